@@ -1,0 +1,1 @@
+"""The exported controller: ONNX export, contract, and the runtime without torch."""

@@ -1,0 +1,1 @@
+"""Trials, metrics, tables, figures and videos."""

@@ -1,0 +1,1 @@
+"""PPO set-up, networks, checkpoints and distillation."""

@@ -1,0 +1,1 @@
+"""The staged runner: plan, keys, artifact store, locks, tracking and console."""

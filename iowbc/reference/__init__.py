@@ -1,0 +1,1 @@
+"""The reference generator: optimal control problem, dataset and network."""

@@ -1,0 +1,1 @@
+"""The robot's description, joint branches and kinematics."""

@@ -1,0 +1,1 @@
+"""MuJoCo: scenes, batched stepping, objects, partner, randomisation and sensing."""
