@@ -1,0 +1,7 @@
+"""The ONNX graph and its checks."""
+
+from iowbc.recipe.section import Section
+
+
+class Export(Section):
+    """The ONNX graph and its checks."""

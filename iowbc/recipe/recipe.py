@@ -1,0 +1,48 @@
+"""The whole recipe: one experiment, from the reference generator to the exported policy."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from iowbc.recipe.distillation import Distillation
+from iowbc.recipe.evaluation import Evaluation
+from iowbc.recipe.execution import Execution
+from iowbc.recipe.export import Export
+from iowbc.recipe.reference import ReferenceGenerator
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation import Simulation
+from iowbc.recipe.task import Task
+from iowbc.recipe.teacher import Teacher
+
+StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+
+
+class Recipe(Section):
+    """One experiment."""
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")
+    """Name of the experiment: lower-case letters, digits, `-` and `_`."""
+    description: str = ""
+    """What the experiment is for, in a sentence."""
+    seed: int = Field(default=0, ge=0)
+    """Seed of everything that is drawn at random."""
+    robot: str = "g1"
+    """Folder under `robots/` that describes the robot."""
+    stages: tuple[StageName, ...] = ("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export")
+    """Stages of this experiment, in the order of the pipeline."""
+    rg: ReferenceGenerator = ReferenceGenerator()
+    """The reference generator: its dataset and its network."""
+    simulation: Simulation = Simulation()
+    """The world: physics, scenes, partner, randomisation, sensing."""
+    task: Task = Task()
+    """The Markov decision process: commands, observation, action, reward, terminations, curriculum."""
+    teacher: Teacher = Teacher()
+    """PPO with privileged information."""
+    distill: Distillation = Distillation()
+    """On-policy distillation of the teacher into the student."""
+    eval: Evaluation = Evaluation()
+    """Trials of the trained policy."""
+    export: Export = Export()
+    """The ONNX graph and its checks."""
+    execution: Execution = Execution()
+    """How this machine runs it; never changes a result, and is not part of any key."""
