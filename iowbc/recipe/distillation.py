@@ -1,7 +1,42 @@
-"""On-policy distillation of the teacher into the student."""
+"""On-policy distillation of the teacher into the student (paper eq. 7)."""
+
+from typing import Literal
+
+from pydantic import Field
 
 from iowbc.recipe.section import Section
 
 
 class Distillation(Section):
     """On-policy distillation of the teacher into the student."""
+
+    steps: int = Field(default=4_000_000, ge=1)
+    """Environment steps, summed over the environments."""
+    environments: int = Field(default=96, ge=1)
+    """Parallel environments."""
+    rollout: int = Field(default=32, ge=1)
+    """Control steps between two rounds of gradient steps."""
+    history: int = Field(default=25, ge=1)
+    """Length of the observation history H_t (paper Table I)."""
+    frame_features: int = Field(default=32, ge=1)
+    """Features to which one observation of the history is projected, with the same weights for all."""
+    latent: int = Field(default=64, ge=1)
+    """Size of what the encoder makes of the whole history."""
+    hidden: tuple[int, ...] = (512, 256, 128)
+    """Hidden layers behind the encoder (paper Table I)."""
+    activation: Literal["elu", "relu", "tanh"] = "elu"
+    """Activation of the hidden layers."""
+    learning_rate: float = Field(default=5e-4, gt=0)
+    """Adam's step size at the start; it falls to a tenth along a cosine."""
+    batch: int = Field(default=1024, ge=1)
+    """Samples of a gradient step, drawn from the whole buffer."""
+    gradient_steps: int = Field(default=12, ge=1)
+    """Gradient steps of one round."""
+    buffer: int = Field(default=300_000, ge=1)
+    """Samples that are kept, the newest."""
+    teacher_share: float = Field(default=0.1, ge=0, le=1)
+    """Part of the steps in which the teacher still drives some of the environments: all of them at first, none at the end of this part."""
+    std_floor: float = Field(default=0.1, gt=0)
+    """Least standard deviation of the two Gaussians in the KL divergence, in units of the action: what makes a mean error matter."""
+    checkpoint_every: int = Field(default=50, ge=1)
+    """Rounds between two checkpoints."""

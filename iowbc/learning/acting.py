@@ -1,0 +1,72 @@
+"""Trained policies as functions of the batched observation, for evaluation and play."""
+
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from iowbc.learning.history import History
+from iowbc.learning.networks import StudentNetwork, TeacherNetwork
+from iowbc.learning.storage import load_student, load_teacher
+
+
+class Policy(Protocol):
+    """A deterministic controller of n environments."""
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        """Forget the past of the marked environments, shape (n,); call before the first `act` of an episode."""
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Mean residual action, shape (n, A), from s_t, shape (n, S), and s_priv, shape (n, P)."""
+
+
+class TeacherPolicy:
+    """The privileged teacher; it has no memory."""
+
+    def __init__(self, network: TeacherNetwork) -> None:
+        self.network = network
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        del which
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        with torch.inference_mode():
+            mean = self.network(torch.from_numpy(np.concatenate([observation, privileged], axis=1)))
+        return np.asarray(mean.numpy(), np.float32)
+
+
+class StudentPolicy:
+    """The student with its observation history."""
+
+    def __init__(self, network: StudentNetwork, length: int) -> None:
+        self.network = network
+        self.length = length
+        self.history: History | None = None
+        self.starts: NDArray[np.bool_] = np.ones(0, np.bool_)
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        if self.starts.shape != which.shape:
+            self.starts = np.ones(which.shape, np.bool_)
+            self.history = None
+        self.starts |= which
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        del privileged
+        if self.history is None:
+            self.history = History(len(observation), self.length, observation.shape[1])
+            self.starts = np.ones(len(observation), np.bool_)
+        frames = self.history.push(observation, self.starts)
+        self.starts[:] = False
+        with torch.inference_mode():
+            mean = self.network(torch.from_numpy(frames))
+        return np.asarray(mean.numpy(), np.float32)
+
+
+def load_policy(folder: Path) -> Policy:
+    """The policy in the artifact of `teacher` or `distill`. Raises FileNotFoundError where there is none."""
+    if (folder / "teacher.json").is_file():
+        return TeacherPolicy(load_teacher(folder)[0])
+    network, about = load_student(folder)
+    return StudentPolicy(network, int(about["architecture"]["history"]))
