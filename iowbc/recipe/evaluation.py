@@ -1,7 +1,156 @@
-"""Trials of the trained policy."""
+"""Trials of the trained policy: which scenes, masses and commands, how often, and what counts as success."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
 
 from iowbc.recipe.section import Section
 
 
+class Segment(Section):
+    """A stretch of a command sequence; the command moves to these values over `ramp` and then holds."""
+
+    duration: float = Field(gt=0, le=600)
+    """How long the segment lasts, its ramp included [s]."""
+    ramp: float = Field(default=0.5, ge=0)
+    """Time over which the command moves linearly from the previous segment's values [s]."""
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Commanded v_x, v_y [m/s] and yaw rate [rad/s] in the heading frame."""
+    height: float | None = Field(default=None, gt=0, lt=1.5)
+    """Commanded pelvis height [m]; empty takes the task's default height."""
+    pitch: float = Field(default=0.0, ge=-1.6, le=1.6)
+    """Commanded torso pitch [rad], positive leans forward."""
+    wrists: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Wrist offsets Δp, left then right, heading frame [m]."""
+
+    @model_validator(mode="after")
+    def _ramp_fits(self) -> Self:
+        if self.ramp > self.duration:
+            raise ValueError(f"ramp {self.ramp} s is longer than the segment's duration {self.duration} s")
+        return self
+
+
+class Beyond(Section):
+    """How a sweep goes on past its last mass, until nothing survives."""
+
+    step: float = Field(default=2.0, gt=0)
+    """Mass added at a time [kg]."""
+    limit: float = Field(default=30.0, gt=0)
+    """No mass above this is tried [kg]."""
+
+
+class Sweep(Section):
+    """Trials over a range of object masses in one scene."""
+
+    scene: str = "lift"
+    """Scene of `simulation.scenes` in which the object is met; a mass of 0 is played in the scene without an object."""
+    masses: tuple[float, ...] = Field(default=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
+    """Object masses [kg], ascending."""
+    beyond: Beyond | None = None
+    """Heavier masses, tried as long as one trial survives; empty stops at the last mass."""
+    rolling_resistance: float | None = Field(default=None, ge=0, le=1)
+    """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
+    partner_share: float | None = Field(default=None, ge=0, le=1)
+    """Share of the weight that the partner bears; empty draws it as in training."""
+    fixed: dict[str, float] = {}
+    """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
+    sequence: tuple[Segment, ...] = ()
+    """Command sequence of this sweep; empty takes `eval.sequence`."""
+
+    @model_validator(mode="after")
+    def _masses_ascend(self) -> Self:
+        if any(mass < 0 for mass in self.masses):
+            raise ValueError(f"masses must not be negative, got {list(self.masses)}")
+        if list(self.masses) != sorted(set(self.masses)):
+            raise ValueError(f"masses must ascend without repetition, got {list(self.masses)}")
+        return self
+
+
+class HeavyCase(Section):
+    """One of the paper's heavy tasks, reported by its success rate."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]*$")
+    """Name of the case in tables and figures."""
+    scene: str
+    """Scene of `simulation.scenes`."""
+    mass: float = Field(gt=0)
+    """Object mass [kg]."""
+    rolling_resistance: float | None = Field(default=None, ge=0, le=1)
+    """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
+    partner_share: float | None = Field(default=None, ge=0, le=1)
+    """Share of the weight that the partner bears; empty draws it as in training."""
+    fixed: dict[str, float] = {}
+    """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
+    sequence: tuple[Segment, ...] = ()
+    """Command sequence of this case; empty takes `eval.sequence`."""
+
+
+class Success(Section):
+    """When a trial counts as survived. A fall, by the task's terminations, never does."""
+
+    drop_fails: bool = True
+    """An object that leaves the hands ends the trial as a failure."""
+    capacity_rate: float = Field(default=0.8, gt=0, le=1)
+    """Success rate that a mass, and every lighter one, must reach to count as carried (load capacity)."""
+
+
+class Video(Section):
+    """Short films of trials."""
+
+    count: int = Field(default=2, ge=0)
+    """Number of films, spread over the sweeps' masses; 0 makes none."""
+    width: int = Field(default=640, ge=64, le=3840, multiple_of=16)
+    """Width of a frame [pixel]; video codecs want multiples of 16."""
+    height: int = Field(default=480, ge=64, le=2160, multiple_of=16)
+    """Height of a frame [pixel]."""
+    fps: int = Field(default=25, ge=1, le=50)
+    """Frames per second."""
+    duration: float = Field(default=20.0, gt=0)
+    """Longest film [s]."""
+    traces: bool = True
+    """Draw scene, mass, time and command into the frames."""
+
+
+STAND_WALK_TURN = (
+    Segment(duration=2.0, ramp=0.0),
+    Segment(duration=4.0, velocity=(0.4, 0.0, 0.0)),
+    Segment(duration=3.0, velocity=(0.3, 0.0, 0.3)),
+    Segment(duration=2.0),
+    Segment(duration=3.0, height=0.65, ramp=1.0),
+    Segment(duration=3.0, height=0.70, pitch=0.3, ramp=1.0),
+    Segment(duration=3.0, ramp=1.0),
+)
+"""Stand, walk, turn, stop, lower the pelvis, lean forward, and back: 20 s."""
+
+
 class Evaluation(Section):
     """Trials of the trained policy."""
+
+    policy: Literal["student", "teacher"] = "student"
+    """Which network acts: the deployable student, or the teacher with its privileged observation."""
+    label: str = Field(default="IO-WBC", min_length=1)
+    """Name of the variant in tables and figures; the paper's are IO-WBC, WBC, w/o RG, w/o Distill."""
+    trials: int = Field(default=5, ge=1)
+    """Trials per mass; trial k of every mass and variant has the same seed."""
+    seed: int = Field(default=1000, ge=0)
+    """Seed of the first trial; apart from the seed of training, so that no trial was met there."""
+    sequence: tuple[Segment, ...] = Field(default=STAND_WALK_TURN, min_length=1)
+    """Commands of a trial, in order; their durations add up to the trial's."""
+    lifting: Sweep | None = Sweep()
+    """Masses lifted (paper's Table II); empty leaves the sweep out."""
+    pushing: Sweep | None = None
+    """Masses pushed (paper's Table III), with a rolling resistance; empty leaves the sweep out."""
+    heavy: tuple[HeavyCase, ...] = ()
+    """The paper's heavy tasks: 7 kg box, 18 kg tyre, 65 kg crate with a partner."""
+    disturbances: bool = False
+    """Keep the impulses on the object and the pushes on the base during trials."""
+    success: Success = Success()
+    """When a trial counts as survived."""
+    video: Video = Video()
+    """Short films of trials."""
+
+    @model_validator(mode="after")
+    def _something_to_do(self) -> Self:
+        if self.lifting is None and self.pushing is None and not self.heavy:
+            raise ValueError("nothing to evaluate: give lifting, pushing or heavy, or leave eval out of the stages")
+        return self

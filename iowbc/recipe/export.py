@@ -1,7 +1,48 @@
-"""The ONNX graph and its checks."""
+"""The ONNX graph, its checks, and the trial that accepts the exported controller."""
 
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.evaluation import Segment
 from iowbc.recipe.section import Section
+
+
+class Acceptance(Section):
+    """A short trial of the exported controller in the simulation; a gate of the stage."""
+
+    scene: str = "lift"
+    """Scene of `simulation.scenes`."""
+    mass: float = Field(default=4.0, ge=0)
+    """Object mass [kg]; 0 is played in the scene without an object."""
+    partner_share: float = Field(default=0.0, ge=0, le=1)
+    """Share of the weight that the partner bears; 0 leaves all of it to the robot."""
+    sequence: tuple[Segment, ...] = Field(default=(Segment(duration=10.0, ramp=0.0),), min_length=1)
+    """Commands of the trial, in order; standing by default."""
+    trials: int = Field(default=5, ge=1)
+    """Number of trials."""
+    seed: int = Field(default=2000, ge=0)
+    """Seed of the first trial."""
+    minimum: int = Field(default=1, ge=0)
+    """Trials that must survive, or the stage fails; 0 only reports."""
+
+    @model_validator(mode="after")
+    def _reachable(self) -> Self:
+        if self.minimum > self.trials:
+            raise ValueError(f"minimum {self.minimum} exceeds the {self.trials} trials")
+        return self
 
 
 class Export(Section):
     """The ONNX graph and its checks."""
+
+    opset: int = Field(default=18, ge=18, le=23)
+    """ONNX operator set; 18 runs on every onnxruntime since 1.14."""
+    parity_tolerance: float = Field(default=1e-5, gt=0)
+    """Largest difference between torch and onnxruntime over the golden vectors [rad, action units]."""
+    golden_steps: int = Field(default=100, ge=1)
+    """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
+    timing_steps: int = Field(default=500, ge=1)
+    """Inferences timed for the report."""
+    acceptance: Acceptance | None = Acceptance()
+    """The trial that accepts the exported controller; empty leaves it out."""
