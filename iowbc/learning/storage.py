@@ -13,9 +13,13 @@ from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 KINDS: dict[str, type[nn.Module]] = {"teacher": TeacherNetwork, "student": StudentNetwork}
 
 
-def save_network(network: nn.Module, architecture: dict[str, Any], folder: Path, kind: str, about: dict[str, Any]) -> None:
-    """Write `<kind>.safetensors` and `<kind>.json` (the constructor's arguments, and what else a reader should know)."""
-    save_file({name: value.contiguous() for name, value in network.state_dict().items()}, folder / f"{kind}.safetensors")
+def save_network(
+    network: nn.Module, architecture: dict[str, Any], folder: Path, kind: str, about: dict[str, Any]
+) -> None:
+    """Write `<kind>.safetensors` and `<kind>.json` (the constructor's arguments and what else to know)."""
+    save_file(
+        {name: value.contiguous() for name, value in network.state_dict().items()}, folder / f"{kind}.safetensors"
+    )
     text = json.dumps({"kind": kind, "architecture": architecture, **about}, indent=1)
     (folder / f"{kind}.json").write_text(text + "\n")
 

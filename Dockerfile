@@ -1,0 +1,24 @@
+FROM python:3.11-slim-bookworm
+
+# OSMesa draws pictures without a display or a GPU.
+RUN apt-get update \
+ && apt-get install --yes --no-install-recommends libosmesa6 \
+ && rm -rf /var/lib/apt/lists/*
+
+WORKDIR /iowbc
+COPY pyproject.toml constraints.txt README.md LICENSE NOTICE ./
+# The heavy packages are a layer of their own, made again only when the versions change.
+RUN python3 -m venv /opt/venv \
+ && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt torch==2.13.0 \
+ && mkdir iowbc robots && touch iowbc/__init__.py \
+ && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt --editable .
+COPY iowbc iowbc
+COPY robots robots
+COPY recipes recipes
+
+RUN useradd --create-home --uid 1000 iowbc && mkdir -p runs && chown iowbc:iowbc runs
+USER iowbc
+ENV PATH=/opt/venv/bin:$PATH MUJOCO_GL=osmesa MLFLOW_DISABLE_TELEMETRY=true
+VOLUME ["/iowbc/runs"]
+ENTRYPOINT ["iowbc"]
+CMD ["--help"]

@@ -1,0 +1,36 @@
+# make test   sets everything up, then lint, types and tests
+# make run    sets everything up, then the quickstart recipe
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: setup test lint types run image clean
+
+setup: $(READY)
+
+# torch is asked for first and alone: an open range can bring several GB of accelerator packages.
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt torch==2.13.0
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $(READY)
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: setup
+	$(BIN)/mypy
+
+test: lint types
+	$(BIN)/pytest
+
+run: setup
+	$(BIN)/iowbc run recipes/quickstart.yaml
+
+image:
+	docker build --tag iowbc .
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info

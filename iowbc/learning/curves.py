@@ -1,0 +1,56 @@
+"""Learning curves: one line of JSON an update, kept beside the checkpoint, and their figure."""
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+
+class Curves:
+    """Rows of named values by environment step; a resumed training drops the rows after its checkpoint."""
+
+    def __init__(self, path: Path, step: int) -> None:
+        self.path = path
+        self.rows: list[dict[str, float]] = []
+        if path.is_file():
+            for line in path.read_text().splitlines():
+                try:
+                    row = json.loads(line)
+                except json.JSONDecodeError:
+                    break
+                if row["step"] <= step:
+                    self.rows.append(row)
+        path.write_text("".join(json.dumps(row) + "\n" for row in self.rows))
+
+    def append(self, step: int, values: Mapping[str, float]) -> None:
+        """Add a row; step in environment steps."""
+        row = {"step": step, **values}
+        self.rows.append(row)
+        with self.path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+
+    def write_csv(self, path: Path) -> None:
+        """All rows as a table, one column a name."""
+        names = list(dict.fromkeys(name for row in self.rows for name in row))
+        with path.open("w", newline="") as file:
+            writer = csv.DictWriter(file, names, restval="")
+            writer.writeheader()
+            writer.writerows(self.rows)
+
+    def write_figure(self, path: Path, title: str, panels: Sequence[str]) -> None:
+        """One panel a name, those without values left out."""
+        from matplotlib.figure import Figure
+
+        shown = [name for name in panels if any(name in row for row in self.rows)]
+        columns = 3
+        lines = -(-len(shown) // columns)
+        figure = Figure(figsize=(4 * columns, 2.6 * lines), layout="constrained")
+        figure.suptitle(title)
+        for position, name in enumerate(shown, 1):
+            axes = figure.add_subplot(lines, columns, position)
+            points = [(row["step"] / 1e6, row[name]) for row in self.rows if name in row]
+            axes.plot(*zip(*points, strict=True), linewidth=1)
+            axes.set_title(name, fontsize=9)
+            axes.set_xlabel("million environment steps", fontsize=8)
+            axes.grid(alpha=0.3)
+        figure.savefig(path, dpi=110)

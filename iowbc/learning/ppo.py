@@ -1,0 +1,154 @@
+"""PPO of stable-baselines3 as the recipe sets it up, its complete state, and the network it leaves behind."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.buffers import RolloutBuffer
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+
+from iowbc.learning import checkpoint
+from iowbc.learning.networks import ACTIVATIONS, TeacherNetwork
+from iowbc.learning.symmetry import MirroredRolloutBuffer, MirrorMap, SymmetricMeanStd
+from iowbc.recipe.teacher import Teacher
+
+VARIANCE_FLOOR = 1e-4
+"""Added to variances: an input that hardly moves in training is not blown up when it does."""
+
+
+def normalize(env: VecEnv, teacher: Teacher, mirror: MirrorMap | None) -> VecNormalize:
+    """Normalise observations and rewards of `env` by running statistics."""
+    normalized = VecNormalize(env, gamma=teacher.gamma, clip_obs=teacher.normalization_clip, epsilon=VARIANCE_FLOOR)
+    if mirror is not None:
+        normalized.obs_rms = SymmetricMeanStd(mirror)
+    return normalized
+
+
+def make_ppo(
+    teacher: Teacher,
+    env: VecNormalize,
+    seed: int,
+    observation_mirror: MirrorMap | None,
+    action_mirror: MirrorMap | None,
+) -> PPO:
+    """PPO with the recipe's numbers; starts as the reference itself (the mean action begins near zero)."""
+    first, last = teacher.learning_rate, teacher.learning_rate_end or teacher.learning_rate
+    buffer: dict[str, Any] = {"rollout_buffer_class": RolloutBuffer}
+    if observation_mirror is not None and action_mirror is not None:
+        mirrors = {"observation_mirror": observation_mirror, "action_mirror": action_mirror}
+        buffer = {"rollout_buffer_class": MirroredRolloutBuffer, "rollout_buffer_kwargs": mirrors}
+    hidden = list(teacher.hidden)
+    model = PPO(
+        "MlpPolicy",
+        env,
+        learning_rate=lambda remaining: last + (first - last) * remaining,
+        n_steps=teacher.rollout,
+        batch_size=teacher.environments * teacher.rollout // teacher.minibatches,
+        n_epochs=teacher.epochs,
+        gamma=teacher.gamma,
+        gae_lambda=teacher.gae_lambda,
+        clip_range=teacher.clip,
+        ent_coef=teacher.entropy,
+        vf_coef=teacher.value_weight,
+        max_grad_norm=teacher.gradient_norm,
+        target_kl=teacher.target_kl,
+        seed=seed,
+        device="cpu",
+        policy_kwargs={
+            "net_arch": {"pi": hidden, "vf": hidden},
+            "activation_fn": ACTIVATIONS[teacher.activation],
+            "log_std_init": float(np.log(teacher.initial_std)),
+        },
+        **buffer,
+    )
+    model.set_logger(Logger(folder=None, output_formats=[]))
+    return model
+
+
+class AfterUpdate(BaseCallback):  # type: ignore[misc]
+    """Calls `do` with the training's own figures after every update, at the boundary between two rollouts."""
+
+    def __init__(self, do: Callable[[dict[str, float]], None]) -> None:
+        super().__init__()
+        self.do = do
+        self.updates = 0
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if self.updates:
+            self._report()
+        self.updates += 1
+
+    def _on_training_end(self) -> None:
+        self._report()
+
+    def _report(self) -> None:
+        values = self.model.logger.name_to_value
+        self.do({name: float(value) for name, value in values.items() if name.startswith("train/")})
+
+
+def ppo_arrays(model: PPO, env: VecNormalize) -> checkpoint.Arrays:
+    """Networks, optimiser, normalisation, last observation and random states, between two rollouts."""
+    assert model._last_obs is not None
+    assert model._last_episode_starts is not None
+    return {
+        **checkpoint.prefixed("policy", checkpoint.module_arrays(model.policy)),
+        **checkpoint.prefixed("optimizer", checkpoint.optimizer_arrays(model.policy.optimizer)),
+        **checkpoint.prefixed("random", checkpoint.random_arrays()),
+        **{f"normalization/observation_{name}": value for name, value in _moments(env.obs_rms).items()},
+        **{f"normalization/return_{name}": value for name, value in _moments(env.ret_rms).items()},
+        "normalization/returns": env.returns,
+        "last/observation": np.asarray(model._last_obs),
+        "last/episode_starts": np.asarray(model._last_episode_starts),
+        "counters": np.array([model.num_timesteps, model._n_updates]),
+    }
+
+
+def restore_ppo(model: PPO, env: VecNormalize, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Inverse of `ppo_arrays`, on a model made from the same recipe."""
+    checkpoint.restore_module(model.policy, checkpoint.under("policy", arrays))
+    checkpoint.restore_optimizer(model.policy.optimizer, checkpoint.under("optimizer", arrays))
+    for statistics, name in ((env.obs_rms, "observation"), (env.ret_rms, "return")):
+        statistics.mean = np.array(arrays[f"normalization/{name}_mean"])
+        statistics.var = np.array(arrays[f"normalization/{name}_var"])
+        statistics.count = float(arrays[f"normalization/{name}_count"][0])
+    env.returns = np.array(arrays["normalization/returns"])
+    model._last_obs = np.array(arrays["last/observation"])
+    model._last_episode_starts = np.array(arrays["last/episode_starts"])
+    model.num_timesteps, model._n_updates = (int(value) for value in arrays["counters"])
+    checkpoint.restore_random(checkpoint.under("random", arrays))
+
+
+def _moments(statistics: Any) -> checkpoint.Arrays:
+    return {
+        "mean": np.asarray(statistics.mean),
+        "var": np.asarray(statistics.var),
+        "count": np.array([statistics.count], np.float64),
+    }
+
+
+def teacher_network(model: PPO, env: VecNormalize, teacher: Teacher) -> tuple[TeacherNetwork, dict[str, Any]]:
+    """The deterministic policy with its normalisation, and the arguments that rebuild it."""
+    (inputs,), (actions,) = env.observation_space.shape, env.action_space.shape
+    architecture: dict[str, Any] = {
+        "inputs": int(inputs),
+        "actions": int(actions),
+        "hidden": list(teacher.hidden),
+        "activation": teacher.activation,
+        "clip": teacher.normalization_clip,
+    }
+    network = TeacherNetwork(**architecture)
+    source = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
+    for target, layer in zip(network.body, source, strict=True):
+        target.load_state_dict(layer.state_dict())
+    network.normalizer.mean.copy_(torch.from_numpy(env.obs_rms.mean))
+    network.normalizer.std.copy_(torch.from_numpy(np.sqrt(env.obs_rms.var + VARIANCE_FLOOR)))
+    network.log_std.copy_(model.policy.log_std.detach())
+    return network.requires_grad_(False), architecture

@@ -1,0 +1,164 @@
+"""Stage `distill`: the student drives, the teacher says what it would have done, the student learns it (DAgger)."""
+
+import json
+import time
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.contract import Interrupted, Job, Stage
+
+PANELS = ("kl", "action_rmse", "action_agreement", "episode_seconds", "teacher_share", "reward")
+"""Shown in the figure of the learning curves."""
+
+
+def _reads(recipe: Recipe) -> tuple[str, ...]:
+    return ("rg-fit", "teacher") if recipe.task.references.use_rg else ("teacher",)
+
+
+def run(job: Job) -> None:
+    """Distil the teacher; leave the student's network, normalisation and curves."""
+    import numpy as np
+    import torch
+
+    from iowbc.learning import checkpoint
+    from iowbc.learning.acting import TeacherPolicy
+    from iowbc.learning.curves import Curves
+    from iowbc.learning.distillation import Experience, gradient_step, mirror_half
+    from iowbc.learning.history import History
+    from iowbc.learning.networks import StudentNetwork
+    from iowbc.learning.storage import load_teacher, save_network
+    from iowbc.learning.symmetry import mirror_maps
+    from iowbc.task.vector_env import VectorEnv
+
+    torch.set_num_threads(max(job.workers, 1))  # learner and workers take turns on the same cores
+    torch.manual_seed(job.recipe.seed)
+    recipe, settings = job.recipe, job.recipe.distill
+    teacher_net, about = load_teacher(job.inputs["teacher"])
+    teacher = TeacherPolicy(teacher_net)
+    environment = VectorEnv(
+        recipe,
+        job.robot,
+        rg=job.inputs.get("rg-fit"),
+        num_envs=settings.environments,
+        workers=job.workers,
+        seed=recipe.seed + 1,
+    )
+    try:
+        environment.set_curriculum(about["curriculum"])
+        layout = environment.layout
+        size, actions = layout.observation.stop, environment.action_space.shape[0]
+        architecture = {
+            "observation": size,
+            "history": settings.history,
+            "actions": actions,
+            "frame_features": settings.frame_features,
+            "latent": settings.latent,
+            "hidden": list(settings.hidden),
+            "activation": settings.activation,
+            "clip": recipe.teacher.normalization_clip,
+        }
+        student = StudentNetwork(**architecture)
+        student.normalizer.mean.copy_(teacher_net.normalizer.mean[layout.observation])
+        student.normalizer.std.copy_(teacher_net.normalizer.std[layout.observation])
+        std = torch.clamp(teacher_net.log_std.exp(), min=settings.std_floor)
+        optimizer = torch.optim.Adam(student.parameters(), settings.learning_rate)
+        random = np.random.default_rng(recipe.seed)
+        observation_mirror, action_mirror = mirror_maps(environment, layout.observation)
+        experience = Experience(settings.buffer, settings.environments, size, actions, settings.history)
+        history = History(settings.environments, settings.history, size)
+        starts = np.ones(settings.environments, np.bool_)
+        teacher_drives = np.arange(settings.environments) / settings.environments
+        rounds = -(-settings.steps // (settings.environments * settings.rollout))
+        done_rounds = 0
+
+        path = job.work / "checkpoint.safetensors"
+        found = checkpoint.load_checkpoint(path, job.key)
+        if found is not None:
+            arrays, state = found
+            done_rounds = state["rounds"]
+            random.bit_generator.state = state["random"]
+            checkpoint.restore_module(student, checkpoint.under("student", arrays))
+            checkpoint.restore_optimizer(optimizer, checkpoint.under("optimizer", arrays))
+            experience.restore(checkpoint.under("experience", arrays))
+            environment.restore(checkpoint.under("environment", arrays))
+            history.frames[:], starts[:] = arrays["history"], arrays["starts"]
+            observation = arrays["observation"]
+            job.report.say(f"distill: resumed from its checkpoint at round {done_rounds} of {rounds}")
+        else:
+            observation = environment.reset()
+        curves = Curves(job.work / "curves.jsonl", done_rounds * settings.environments * settings.rollout)
+
+        def save() -> None:
+            arrays = {
+                **checkpoint.prefixed("student", checkpoint.module_arrays(student)),
+                **checkpoint.prefixed("optimizer", checkpoint.optimizer_arrays(optimizer)),
+                **checkpoint.prefixed("experience", experience.arrays()),
+                **checkpoint.prefixed("environment", environment.state()),
+                "history": history.frames,
+                "starts": starts,
+                "observation": observation,
+            }
+            state = {"rounds": done_rounds, "random": random.bit_generator.state}
+            checkpoint.save_checkpoint(path, job.key, arrays, state)
+
+        for done_rounds in range(done_rounds + 1, rounds + 1):
+            began = time.monotonic()
+            progress = (done_rounds - 1) / rounds
+            teacher_share = max(0.0, 1.0 - progress / settings.teacher_share) if settings.teacher_share else 0.0
+            errors, targets_square = [], []
+            for _ in range(settings.rollout):
+                frame = observation[:, layout.observation]
+                target = teacher.act(frame, observation[:, layout.privileged])
+                frames = history.push(frame, starts)
+                with torch.inference_mode():
+                    action = student(torch.from_numpy(frames)).numpy()
+                experience.add(frame, target, starts)
+                errors.append(np.mean((action - target) ** 2))
+                targets_square.append(np.mean(target**2))
+                driven = np.where((teacher_drives < teacher_share)[:, None], target, action)
+                observation, _, starts, _ = environment.step(driven)
+            for group in optimizer.param_groups:
+                group["lr"] = settings.learning_rate * (0.1 + 0.9 * 0.5 * (1 + np.cos(np.pi * progress)))
+            losses = []
+            for _ in range(settings.gradient_steps):
+                histories, targets = experience.sample(settings.batch, random)
+                if recipe.teacher.symmetry == "augment":
+                    mirror_half(histories, targets, observation_mirror, action_mirror, random)
+                losses.append(gradient_step(student, optimizer, histories, targets, std))
+
+            steps = done_rounds * settings.environments * settings.rollout
+            values = {
+                "kl": float(np.mean(losses)),
+                "action_rmse": float(np.sqrt(np.mean(errors))),
+                "action_agreement": float(1 - np.mean(errors) / np.mean(targets_square)),
+                "teacher_share": teacher_share,
+                "steps_per_second": settings.environments * settings.rollout / (time.monotonic() - began),
+                **environment.statistics(),
+            }
+            curves.append(steps, values)
+            job.report.metrics(values, steps)
+            job.report.progress(steps, rounds * settings.environments * settings.rollout, f"KL {values['kl']:.3f}")
+            stop = job.interrupted()
+            if stop or done_rounds % settings.checkpoint_every == 0:
+                save()
+            if stop:
+                raise Interrupted(f"distill: stopped at round {done_rounds} of {rounds}, checkpoint written")
+    finally:
+        environment.close()
+
+    save_network(student, architecture, job.out, "student", {"layout": layout.describe()})
+    (job.out / "tables").mkdir()
+    (job.out / "figures").mkdir()
+    curves.write_csv(job.out / "tables" / "learning_curves.csv")
+    curves.write_figure(job.out / "figures" / "learning_curves.png", f"{recipe.name}: student", PANELS)
+    metrics = {name: curves.rows[-1][name] for name in ("step", *PANELS, "steps_per_second")}
+    (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
+
+
+STAGE = Stage(
+    name="distill",
+    version=1,
+    slice=("seed", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
+    reads=_reads,
+    run=run,
+    packages=("stages.distill", "learning", "task", "sim", "reference.network", "robot"),
+)

@@ -1,0 +1,132 @@
+"""Stage `teacher`: PPO with privileged information on the vector environment, resumable at every checkpoint."""
+
+import time
+from typing import TYPE_CHECKING
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.contract import Interrupted, Job, Stage
+
+if TYPE_CHECKING:
+    from iowbc.learning.curves import Curves
+
+PANELS = (
+    "episode_seconds",
+    "reward",
+    "curriculum_level",
+    "train/approx_kl",
+    "train/std",
+    "train/explained_variance",
+)
+"""Shown in the figure of the learning curves, before the reward's terms."""
+
+
+def _reads(recipe: Recipe) -> tuple[str, ...]:
+    return ("rg-fit",) if recipe.task.references.use_rg else ()
+
+
+def run(job: Job) -> None:
+    """Train the teacher; leave its network, normalisation, curves, and an SB3 zip for users' own code."""
+    import torch
+
+    from iowbc.learning import checkpoint, ppo
+    from iowbc.learning.curves import Curves
+    from iowbc.learning.storage import save_network
+    from iowbc.learning.symmetry import mirror_maps
+    from iowbc.task.vector_env import VectorEnv
+
+    torch.set_num_threads(max(job.workers, 1))  # learner and workers take turns on the same cores
+    recipe, settings = job.recipe, job.recipe.teacher
+    environment = VectorEnv(
+        recipe,
+        job.robot,
+        rg=job.inputs.get("rg-fit"),
+        num_envs=settings.environments,
+        workers=job.workers,
+        seed=recipe.seed,
+    )
+    try:
+        mirrors = mirror_maps(environment) if settings.symmetry == "augment" else (None, None)
+        env = ppo.normalize(environment, settings, mirrors[0])
+        model = ppo.make_ppo(settings, env, recipe.seed, *mirrors)
+        path = job.work / "checkpoint.safetensors"
+        found = checkpoint.load_checkpoint(path, job.key)
+        if found is not None:
+            arrays, _ = found
+            environment.restore(checkpoint.under("environment", arrays))
+            ppo.restore_ppo(model, env, arrays)
+            job.report.say(f"teacher: resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps")
+        curves = Curves(job.work / "curves.jsonl", model.num_timesteps)
+        clock = _Clock(model.num_timesteps)
+
+        def save() -> None:
+            arrays = {
+                **ppo.ppo_arrays(model, env),
+                **checkpoint.prefixed("environment", environment.state()),
+            }
+            checkpoint.save_checkpoint(path, job.key, arrays, {})
+
+        def after_update(training: dict[str, float]) -> None:
+            steps = model.num_timesteps
+            values = {**environment.statistics(), **training, "steps_per_second": clock.rate(steps)}
+            curves.append(steps, values)
+            job.report.metrics(values, steps)
+            job.report.progress(min(steps, settings.steps), settings.steps, f"{values['episode_seconds']:.1f} s an episode")
+            updates = steps // (settings.environments * settings.rollout)
+            stop = job.interrupted()
+            if stop or updates % settings.checkpoint_every == 0:
+                save()
+            if stop:
+                raise Interrupted(f"teacher: stopped at {steps:,} of {settings.steps:,} steps, checkpoint written")
+
+        if model.num_timesteps < settings.steps:
+            model.learn(
+                settings.steps - model.num_timesteps,
+                callback=ppo.AfterUpdate(after_update),
+                log_interval=None,  # type: ignore[arg-type]  # never dumps: the figures are read after each update
+                reset_num_timesteps=False,
+            )
+        save()
+
+        network, architecture = ppo.teacher_network(model, env, settings)
+        about = {"layout": environment.layout.describe(), "curriculum": environment.curriculum()}
+        save_network(network, architecture, job.out, "teacher", about)
+        model.save(job.out / "teacher_sb3.zip")
+        _write_curves(job, curves)
+    finally:
+        environment.close()
+
+
+class _Clock:
+    """Environment steps a second since the previous call."""
+
+    def __init__(self, steps: int) -> None:
+        self.steps, self.time = steps, time.monotonic()
+
+    def rate(self, steps: int) -> float:
+        now = time.monotonic()
+        rate = (steps - self.steps) / (now - self.time)
+        self.steps, self.time = steps, now
+        return rate
+
+
+def _write_curves(job: Job, curves: "Curves") -> None:
+    import json
+
+    (job.out / "tables").mkdir()
+    (job.out / "figures").mkdir()
+    curves.write_csv(job.out / "tables" / "learning_curves.csv")
+    terms = sorted({name for row in curves.rows for name in row if name.startswith("reward/")})
+    curves.write_figure(job.out / "figures" / "learning_curves.png", f"{job.recipe.name}: teacher", [*PANELS, *terms])
+    last = curves.rows[-1]
+    metrics = {name: last[name] for name in ("step", *PANELS, "steps_per_second") if name in last}
+    (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
+
+
+STAGE = Stage(
+    name="teacher",
+    version=1,
+    slice=("seed", "simulation", "task", "teacher"),
+    reads=_reads,
+    run=run,
+    packages=("stages.teacher", "learning", "task", "sim", "reference.network", "robot"),
+)
