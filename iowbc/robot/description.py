@@ -1,0 +1,193 @@
+"""What the rest of the package knows of a robot: its joints, branches, gains, limits and named frames."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from iowbc.robot.mjcf import Tree, read_tree
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+
+ROW_KEYS = frozenset({"kp", "kd", "velocity", "default", "scale", "mirrored"})
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot's description. Arrays are in the MJCF's joint order, shape (joints,), unless said otherwise."""
+
+    folder: Path
+    name: str
+    mjcf: Path
+    tree: Tree
+    """The MJCF as bodies, joints, sites and collision capsules."""
+    joints: tuple[str, ...]
+    """Joint names in MJCF order."""
+    support: Indices
+    """Support branch S: indices of its joints, in the order of the policy's action."""
+    interaction: Indices
+    """Interaction branch I: indices of the arm joints."""
+    kp: Array
+    """Position gains [N·m/rad]."""
+    kd: Array
+    """Velocity gains [N·m·s/rad]."""
+    effort: Array
+    """Torque limits [N·m]."""
+    armature: Array
+    """Rotor inertias at the joints [kg·m²]."""
+    velocity_limit: Array
+    """Joint speed limits [rad/s]."""
+    lower: Array
+    upper: Array
+    """Joint ranges [rad]."""
+    default_position: Array
+    """The default posture [rad]."""
+    action_scale: Array
+    """Radians that one unit of the policy's action adds, shape (support joints,)."""
+    wrists: tuple[str, str]
+    """Sites that the wrist commands move (left, right): the grip points."""
+    wrist_bodies: tuple[str, str]
+    """Bodies that carry those sites."""
+    grip_offset: Array
+    """Position of the wrist sites in their bodies' frames, shape (2, 3) [m]."""
+    soles: tuple[str, str]
+    """Sites at the centre of each sole, on the sole plane."""
+    sole_bodies: tuple[str, str]
+    """Bodies that carry those sites."""
+    sole_polygon: Array
+    """Corners of the contact polygon in the frames of the sole sites: x and y, shape (2, 4, 2) [m]."""
+    torso: str
+    base: str
+    """Body names of the torso and of the floating base."""
+    default_height: float
+    """Height of the base above the ground in the default posture, soles flat [m]."""
+
+
+def robot_folder(name: str) -> Path:
+    """Finds `robots/<name>`: in the current folder, else in the checkout, else in the installed package."""
+    package = Path(__file__).resolve().parents[1]
+    roots = [Path.cwd() / "robots", package.parent / "robots", package / "robots"]
+    for root in roots:
+        if (root / name / "robot.yaml").is_file():
+            return root / name
+    known = sorted({found.parent.name for root in roots for found in root.glob("*/robot.yaml")})
+    raise FileNotFoundError(
+        f"no robot {name!r}: looked for {name}/robot.yaml in {', '.join(str(root) for root in roots)}; "
+        f"known robots: {', '.join(known) or 'none'}"
+    )
+
+
+def load_robot(folder: Path) -> Robot:
+    """Reads `robot.yaml` and the MJCF it names. Errors name the file, the entry, and what would be valid."""
+    source = folder / "robot.yaml"
+    entries = yaml.safe_load(source.read_text(encoding="utf-8"))
+    if not isinstance(entries, Mapping):
+        raise ValueError(f"{source}: expected a mapping of entries, found {type(entries).__name__}")
+    needed = ("name", "mjcf", "base", "torso", "soles", "wrists", "support", "joints")
+    missing = [key for key in needed if key not in entries]
+    if missing:
+        raise ValueError(f"{source}: missing {', '.join(missing)}")
+    mjcf = folder / entries["mjcf"]
+    tree = read_tree(mjcf)
+    hinges = tree.hinges()
+    joints = tuple(hinge.name for hinge in hinges)
+    for key in ("base", "torso"):
+        if entries[key] not in tree.bodies:
+            raise ValueError(
+                f"{source}: {key}: no body {entries[key]!r} in {mjcf.name}; it has {', '.join(tree.bodies)}"
+            )
+    support = _support(entries["support"], joints, source)
+    rows = [_row(entries["joints"], name, source) for name in joints]
+    unused = set(entries["joints"]) - {_kind(name) for name in joints}
+    if unused:
+        raise ValueError(f"{source}: joints: no joint of {mjcf.name} is of kind {', '.join(sorted(unused))}")
+    default = np.array([_default(row, name) for row, name in zip(rows, joints, strict=True)])
+    lower = np.array([hinge.lower for hinge in hinges])
+    upper = np.array([hinge.upper for hinge in hinges])
+    for index, name in enumerate(joints):
+        if not lower[index] <= default[index] <= upper[index]:
+            raise ValueError(
+                f"{source}: default position {default[index]} of {name} is outside its range "
+                f"{lower[index]} to {upper[index]} rad"
+            )
+    scales = [rows[index].get("scale") for index in support]
+    if None in scales:
+        raise ValueError(f"{source}: joints: support joint {joints[support[scales.index(None)]]} has no `scale`")
+    wrists, soles = _pair(entries, "wrists", source), _pair(entries, "soles", source)
+    wrist_bodies, sole_bodies = (
+        [tree.body_of_site(site) for site in wrists],
+        [tree.body_of_site(site) for site in soles],
+    )
+    posture = dict(zip(joints, default.tolist(), strict=True))
+    return Robot(
+        folder=folder,
+        name=str(entries["name"]),
+        mjcf=mjcf,
+        tree=tree,
+        joints=joints,
+        support=support,
+        interaction=np.array([index for index in range(len(joints)) if index not in set(support.tolist())]),
+        kp=np.array([float(row["kp"]) for row in rows]),
+        kd=np.array([float(row["kd"]) for row in rows]),
+        effort=np.array([hinge.effort for hinge in hinges]),
+        armature=np.array([hinge.armature for hinge in hinges]),
+        velocity_limit=np.array([float(row["velocity"]) for row in rows]),
+        lower=lower,
+        upper=upper,
+        default_position=default,
+        action_scale=np.array(scales, dtype=np.float64),
+        wrists=wrists,
+        wrist_bodies=(wrist_bodies[0].name, wrist_bodies[1].name),
+        grip_offset=np.stack([body.sites[site] for body, site in zip(wrist_bodies, wrists, strict=True)]),
+        soles=soles,
+        sole_bodies=(sole_bodies[0].name, sole_bodies[1].name),
+        sole_polygon=np.stack(
+            [body.feet - body.sites[site][:2] for body, site in zip(sole_bodies, soles, strict=True)]
+        ),
+        torso=str(entries["torso"]),
+        base=str(entries["base"]),
+        default_height=-float(tree.forward(posture, entries["base"], soles[0])[0][2]),
+    )
+
+
+def _kind(joint: str) -> str:
+    """The name of the joint without its side and ending: `left_hip_pitch_joint` is a `hip_pitch`."""
+    return joint.removeprefix("left_").removeprefix("right_").removesuffix("_joint")
+
+
+def _row(rows: Mapping[str, Mapping[str, Any]], joint: str, source: Path) -> Mapping[str, Any]:
+    row = rows.get(_kind(joint))
+    if row is None:
+        raise ValueError(f"{source}: joints: no row {_kind(joint)!r} for {joint}; rows: {', '.join(rows)}")
+    unknown = set(row) - ROW_KEYS
+    absent = {"kp", "kd", "velocity", "default"} - set(row)
+    if unknown or absent:
+        raise ValueError(
+            f"{source}: joints.{_kind(joint)}: unknown {sorted(unknown)}, missing {sorted(absent)}; "
+            f"a row has {', '.join(sorted(ROW_KEYS))}"
+        )
+    return row
+
+
+def _default(row: Mapping[str, Any], joint: str) -> float:
+    sign = -1.0 if row.get("mirrored", False) and joint.startswith("right_") else 1.0
+    return sign * float(row["default"])
+
+
+def _support(names: list[str], joints: tuple[str, ...], source: Path) -> Indices:
+    unknown = [name for name in names if name not in joints]
+    if unknown or len(set(names)) != len(names):
+        raise ValueError(f"{source}: support: unknown or repeated joints {unknown}; the MJCF has {', '.join(joints)}")
+    return np.array([joints.index(name) for name in names])
+
+
+def _pair(entries: Mapping[str, Any], key: str, source: Path) -> tuple[str, str]:
+    value = entries[key]
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"{source}: {key}: expected [left, right], found {value!r}")
+    return str(value[0]), str(value[1])

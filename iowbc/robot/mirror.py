@@ -1,0 +1,68 @@
+"""Left-right mirror maps: reflection across the sagittal plane (y to -y) of joints and vectors."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.robot.description import Robot
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+
+VECTOR_SIGN = np.array([1.0, -1.0, 1.0])
+"""A polar vector (position, velocity, force) in a frame of the sagittal plane."""
+AXIAL_SIGN = np.array([-1.0, 1.0, -1.0])
+"""An axial vector (angular velocity, torque); also roll, pitch, yaw."""
+QUATERNION_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+"""A rotation, wxyz."""
+
+
+@dataclass(frozen=True)
+class MirrorMap:
+    """mirrored[..., i] = sign[i] * values[..., permutation[i]]; its own inverse."""
+
+    permutation: Indices
+    sign: Array
+
+    def __call__(self, values: Array) -> Array:
+        """The mirror image of values, shape (..., size)."""
+        mirrored: Array = self.sign * values[..., self.permutation]
+        return mirrored
+
+
+def joint_mirror(robot: Robot) -> MirrorMap:
+    """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints)."""
+    permutation = np.array([robot.joints.index(_other_side(name)) for name in robot.joints])
+    return MirrorMap(permutation, np.array([_sign(hinge.axis) for hinge in robot.tree.hinges()]))
+
+
+def support_mirror(robot: Robot) -> MirrorMap:
+    """Mirror of the support branch in its own order, shape (..., support joints)."""
+    return _restricted(joint_mirror(robot), robot.support)
+
+
+def interaction_mirror(robot: Robot) -> MirrorMap:
+    """Mirror of the interaction branch in its own order, shape (..., arm joints)."""
+    return _restricted(joint_mirror(robot), robot.interaction)
+
+
+def _restricted(whole: MirrorMap, branch: Indices) -> MirrorMap:
+    place = {int(joint): index for index, joint in enumerate(branch)}
+    permutation = np.array([place[int(whole.permutation[joint])] for joint in branch])
+    return MirrorMap(permutation, whole.sign[branch])
+
+
+def _other_side(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name.removeprefix("left_")
+    if name.startswith("right_"):
+        return "left_" + name.removeprefix("right_")
+    return name
+
+
+def _sign(axis: Array) -> float:
+    """A hinge is an axial vector: reflection keeps a rotation about y and reverses one about x or z."""
+    leading = int(np.argmax(np.abs(axis)))
+    return float(AXIAL_SIGN[leading])

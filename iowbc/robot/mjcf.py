@@ -1,0 +1,174 @@
+"""Reads a robot's MJCF as a tree of bodies with NumPy alone: kinematics where there is no simulator."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.robot import rotations
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A hinge joint at its body's origin."""
+
+    name: str
+    axis: Array
+    """Unit axis in the body frame, shape (3,)."""
+    lower: float
+    upper: float
+    """Range [rad]."""
+    effort: float
+    """Largest torque [N·m]."""
+    armature: float
+    """Rotor inertia seen at the joint [kg·m²]."""
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A collision shape in its body's frame; a sphere is a capsule of no length."""
+
+    name: str
+    start: Array
+    end: Array
+    """Ends of the axis, shape (3,) [m]."""
+    radius: float
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body, its place in the parent's frame, and what hangs on it."""
+
+    name: str
+    parent: str | None
+    position: Array
+    """Origin in the parent's frame, shape (3,) [m]."""
+    quaternion: Array
+    """Orientation in the parent's frame, wxyz."""
+    hinge: Hinge | None
+    sites: dict[str, Array]
+    """Position of each site in the body frame, shape (3,) [m]."""
+    capsules: tuple[Capsule, ...]
+    """Shapes of class `body`: those that can collide with other links."""
+    feet: Array
+    """Ground contact points of class `foot`: x and y in the body frame, shape (points, 2) [m]."""
+
+
+@dataclass(frozen=True)
+class Tree:
+    """The bodies in the file's order (parents first)."""
+
+    bodies: dict[str, Body]
+    excluded: frozenset[frozenset[str]] = field(default_factory=frozenset)
+    """Pairs of bodies that are never checked for collision."""
+
+    def hinges(self) -> tuple[Hinge, ...]:
+        """Joints in MuJoCo's order."""
+        return tuple(body.hinge for body in self.bodies.values() if body.hinge is not None)
+
+    def body_of_site(self, site: str) -> Body:
+        """The body that carries a site."""
+        for body in self.bodies.values():
+            if site in body.sites:
+                return body
+        known = sorted(name for body in self.bodies.values() for name in body.sites)
+        raise ValueError(f"the MJCF has no site {site!r}; its sites are {', '.join(known)}")
+
+    def chain(self, end: str, start: str) -> tuple[Body, ...]:
+        """Bodies from below `start` down to `end`."""
+        found: list[Body] = []
+        name: str | None = end
+        while name != start:
+            if name is None or name not in self.bodies:
+                raise ValueError(f"body {end!r} does not descend from {start!r} in the MJCF")
+            found.append(self.bodies[name])
+            name = self.bodies[name].parent
+        return tuple(reversed(found))
+
+    def forward(self, joint_position: dict[str, float], start: str, site: str) -> tuple[Array, Array]:
+        """Position (3,) and rotation (3, 3) of a site in the frame of body `start`."""
+        position, rotation = np.zeros(3), np.eye(3)
+        end = self.body_of_site(site)
+        for body in self.chain(end.name, start):
+            position = position + rotation @ body.position
+            rotation = rotation @ rotations.matrix(body.quaternion)
+            if body.hinge is not None:
+                angle = np.asarray(joint_position[body.hinge.name])
+                rotation = rotation @ rotations.axis_matrix(body.hinge.axis, angle)
+        return position + rotation @ end.sites[site], rotation
+
+
+def read_tree(path: Path) -> Tree:
+    """Reads an MJCF whose numbers stand on the elements themselves (classes only decide contact and look)."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{path}: not well-formed XML: {error}") from error
+    world = root.find("worldbody")
+    if world is None:
+        raise ValueError(f"{path}: no <worldbody>")
+    bodies = {body.name: body for child in world.findall("body") for body in _bodies(child, None, path)}
+    excluded = frozenset(
+        frozenset((pair.attrib["body1"], pair.attrib["body2"])) for pair in root.findall("contact/exclude")
+    )
+    return Tree(bodies, excluded)
+
+
+def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Iterator[Body]:
+    name = element.attrib.get("name")
+    if name is None:
+        raise ValueError(f"{path}: a body inside {parent or 'the world'!r} has no name")
+    joint = element.find("joint")
+    yield Body(
+        name=name,
+        parent=parent,
+        position=_numbers(element, "pos", "0 0 0"),
+        quaternion=rotations.normalized(_numbers(element, "quat", "1 0 0 0")),
+        hinge=None if joint is None else _hinge(joint, path),
+        sites={site.attrib["name"]: _numbers(site, "pos", "0 0 0") for site in element.findall("site")},
+        capsules=tuple(_capsule(geom) for geom in element.findall("geom") if geom.attrib.get("class") == "body"),
+        feet=np.array(
+            [
+                _numbers(geom, "pos", "0 0 0")[:2]
+                for geom in element.findall("geom")
+                if geom.attrib.get("class") == "foot"
+            ]
+        ).reshape(-1, 2),
+    )
+    for child in element.findall("body"):
+        yield from _bodies(child, name, path)
+
+
+def _hinge(element: ElementTree.Element, path: Path) -> Hinge:
+    for needed in ("name", "axis", "range", "actuatorfrcrange", "armature"):
+        if needed not in element.attrib:
+            raise ValueError(f"{path}: joint {element.attrib.get('name', '?')!r} lacks the attribute {needed!r}")
+    axis, limits = _numbers(element, "axis", ""), _numbers(element, "range", "")
+    return Hinge(
+        name=element.attrib["name"],
+        axis=axis / np.linalg.norm(axis),
+        lower=float(limits[0]),
+        upper=float(limits[1]),
+        effort=float(_numbers(element, "actuatorfrcrange", "")[1]),
+        armature=float(element.attrib["armature"]),
+    )
+
+
+def _capsule(element: ElementTree.Element) -> Capsule:
+    radius = float(element.attrib["size"].split()[0])
+    name = element.attrib.get("name", "")
+    if "fromto" in element.attrib:
+        ends = _numbers(element, "fromto", "")
+        return Capsule(name, ends[:3], ends[3:], radius)
+    centre = _numbers(element, "pos", "0 0 0")
+    return Capsule(name, centre, centre, radius)
+
+
+def _numbers(element: ElementTree.Element, attribute: str, default: str) -> Array:
+    return np.array([float(word) for word in element.attrib.get(attribute, default).split()])
