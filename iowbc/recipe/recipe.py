@@ -1,8 +1,8 @@
 """The whole recipe: one experiment, from the reference generator to the exported policy."""
 
-from typing import Literal
+from typing import Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from iowbc.recipe.distillation import Distillation
 from iowbc.recipe.evaluation import Evaluation
@@ -15,6 +15,8 @@ from iowbc.recipe.task import Task
 from iowbc.recipe.teacher import Teacher
 
 StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+PIPELINE: tuple[StageName, ...] = get_args(StageName)
+"""All stages, in the order in which they run."""
 
 
 class Recipe(Section):
@@ -28,8 +30,8 @@ class Recipe(Section):
     """Seed of everything that is drawn at random."""
     robot: str = "g1"
     """Folder under `robots/` that describes the robot."""
-    stages: tuple[StageName, ...] = ("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export")
-    """Stages of this experiment, in the order of the pipeline."""
+    stages: tuple[StageName, ...] = Field(default=PIPELINE, min_length=1)
+    """Stages of this experiment; they run in the order of the pipeline."""
     rg: ReferenceGenerator = ReferenceGenerator()
     """The reference generator: its dataset and its network."""
     simulation: Simulation = Simulation()
@@ -46,3 +48,11 @@ class Recipe(Section):
     """The ONNX graph and its checks."""
     execution: Execution = Execution()
     """How this machine runs it; never changes a result, and is not part of any key."""
+
+    @field_validator("stages")
+    @classmethod
+    def _in_order(cls, stages: tuple[StageName, ...]) -> tuple[StageName, ...]:
+        repeated = sorted({name for name in stages if stages.count(name) > 1})
+        if repeated:
+            raise ValueError(f"names {', '.join(repeated)} more than once")
+        return tuple(sorted(stages, key=PIPELINE.index))

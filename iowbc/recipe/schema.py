@@ -1,0 +1,17 @@
+"""The JSON Schema of a recipe, for editors."""
+
+from typing import Any
+
+from iowbc.recipe.recipe import Recipe
+
+
+def recipe_schema() -> dict[str, Any]:
+    """JSON Schema of a recipe file: the recipe's fields with their sentences, and `extends`."""
+    schema = Recipe.model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["properties"] = {
+        "extends": {"type": "string", "description": "Recipe file, relative to this one, that this one changes."},
+        **schema["properties"],
+    }
+    schema["required"] = [name for name in schema.get("required", []) if name != "name"]
+    return schema
