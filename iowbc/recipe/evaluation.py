@@ -52,7 +52,7 @@ class Sweep(Section):
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
     partner_share: float | None = Field(default=None, ge=0, le=1)
     """Share of the weight that the partner bears; empty draws it as in training."""
-    fixed: dict[str, float] = {}
+    fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
     """Command sequence of this sweep; empty takes `eval.sequence`."""
@@ -79,7 +79,7 @@ class HeavyCase(Section):
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
     partner_share: float | None = Field(default=None, ge=0, le=1)
     """Share of the weight that the partner bears; empty draws it as in training."""
-    fixed: dict[str, float] = {}
+    fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
     """Command sequence of this case; empty takes `eval.sequence`."""
