@@ -14,7 +14,7 @@ class History:
         self.frames: NDArray[np.float32] = np.zeros((environments, length, observation), np.float32)
 
     def push(self, observation: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """Append s_t, shape (n, S), or fill the history with it where `starts`; returns the history, shape (n, K, S)."""
+        """Append s_t, shape (n, S), or refill the history with it where `starts`; returns H_t, shape (n, K, S)."""
         self.frames[:, :-1] = self.frames[:, 1:]
         self.frames[:, -1] = observation
         self.frames[starts] = observation[starts, None]

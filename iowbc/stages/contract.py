@@ -9,7 +9,7 @@ from iowbc.recipe.recipe import Recipe
 
 
 class StageFailed(Exception):
-    """A stage found that its result is not good enough (a gate), or could not be made. The text says what to do next."""
+    """A stage found that its result fails a gate or could not be made; the text says what to do next."""
 
 
 class Interrupted(Exception):

@@ -68,13 +68,13 @@ def run(job: Job) -> None:
         starts = np.ones(settings.environments, np.bool_)
         teacher_drives = np.arange(settings.environments) / settings.environments
         rounds = -(-settings.steps // (settings.environments * settings.rollout))
-        done_rounds = 0
+        finished = 0
 
         path = job.work / "checkpoint.safetensors"
         found = checkpoint.load_checkpoint(path, job.key)
         if found is not None:
             arrays, state = found
-            done_rounds = state["rounds"]
+            finished = state["rounds"]
             random.bit_generator.state = state["random"]
             checkpoint.restore_module(student, checkpoint.under("student", arrays))
             checkpoint.restore_optimizer(optimizer, checkpoint.under("optimizer", arrays))
@@ -82,12 +82,12 @@ def run(job: Job) -> None:
             environment.restore(checkpoint.under("environment", arrays))
             history.frames[:], starts[:] = arrays["history"], arrays["starts"]
             observation = arrays["observation"]
-            job.report.say(f"distill: resumed from its checkpoint at round {done_rounds} of {rounds}")
+            job.report.say(f"distill: resumed from its checkpoint at round {finished} of {rounds}")
         else:
             observation = environment.reset()
-        curves = Curves(job.work / "curves.jsonl", done_rounds * settings.environments * settings.rollout)
+        curves = Curves(job.work / "curves.jsonl", finished * settings.environments * settings.rollout)
 
-        def save() -> None:
+        def save(rounds_done: int) -> None:
             arrays = {
                 **checkpoint.prefixed("student", checkpoint.module_arrays(student)),
                 **checkpoint.prefixed("optimizer", checkpoint.optimizer_arrays(optimizer)),
@@ -97,12 +97,12 @@ def run(job: Job) -> None:
                 "starts": starts,
                 "observation": observation,
             }
-            state = {"rounds": done_rounds, "random": random.bit_generator.state}
+            state = {"rounds": rounds_done, "random": random.bit_generator.state}
             checkpoint.save_checkpoint(path, job.key, arrays, state)
 
-        for done_rounds in range(done_rounds + 1, rounds + 1):
+        for current in range(finished + 1, rounds + 1):
             began = time.monotonic()
-            progress = (done_rounds - 1) / rounds
+            progress = (current - 1) / rounds
             teacher_share = max(0.0, 1.0 - progress / settings.teacher_share) if settings.teacher_share else 0.0
             errors, targets_square = [], []
             for _ in range(settings.rollout):
@@ -125,7 +125,7 @@ def run(job: Job) -> None:
                     mirror_half(histories, targets, observation_mirror, action_mirror, random)
                 losses.append(gradient_step(student, optimizer, histories, targets, std))
 
-            steps = done_rounds * settings.environments * settings.rollout
+            steps = current * settings.environments * settings.rollout
             values = {
                 "kl": float(np.mean(losses)),
                 "action_rmse": float(np.sqrt(np.mean(errors))),
@@ -138,10 +138,10 @@ def run(job: Job) -> None:
             job.report.metrics(values, steps)
             job.report.progress(steps, rounds * settings.environments * settings.rollout, f"KL {values['kl']:.3f}")
             stop = job.interrupted()
-            if stop or done_rounds % settings.checkpoint_every == 0:
-                save()
+            if stop or current % settings.checkpoint_every == 0:
+                save(current)
             if stop:
-                raise Interrupted(f"distill: stopped at round {done_rounds} of {rounds}, checkpoint written")
+                raise Interrupted(f"distill: stopped at round {current} of {rounds}, checkpoint written")
     finally:
         environment.close()
 

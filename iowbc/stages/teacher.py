@@ -54,7 +54,9 @@ def run(job: Job) -> None:
             arrays, _ = found
             environment.restore(checkpoint.under("environment", arrays))
             ppo.restore_ppo(model, env, arrays)
-            job.report.say(f"teacher: resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps")
+            job.report.say(
+                f"teacher: resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps"
+            )
         curves = Curves(job.work / "curves.jsonl", model.num_timesteps)
         clock = _Clock(model.num_timesteps)
 
@@ -70,7 +72,9 @@ def run(job: Job) -> None:
             values = {**environment.statistics(), **training, "steps_per_second": clock.rate(steps)}
             curves.append(steps, values)
             job.report.metrics(values, steps)
-            job.report.progress(min(steps, settings.steps), settings.steps, f"{values['episode_seconds']:.1f} s an episode")
+            job.report.progress(
+                min(steps, settings.steps), settings.steps, f"{values['episode_seconds']:.1f} s an episode"
+            )
             updates = steps // (settings.environments * settings.rollout)
             stop = job.interrupted()
             if stop or updates % settings.checkpoint_every == 0:

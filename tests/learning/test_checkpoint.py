@@ -1,0 +1,120 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
+
+from iowbc.learning import checkpoint, ppo
+from iowbc.learning.symmetry import MirrorMap
+from iowbc.recipe.teacher import Teacher
+
+SETTINGS = Teacher(
+    steps=16 * 8 * 6,
+    environments=8,
+    rollout=16,
+    minibatches=2,
+    hidden=(16,),
+    learning_rate=1e-2,
+    learning_rate_end=1e-3,
+)
+ODD = MirrorMap(np.array([0, 1]), np.array([-1, -1], np.float32)), MirrorMap(np.array([0]), np.array([-1], np.float32))
+
+
+class PushToCentre(VecEnv):  # type: ignore[misc]
+    """Unit masses on a line, rewarded for resting at zero; the task is its own mirror image."""
+
+    def __init__(self) -> None:
+        super().__init__(8, spaces.Box(-np.inf, np.inf, (2,)), spaces.Box(-1, 1, (1,)))
+        self.state = np.tile(np.linspace(-1, 1, 8)[:, None], (1, 2)).astype(np.float32)
+
+    def reset(self) -> Any:
+        return self.state.copy()
+
+    def step_async(self, actions: Any) -> None:
+        self.state[:, 1] = 0.9 * self.state[:, 1] + 0.2 * actions[:, 0]
+        self.state[:, 0] += 0.2 * self.state[:, 1]
+
+    def step_wait(self) -> Any:
+        reward = -(self.state**2).sum(1)
+        return self.state.copy(), reward, np.zeros(8, np.bool_), [{} for _ in range(8)]
+
+    def close(self) -> None: ...
+    def get_attr(self, name: str, indices: Any = None) -> Any:
+        return [None] * 8
+
+    def set_attr(self, name: str, value: Any, indices: Any = None) -> None: ...
+    def env_method(self, name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any: ...
+    def env_is_wrapped(self, wrapper: Any, indices: Any = None) -> Any:
+        return [False] * 8
+
+
+class Stop(Exception):
+    pass
+
+
+def train(path: Path, stop_after: int | None = None) -> dict[str, np.ndarray]:
+    env = PushToCentre()
+    normalised = ppo.normalize(env, SETTINGS, ODD[0])
+    model = ppo.make_ppo(SETTINGS, normalised, 3, *ODD)
+    found = checkpoint.load_checkpoint(path, "key")
+    if found:
+        env.state = found[0]["environment/state"].copy()
+        ppo.restore_ppo(model, normalised, found[0])
+    count = 0
+
+    def after(_: dict[str, float]) -> None:
+        nonlocal count
+        count += 1
+        arrays = {**ppo.ppo_arrays(model, normalised), "environment/state": env.state}
+        checkpoint.save_checkpoint(path, "key", arrays, {})
+        if count == stop_after:
+            raise Stop
+
+    remaining = SETTINGS.steps - model.num_timesteps
+    model.learn(remaining, ppo.AfterUpdate(after), log_interval=None, reset_num_timesteps=False)
+    return checkpoint.module_arrays(model.policy)
+
+
+def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(tmp_path: Path) -> None:
+    torch.set_num_threads(1)
+    unbroken = train(tmp_path / "a.safetensors")
+    with pytest.raises(Stop):
+        train(tmp_path / "b.safetensors", stop_after=3)
+    np.random.seed(99)
+    torch.manual_seed(99)
+    resumed = train(tmp_path / "b.safetensors")
+    for name, value in unbroken.items():
+        np.testing.assert_array_equal(resumed[name], value, err_msg=name)
+
+
+def test_the_network_that_is_kept_acts_as_the_trained_policy(tmp_path: Path) -> None:
+    env = PushToCentre()
+    normalised = ppo.normalize(env, SETTINGS, None)
+    model = ppo.make_ppo(SETTINGS, normalised, 0, None, None)
+    model.learn(SETTINGS.steps)
+    network, _ = ppo.teacher_network(model, normalised, SETTINGS)
+    raw = np.random.default_rng(0).normal(size=(9, 2)).astype(np.float32)
+    expected = model.policy.get_distribution(torch.from_numpy(normalised.normalize_obs(raw))).mode()
+    torch.testing.assert_close(network(torch.from_numpy(raw)), expected, rtol=1e-5, atol=1e-6)
+
+
+def test_a_checkpoint_of_another_key_and_a_damaged_one_are_not_used(tmp_path: Path) -> None:
+    path = tmp_path / "checkpoint.safetensors"
+    checkpoint.save_checkpoint(path, "one", {"x": np.arange(3)}, {"rounds": 4})
+    found = checkpoint.load_checkpoint(path, "one")
+    assert found is not None
+    assert found[1] == {"rounds": 4}
+    assert checkpoint.load_checkpoint(path, "two") is None
+    path.write_bytes(path.read_bytes()[:40])
+    assert checkpoint.load_checkpoint(path, "one") is None
+    assert checkpoint.load_checkpoint(tmp_path / "none", "one") is None
+
+
+def test_an_unfinished_write_leaves_the_old_checkpoint(tmp_path: Path) -> None:
+    path = tmp_path / "checkpoint.safetensors"
+    checkpoint.save_checkpoint(path, "k", {"x": np.arange(3)}, {})
+    (tmp_path / "checkpoint.fresh").write_bytes(b"half")
+    assert checkpoint.load_checkpoint(path, "k") is not None

@@ -1,0 +1,26 @@
+from pathlib import Path
+
+from iowbc.learning.curves import Curves
+
+
+def test_rows_after_the_checkpoint_and_a_torn_last_line_are_dropped(tmp_path: Path) -> None:
+    path = tmp_path / "curves.jsonl"
+    curves = Curves(path, 0)
+    for step in (10, 20, 30):
+        curves.append(step, {"reward": step / 10})
+    with path.open("a") as file:
+        file.write('{"step": 40, "rew')
+    again = Curves(path, 20)
+    assert [row["step"] for row in again.rows] == [10, 20]
+    again.append(30, {"reward": 9.0})
+    assert [row["reward"] for row in Curves(path, 99).rows] == [1.0, 2.0, 9.0]
+
+
+def test_the_figure_leaves_out_what_was_never_recorded(tmp_path: Path) -> None:
+    curves = Curves(tmp_path / "curves.jsonl", 0)
+    curves.append(10, {"reward": 1.0})
+    curves.append(20, {"reward": 2.0, "late": 1.0})
+    curves.write_figure(tmp_path / "figure.png", "curves", ["reward", "absent"])
+    curves.write_csv(tmp_path / "curves.csv")
+    assert (tmp_path / "figure.png").stat().st_size > 2000
+    assert (tmp_path / "curves.csv").read_text().splitlines() == ["step,reward,late", "10,1.0,", "20,2.0,1.0"]

@@ -1,0 +1,82 @@
+import math
+
+import numpy as np
+import torch
+
+from iowbc.learning.distillation import Experience, gaussian_kl, gradient_step, mirror_half
+from iowbc.learning.history import History
+from iowbc.learning.networks import StudentNetwork
+from iowbc.learning.symmetry import MirrorMap
+
+
+def test_the_kl_of_equal_gaussians_is_zero_and_a_worked_example_agrees() -> None:
+    mean, std = torch.tensor([[0.3, -0.2]]), torch.tensor([0.5, 0.2])
+    assert float(gaussian_kl(mean, mean, std, std)) == 0.0
+    shifted = gaussian_kl(torch.tensor([[0.0]]), torch.tensor([[1.0]]), torch.tensor([1.0]), torch.tensor([2.0]))
+    assert math.isclose(float(shifted), math.log(2) + (1 + 1) / (2 * 4) - 0.5, rel_tol=1e-6)
+
+
+def test_with_equal_deviations_the_kl_is_the_squared_error_over_twice_the_variance() -> None:
+    std = torch.full((3,), 0.1)
+    error = gaussian_kl(torch.zeros(1, 3), torch.tensor([[0.1, 0.0, 0.2]]), std, std)
+    assert math.isclose(float(error), (0.01 + 0.04) / (2 * 0.01), rel_tol=1e-5)
+
+
+def test_a_sampled_history_is_the_one_that_the_student_saw() -> None:
+    random = np.random.default_rng(0)
+    history, experience = (
+        History(3, 4, 2),
+        Experience(capacity=3 * 10, environments=3, observation=2, actions=1, history=4),
+    )
+    seen: dict[tuple[float, float], np.ndarray] = {}
+    starts = np.ones(3, np.bool_)
+    for _ in range(37):
+        frame = random.normal(size=(3, 2)).astype(np.float32)
+        frames = history.push(frame, starts).copy()
+        experience.add(frame, frame[:, :1] * 2, starts)
+        seen.update({(float(f[0]), float(f[1])): h for f, h in zip(frame, frames, strict=True)})
+        starts = random.random(3) < 0.2
+    histories, targets = experience.sample(500, random)
+    for sampled, target in zip(histories, targets, strict=True):
+        newest = sampled[-1]
+        np.testing.assert_array_equal(sampled, seen[(float(newest[0]), float(newest[1]))])
+        assert target[0] == newest[0] * 2
+
+
+def test_the_ring_restores_exactly() -> None:
+    random = np.random.default_rng(1)
+    first = Experience(40, 2, 3, 1, 5)
+    for step in range(30):
+        starts = np.full(2, step % 7 == 0)
+        first.add(random.normal(size=(2, 3)).astype(np.float32), random.normal(size=(2, 1)).astype(np.float32), starts)
+    second = Experience(40, 2, 3, 1, 5)
+    second.restore(first.arrays())
+    for a, b in zip(
+        first.sample(50, np.random.default_rng(2)), second.sample(50, np.random.default_rng(2)), strict=True
+    ):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_the_student_learns_what_depends_on_the_past() -> None:
+    torch.manual_seed(0)
+    random = np.random.default_rng(0)
+    student = StudentNetwork(1, 5, 1, frame_features=8, latent=16, hidden=(32,), activation="elu", clip=10)
+    optimizer = torch.optim.Adam(student.parameters(), 3e-3)
+    losses = []
+    for _ in range(400):
+        histories = random.normal(size=(256, 5, 1)).astype(np.float32)
+        targets = histories[:, 0] - histories[:, -2]
+        losses.append(gradient_step(student, optimizer, histories, targets, torch.ones(1)))
+    assert losses[-1] < 0.02 * losses[0]
+
+
+def test_half_of_the_samples_are_mirrored_with_their_targets() -> None:
+    histories = np.ones((1000, 2, 2), np.float32)
+    targets = np.ones((1000, 1), np.float32)
+    flip = MirrorMap(np.array([0, 1]), np.array([-1, 1], np.float32))
+    mirror_half(
+        histories, targets, flip, MirrorMap(np.array([0]), np.array([-1], np.float32)), np.random.default_rng(0)
+    )
+    assert 400 < (targets < 0).sum() < 600
+    np.testing.assert_array_equal(histories[:, :, 0], np.repeat(targets, 2, axis=1))
+    assert (histories[:, :, 1] == 1).all()
