@@ -48,7 +48,7 @@ class Trace:
 
 
 def moving_average(values: Array, window: int) -> Array:
-    """Mean over a centred window of at least one step along the first axis, shortened at both ends, shape as `values`."""
+    """Mean over a centred window (>= 1 step) along the first axis, shortened at both ends, shape as `values`."""
     before, after = (window - 1) // 2, window // 2
     summed = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
     steps = np.arange(len(values))
