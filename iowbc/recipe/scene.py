@@ -1,0 +1,78 @@
+"""The worlds that a robot can be put in: nothing, an object held between the wrists, a crate to push."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import Section
+
+Size = tuple[float, float, float]
+
+
+class Grasp(Section):
+    """How the hands hold an object."""
+
+    kind: Literal["compliant", "contact"] = "compliant"
+    """A compliant connection that lets go above its slip force, or frictional squeeze between two palms."""
+    time_constant: float = Field(default=0.02, gt=0.0)
+    """Time constant of the compliant connection [s]; four physics steps, below which MuJoCo's soft constraint gets stiff."""
+    squeeze: float = Field(default=130.0, ge=0.0)
+    """Force of each palm against the object [N]; times the surface friction it is the force at which a hand slips.
+    At friction 1.0 two hands hold 26 kg; the tyre at 150 % weighs 27."""
+    height: float = 0.08
+    """Height of the grip points above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
+    swing_damping: float = Field(default=3.0, ge=0.0)
+    """Rate at which friction in the palms damps the object's rotation [1/s]; a box on two points swings at 1.5 Hz."""
+
+
+class Object(Section):
+    """A rigid object, uniform at its nominal mass."""
+
+    shape: Literal["box", "tyre"]
+    """A box, or a ring that stands across the robot's way, so that the hands hold its rim on both sides."""
+    size: Size
+    """Extent along x (forward), y (left) and z (up) [m]."""
+    mass: float = Field(gt=0.0)
+    """Nominal mass [kg]."""
+    smallest_mass: float = Field(default=0.05, gt=0.0)
+    """Lighter masses, zero too, are simulated as this [kg]: a free body needs inertia."""
+
+
+class Scene(Section):
+    """A world."""
+
+    kind: Literal["free", "lift", "push"]
+    """No object; one held between the wrists; a crate on omnidirectional wheels before the hands."""
+    object: Object | None = None
+    """The object; none in a free scene."""
+    grasp: Grasp = Grasp()
+    """How an object is held in a lift scene."""
+    palm: tuple[float, float, float] = (0.0, -0.03, 0.0)
+    """Where the left palm touches an object, from the grip in the hand's frame [m]; the right one mirrors it."""
+    gap: float = Field(default=0.01, ge=0.0)
+    """Distance from the palms to the crate's face at the start of a push [m]."""
+    palm_radius: float = Field(default=0.03, gt=0.0)
+    """Radius of the spheres with which palms touch an object [m]."""
+    yaw_arm: float = Field(default=0.3, ge=0.0)
+    """Mean distance of the crate's wheels from its centre [m]; times the rolling resistance it resists turning."""
+
+    @model_validator(mode="after")
+    def _object_fits_kind(self) -> Self:
+        if (self.kind == "free") != (self.object is None):
+            raise ValueError(f"a {self.kind} scene {'has no' if self.kind == 'free' else 'needs an'} object")
+        return self
+
+
+class Scenes(Section):
+    """The scenes by name."""
+
+    free: Scene = Scene(kind="free")
+    """No object."""
+    lift: Scene = Scene(kind="lift", object=Object(shape="box", size=(0.30, 0.25, 0.30), mass=7.0))
+    """A cardboard box, 7 kg (paper IV-A)."""
+    tyre: Scene = Scene(kind="lift", object=Object(shape="tyre", size=(0.18, 0.56, 0.56), mass=18.0))
+    """A rubber tyre, 18 kg (paper IV-A)."""
+    push: Scene = Scene(
+        kind="push", object=Object(shape="box", size=(0.70, 0.60, 1.10), mass=65.0), palm=(0.11, 0.0, 0.0)
+    )
+    """A crate on omnidirectional wheels, 65 kg (paper IV-A)."""

@@ -1,0 +1,91 @@
+"""Where things lie in a compiled model."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.robot.description import Robot
+
+Indices = NDArray[np.int64]
+
+BASE = slice(0, 7)
+BASE_LINEAR = slice(0, 3)
+BASE_ANGULAR = slice(3, 6)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Indices into the arrays of a model and of its data. The robot comes first, then the object."""
+
+    joints: slice
+    """Robot's joint positions in qpos."""
+    joint_speeds: slice
+    """Robot's joint velocities in qvel."""
+    object_position: slice | None
+    """Object in qpos: a pose, or x, y and yaw of a crate."""
+    object_velocity: slice | None
+    """Object in qvel."""
+    base: int
+    torso: int
+    feet: Indices
+    """Bodies of the feet, (2,)."""
+    hands: Indices
+    """Bodies of the hands, (2,)."""
+    object: int | None
+    """Body of the object."""
+    links: slice
+    """Bodies of the robot."""
+    soles: Indices
+    """Sites of the soles, (2,)."""
+    grips: Indices
+    """Sites of the grips, (2,)."""
+    object_grips: Indices | None
+    """Sites on the object to which the grips are connected, (2,)."""
+    foot_geoms: Indices
+    """Contact points of the feet."""
+    palms: Indices | None
+    """Geoms of the palms, (2,)."""
+    object_geom: int | None
+    """Geom with which the object touches palms."""
+
+    @classmethod
+    def of(cls, model: Any, robot: Robot) -> "Layout":
+        """Finds everything by name; checks that the joints are in the robot's order."""
+        names = [model.joint(index).name for index in range(model.njnt)]
+        count = len(robot.joints)
+        if tuple(names[1 : count + 1]) != robot.joints:
+            raise ValueError(f"{robot.mjcf}: joints compile to {names}, expected a free joint and then {robot.joints}")
+        bodies = {model.body(index).name: index for index in range(model.nbody)}
+        sites = {model.site(index).name: index for index in range(model.nsite)}
+        geoms = {model.geom(index).name: index for index in range(model.ngeom)}
+        feet = np.array([bodies[name] for name in robot.sole_bodies])
+        points = [
+            index
+            for index in range(model.ngeom)
+            if model.geom_bodyid[index] in feet and model.geom_conaffinity[index]
+        ]
+        thing = bodies.get("object")
+        return cls(
+            joints=slice(7, 7 + count),
+            joint_speeds=slice(6, 6 + count),
+            object_position=None if thing is None else slice(7 + count, model.nq),
+            object_velocity=None if thing is None else slice(6 + count, model.nv),
+            base=bodies[robot.base],
+            torso=bodies[robot.torso],
+            feet=feet,
+            hands=np.array([bodies[name] for name in robot.wrist_bodies]),
+            object=thing,
+            links=slice(1, model.nbody if thing is None else thing),
+            soles=np.array([sites[name] for name in robot.soles]),
+            grips=np.array([sites[name] for name in robot.wrists]),
+            object_grips=_pair(sites, "object_left_grip", "object_right_grip"),
+            foot_geoms=np.array(points),
+            palms=_pair(geoms, "left_palm", "right_palm"),
+            object_geom=geoms.get("object"),
+        )
+
+
+def _pair(indices: dict[str, int], left: str, right: str) -> Indices | None:
+    return np.array([indices[left], indices[right]]) if left in indices else None

@@ -1,0 +1,88 @@
+"""Compiles the model of a scene: the robot's MJCF with motors and ground, and the scene's object."""
+
+from typing import Any
+
+import mujoco
+
+from iowbc.recipe.scene import Scene
+from iowbc.recipe.simulation import Physics
+from iowbc.robot.description import Robot
+from iowbc.sim.objects import OBJECT_BIT, add_object
+
+GROUND_BIT = 1
+ARENA = 2 << 20
+"""Memory for contacts and constraints of one simulation [bytes]; twenty contacts take a tenth of it."""
+
+INTEGRATORS = {"implicit": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "explicit": mujoco.mjtIntegrator.mjINT_EULER}
+"""MuJoCo's implicit integrator takes the motors' velocity feedback into its step; under Euler it is a force of the
+state before the step, as that of a controller on the robot is."""
+SOLVERS = {"newton": mujoco.mjtSolver.mjSOL_NEWTON, "cg": mujoco.mjtSolver.mjSOL_CG}
+CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
+
+
+def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> Any:
+    """The editable description. With `look`, everything that is for the eye; without, only what moves or touches."""
+    spec = mujoco.MjSpec.from_file(str(robot.mjcf))
+    option = spec.option
+    option.timestep = physics.timestep
+    option.integrator = INTEGRATORS[physics.pd]
+    option.solver, option.cone = SOLVERS[physics.solver], CONES[physics.cone]
+    option.iterations, option.ls_iterations = physics.iterations, physics.line_search_iterations
+    spec.memory = ARENA
+    foot_points = [geom for geom in spec.geoms if geom.parent.name in robot.sole_bodies and geom.conaffinity]
+    for geom in list(spec.geoms):
+        if geom in foot_points:
+            geom.priority = 1
+        elif not physics.body_contact:
+            geom.contype = geom.conaffinity = 0
+    if not look:
+        for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
+            spec.delete(geom)
+    spec.worldbody.add_geom(
+        name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0
+    )
+    _add_motors(spec, robot)
+    if scene.object is not None:
+        add_object(spec, robot, scene, ground_bit=GROUND_BIT if scene.kind == "lift" else 0, look=look)
+        if physics.body_contact:
+            _let_links_touch_object(spec, robot)
+    spec.add_sensor(
+        name="contact_forces",
+        type=mujoco.mjtSensor.mjSENS_FORCE,
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+        objname=robot.soles[0],
+    )
+    return spec
+
+
+def compile_scene(robot: Robot, physics: Physics, scene: Scene) -> Any:
+    """The model that is stepped. Its one sensor makes MuJoCo compute `cfrc_ext`, from which all contact forces are read."""
+    return scene_spec(robot, physics, scene, look=False).compile()
+
+
+def _add_motors(spec: Any, robot: Robot) -> None:
+    """torque = kp (target - position) - kd velocity, within the effort limit; motor i drives joint i."""
+    for index, joint in enumerate(robot.joints):
+        kp, kd, effort = float(robot.kp[index]), float(robot.kd[index]), float(robot.effort[index])
+        spec.add_actuator(
+            name=joint,
+            target=joint,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            gainprm=[kp] + [0.0] * 9,
+            biasprm=[0.0, -kp, -kd] + [0.0] * 7,
+            forcelimited=True,
+            forcerange=[-effort, effort],
+        )
+
+
+def _let_links_touch_object(spec: Any, robot: Robot) -> None:
+    """All links but the hands and forearms, which hold it, touch the object."""
+    for geom in spec.geoms:
+        if geom.contype and geom.name not in ("ground", "object"):
+            geom.conaffinity |= OBJECT_BIT
+    for side in ("left", "right"):
+        for body in spec.bodies:
+            if body.name.startswith(f"{side}_wrist") or body.name == f"{side}_elbow_link":
+                spec.add_exclude(bodyname1=body.name, bodyname2="object")

@@ -1,0 +1,147 @@
+"""Adds a scene's object to a model: a box or tyre between the hands, or a crate on wheels."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from iowbc.recipe.scene import Object, Scene
+from iowbc.robot.description import Robot
+
+OBJECT_BIT = 4
+PALM_CONDIM = 4
+"""Palms resist sliding and twisting."""
+TORSION = 0.02
+"""Torsional friction of a palm per unit of sliding friction [m]: two thirds of the radius of a contact patch of 3 cm."""
+HOLE = 0.55
+"""Inner radius of a tyre as a part of its outer one."""
+RING_SEGMENTS = 16
+CLEARANCE = 0.06
+"""Height of a crate's floor above the ground [m]."""
+CARDBOARD = (0.72, 0.53, 0.34, 1.0)
+RUBBER = (0.13, 0.13, 0.14, 1.0)
+WOOD = (0.62, 0.47, 0.30, 1.0)
+
+
+def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, look: bool) -> None:
+    """Body `object` with the scene's nominal mass, its joints, its grips or the palms that touch it."""
+    thing = scene.object
+    if thing is None:
+        raise ValueError("a scene without an object has none to add")
+    body = spec.worldbody.add_body(name="object", pos=[1.0, 0.0, resting_height(scene)])
+    body.explicitinertial = True
+    body.mass = thing.mass
+    body.ipos = [0.0, 0.0, 0.0]
+    body.inertia = inertia_per_mass(thing) * thing.mass
+    half = 0.5 * np.asarray(thing.size)
+    by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
+    ring = thing.shape == "tyre"
+    body.add_geom(
+        name="object",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=half,
+        contype=OBJECT_BIT if by_contact else 0,
+        conaffinity=ground_bit,
+        group=3 if ring else 2,
+        rgba=WOOD if scene.kind == "push" else CARDBOARD,
+    )
+    if look and ring:
+        _add_ring(body, thing)
+    if scene.kind == "push":
+        _add_wheels(body, thing, look)
+    else:
+        body.add_freejoint(name="object_joint")
+    if by_contact:
+        _add_palms(spec, robot, scene)
+    else:
+        _add_grips(spec, body, robot, scene)
+
+
+def inertia_per_mass(thing: Object) -> Any:
+    """Principal inertia of a uniform box, or of a uniform ring around x, for unit mass, (3,) [m²]."""
+    x, y, z = thing.size
+    if thing.shape == "box":
+        return np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12.0
+    outer = 0.25 * (y + z)
+    squares = outer**2 * (1.0 + HOLE**2)
+    across = squares / 4.0 + x * x / 12.0
+    return np.array([squares / 2.0, across, across])
+
+
+def resting_height(scene: Scene) -> float:
+    """Height of a crate's centre above the ground [m]."""
+    return CLEARANCE + 0.5 * scene.object.size[2] if scene.object is not None else 0.0
+
+
+def _add_grips(spec: Any, body: Any, robot: Robot, scene: Scene) -> None:
+    """A compliant point connection of each grip; its place on the object is set when the object is put between the hands."""
+    for side, grip, sign in (("left", robot.wrists[0], 1.0), ("right", robot.wrists[1], -1.0)):
+        site = body.add_site(name=f"object_{side}_grip", pos=[0.0, sign * 0.15, scene.grasp.height])
+        site.group = 4
+        spec.add_equality(
+            name=f"{side}_grasp",
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=grip,
+            name2=site.name,
+            solref=[scene.grasp.time_constant, 1.0],
+        )
+
+
+def _add_palms(spec: Any, robot: Robot, scene: Scene) -> None:
+    """A sphere on each hand that touches the object, and nothing else."""
+    x, y, z = scene.palm
+    for name, grip, sign in (("left_palm", 0, 1.0), ("right_palm", 1, -1.0)):
+        spec.body(robot.wrist_bodies[grip]).add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[scene.palm_radius, 0.0, 0.0],
+            pos=robot.grip_offset[grip] + np.array([x, sign * y, z]),
+            contype=0,
+            conaffinity=OBJECT_BIT,
+            condim=PALM_CONDIM,
+            priority=2,
+            friction=[1.0, TORSION, 0.0001],
+            rgba=(0.2, 0.2, 0.22, 1.0),
+            group=2,
+        )
+
+
+def _add_wheels(body: Any, thing: Object, look: bool) -> None:
+    """Planar motion and turning; rolling resistance is the dry friction of these joints."""
+    for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0))):
+        body.add_joint(name=f"object_{name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    body.add_joint(name="object_yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0.0, 0.0, 1.0))
+    if not look:
+        return
+    x, y, z = 0.5 * np.asarray(thing.size)
+    for along in (-0.85, 0.85):
+        for across in (-0.85, 0.85):
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                size=[0.5 * CLEARANCE, 0.0, 0.0],
+                pos=[along * x, across * y, -z - 0.5 * CLEARANCE],
+                contype=0,
+                conaffinity=0,
+                rgba=RUBBER,
+                group=2,
+            )
+
+
+def _add_ring(body: Any, thing: Object) -> None:
+    """A ring of capsules around the x axis, for the eye."""
+    outer = 0.25 * (thing.size[1] + thing.size[2])
+    thickness = 0.5 * outer * (1.0 - HOLE)
+    middle = outer - thickness
+    angles = np.linspace(0.0, 2.0 * np.pi, RING_SEGMENTS + 1)
+    rim = np.stack([np.zeros_like(angles), middle * np.cos(angles), middle * np.sin(angles)], axis=1)
+    for start, end in zip(rim[:-1], rim[1:], strict=True):
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[*start, *end],
+            size=[thickness, 0.0, 0.0],
+            contype=0,
+            conaffinity=0,
+            rgba=RUBBER,
+            group=2,
+        )

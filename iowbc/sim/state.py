@@ -1,0 +1,145 @@
+"""What a simulation tells of its environments: the truth, and what the sensors deliver."""
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+JOINTS = 29
+
+
+class _Arrays:
+    """Preallocated arrays with a row an environment."""
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays by name; the same objects, not copies."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class SimulationState(_Arrays):
+    """The truth after a control period. World frame unless said otherwise; quaternions wxyz.
+
+    Forces, torques, accelerations are those of the last physics step; all else is of the state that it led to.
+    """
+
+    base_position: Array
+    """Pelvis, (n, 3) [m]."""
+    base_quaternion: Array
+    """(n, 4)."""
+    base_linear_velocity: Array
+    """(n, 3) [m/s]."""
+    base_angular_velocity: Array
+    """Base frame, (n, 3) [rad/s]."""
+    joint_position: Array
+    """MJCF order, (n, joints) [rad]."""
+    joint_velocity: Array
+    """(n, joints) [rad/s]."""
+    joint_acceleration: Array
+    """(n, joints) [rad/s²]."""
+    joint_torque: Array
+    """Torque of the motors, (n, joints) [N·m]."""
+    saturation: Mask
+    """Motors at their torque limit, (n, joints)."""
+    torso_quaternion: Array
+    """(n, 4)."""
+    com_position: Array
+    """The robot's own centre of mass, (n, 3) [m]."""
+    system_velocity: Array
+    """v_sys: velocity of the common centre of mass of robot and object (held, or crate), (n, 3) [m/s]."""
+    foot_position: Array
+    """Sole centres, left and right, (n, 2, 3) [m]."""
+    foot_velocity: Array
+    """Of the sole centres, (n, 2, 3) [m/s]."""
+    foot_force: Array
+    """Contact force of the ground on each foot, (n, 2, 3) [N]."""
+    foot_contact: Mask
+    """(n, 2)."""
+    has_object: Mask
+    """(n,)."""
+    object_position: Array
+    """Object's centre, (n, 3) [m]; zero without an object."""
+    object_quaternion: Array
+    """(n, 4); identity without an object."""
+    object_linear_velocity: Array
+    """Of the object's centre, (n, 3) [m/s]."""
+    object_angular_velocity: Array
+    """(n, 3) [rad/s]."""
+    grasped: Mask
+    """Hands (left, right) that hold the object, or touch it where there is nothing to hold, (n, 2)."""
+    slipped: Mask
+    """Hands that let go in this control period, (n, 2)."""
+    grip_force: Array
+    """Force of the object on each hand, (n, 2, 3) [N]."""
+    partner_force: Array
+    """Force of the partner on the object, (n, 3) [N]."""
+    partner_energy: Array
+    """Work of the partner on the object since the reset, (n,) [J]."""
+    external_force: Array
+    """Force and torque of partner and impulses on the object about its centre of mass, (n, 6) [N, N·m]."""
+    push_force: Array
+    """Force of pushes on the base, (n, 3) [N]."""
+    diverged: Mask
+    """Simulation left the numbers in this control period, and stands where it was before; to be reset, (n,)."""
+
+    @classmethod
+    def empty(cls, n: int) -> Self:
+        """Arrays for n environments, upright at the origin."""
+        mask = {
+            "saturation": (JOINTS,),
+            "foot_contact": (2,),
+            "has_object": (),
+            "grasped": (2,),
+            "slipped": (2,),
+            "diverged": (),
+        }
+        real = {
+            "joint_position": (JOINTS,),
+            "joint_velocity": (JOINTS,),
+            "joint_acceleration": (JOINTS,),
+            "joint_torque": (JOINTS,),
+            "base_quaternion": (4,),
+            "torso_quaternion": (4,),
+            "object_quaternion": (4,),
+            "foot_position": (2, 3),
+            "foot_velocity": (2, 3),
+            "foot_force": (2, 3),
+            "grip_force": (2, 3),
+            "external_force": (6,),
+            "partner_energy": (),
+        }
+        arrays: dict[str, Any] = {}
+        for field in fields(cls):
+            if field.name in mask:
+                arrays[field.name] = np.zeros((n, *mask[field.name]), bool)
+            else:
+                arrays[field.name] = np.zeros((n, *real.get(field.name, (3,))))
+            if field.name.endswith("quaternion"):
+                arrays[field.name][:, 0] = 1.0
+        return cls(**arrays)
+
+
+@dataclass(frozen=True)
+class MeasuredState(_Arrays):
+    """What the sensors deliver, with bias, noise and latency. The arrays are views of one row an environment."""
+
+    joint_position: Array
+    """(n, joints) [rad]."""
+    joint_velocity: Array
+    """(n, joints) [rad/s]."""
+    base_angular_velocity: Array
+    """Base frame, (n, 3) [rad/s]."""
+    projected_gravity: Array
+    """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
+    object_position: Array
+    """Object's centre from the base, base frame, (n, 3) [m]; zero without an object."""
+    object_quaternion: Array
+    """Object's orientation in the base frame, (n, 4)."""
+    object_linear_velocity: Array
+    """Rate of `object_position`, (n, 3) [m/s]."""
+    object_angular_velocity: Array
+    """Angular velocity of the object relative to the base, base frame, (n, 3) [rad/s]."""
