@@ -36,11 +36,11 @@ class Trace:
     saturation: Array
     """Share of the joints at their torque limit, shape (T,)."""
     slipped: Array
-    """1 where a hand has lost its grip, shape (T,)."""
+    """1 in the control periods in which a hand lost its grip, shape (T,)."""
     partner_force: Array
     """Partner's force on the object, shape (T, 3) [N]."""
     grip_force: Array
-    """Force of each hand's grip, shape (T, k) [N]."""
+    """Force of the object on each hand, left then right, world, shape (T, 6) [N]."""
     power: Array
     """Sum over the joints of |torque x speed|, shape (T,) [W]."""
     base_position: Array
@@ -85,9 +85,9 @@ def trial_metrics(trace: Trace, gait_steps: int) -> dict[str, float]:
         "E_v_raw": velocity_error(trace.system_velocity, trace.commanded_velocity, 1),
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
-        "slip_share": float(np.mean(trace.slipped > 0)),
+        "slips": float(np.sum(trace.slipped > 0)),
         "partner_force_peak": float(np.max(np.linalg.norm(trace.partner_force, axis=1))),
-        "grip_force_peak": float(np.max(np.abs(trace.grip_force))),
+        "grip_force_peak": float(np.max(np.linalg.norm(trace.grip_force.reshape(steps, 2, 3), axis=2))),
         "energy": float(np.sum(trace.power) * trace.dt),
         "distance": float(np.sum(np.linalg.norm(travelled, axis=1))),
     }

@@ -50,8 +50,8 @@ class Sweep(Section):
     """Heavier masses, tried as long as one trial survives; empty stops at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
-    partner_share: float | None = Field(default=None, ge=0, le=1)
-    """Share of the weight that the partner bears; empty draws it as in training."""
+    partner_share: float | None = Field(default=0.0, ge=0, le=1)
+    """Share of the weight that the partner bears; 0 leaves all of it to the robot, empty draws it as in training."""
     fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
@@ -77,7 +77,7 @@ class HeavyCase(Section):
     """Object mass [kg]."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
-    partner_share: float | None = Field(default=None, ge=0, le=1)
+    partner_share: float | None = Field(default=0.5, ge=0, le=1)
     """Share of the weight that the partner bears; empty draws it as in training."""
     fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
@@ -86,10 +86,10 @@ class HeavyCase(Section):
 
 
 class Success(Section):
-    """When a trial counts as survived. A fall, by the task's terminations, never does."""
+    """When a trial counts as survived: no fall and nothing dropped, by `task.termination`, for the whole trial."""
 
-    drop_fails: bool = True
-    """An object that leaves the hands ends the trial as a failure."""
+    slip_fails: bool = False
+    """Also count a trial as failed in which a hand lost its grip, even though the object was not dropped."""
     capacity_rate: float = Field(default=0.8, gt=0, le=1)
     """Success rate that a mass, and every lighter one, must reach to count as carried (load capacity)."""
 

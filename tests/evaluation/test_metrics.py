@@ -27,7 +27,7 @@ def trace(steps: int = 400) -> Trace:
         saturation=zeros,
         slipped=zeros,
         partner_force=np.zeros((steps, 3)),
-        grip_force=np.zeros((steps, 2)),
+        grip_force=np.zeros((steps, 6)),
         power=np.full(steps, 100.0),
         base_position=np.zeros((steps, 3)),
     )

@@ -1,0 +1,128 @@
+"""Plays episodes with a policy, each once, and records the signals of every step."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.evaluation.metrics import Trace
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.episode import Episode
+from iowbc.task.vector_env import VectorEnv
+
+Array = NDArray[np.float64]
+
+RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
+"""Signals that a trace keeps."""
+VECTORS = ("system_velocity", "commanded_velocity", "partner_force", "grip_force", "base_position")
+"""Those of them with more than one column."""
+ASK_EVERY = 25
+"""Control steps between two questions whether to stop."""
+
+
+class Stopped(Exception):
+    """The rollout was asked to stop before its episodes had ended."""
+
+
+class Acting(Protocol):
+    """What drives the environments; `iowbc.learning.acting.Policy` is one."""
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        """Forget the past of the marked environments, shape (n,)."""
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Residual action (n, 15) from s_t (n, S) and s_priv (n, P)."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """How one episode went."""
+
+    trace: Trace
+    seconds: float
+    """Time until it ended [s]."""
+    fallen: bool
+    dropped: bool
+    finished: bool
+    """Whether it reached its time limit."""
+    drawn: Mapping[str, Array]
+    """Everything that was drawn for it, by name, each of shape (k,)."""
+
+
+def play_episodes(
+    recipe: Recipe,
+    robot: Path,
+    rg: Path | None,
+    episodes: Sequence[Episode],
+    policy: Acting,
+    *,
+    workers: int,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> list[Played]:
+    """Play each episode to its end and return how they went, in their order; independent of `workers`.
+
+    progress: told the time reached within the episodes [s]. Raises Stopped once `interrupted()` is true.
+    """
+    environment = VectorEnv(
+        recipe, robot, rg=rg, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)
+    )
+    try:
+        return _play(environment, recipe, episodes, policy, interrupted, progress)
+    finally:
+        environment.close()
+
+
+def _play(
+    environment: VectorEnv,
+    recipe: Recipe,
+    episodes: Sequence[Episode],
+    policy: Acting,
+    interrupted: Callable[[], bool],
+    progress: Callable[[float], None],
+) -> list[Played]:
+    count, dt = len(episodes), 1.0 / recipe.task.control_frequency
+    layout = environment.layout
+    observation = environment.reset()
+    drawn = {name: np.array(values, np.float64).reshape(count, -1) for name, values in environment.drawn().items()}
+    policy.reset(np.ones(count, np.bool_))
+    frames: list[dict[str, Array]] = []
+    length = np.zeros(count, np.int64)
+    endings = {name: np.zeros(count, np.bool_) for name in ("fallen", "dropped")}
+    finished = np.zeros(count, np.bool_)
+    while not length.all():
+        if len(frames) % ASK_EVERY == 0:
+            if interrupted():
+                raise Stopped(f"stopped after {len(frames) * dt:.1f} s of {count} episodes")
+            progress(len(frames) * dt)
+        action = policy.act(observation[:, layout.observation], observation[:, layout.privileged])
+        observation, _, done, infos = environment.step(action)
+        frames.append({name: np.array(environment.signals[name], np.float64) for name in RECORDED})
+        ends = done & (length == 0)
+        length[ends] = len(frames)
+        for name, flags in endings.items():
+            flags[ends] = np.asarray(environment.signals[name]).reshape(count, -1).any(axis=1)[ends]
+        for index in np.flatnonzero(ends):
+            finished[index] = bool(infos[index].get("TimeLimit.truncated", False))
+        if done.any():
+            policy.reset(done)
+    recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
+    return [
+        Played(
+            trace=_trace(recorded, index, int(length[index]), dt),
+            seconds=float(length[index] * dt),
+            fallen=bool(endings["fallen"][index]),
+            dropped=bool(endings["dropped"][index]),
+            finished=bool(finished[index]),
+            drawn={name: values[index] for name, values in drawn.items()},
+        )
+        for index in range(count)
+    ]
+
+
+def _trace(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
+    rows = {name: values[:steps, index] for name, values in recorded.items()}
+    return Trace(dt=dt, **{name: row if name in VECTORS else row[:, 0] for name, row in rows.items()})
