@@ -10,7 +10,7 @@ from torch import Tensor
 
 from iowbc.learning.checkpoint import Arrays
 from iowbc.learning.networks import StudentNetwork
-from iowbc.learning.symmetry import MirrorMap
+from iowbc.robot.mirror import MirrorMap
 
 
 def gaussian_kl(teacher_mean: Tensor, student_mean: Tensor, teacher_std: Tensor, student_std: Tensor) -> Tensor:

@@ -14,34 +14,33 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from iowbc.learning import checkpoint
 from iowbc.learning.networks import ACTIVATIONS, TeacherNetwork
-from iowbc.learning.symmetry import MirroredRolloutBuffer, MirrorMap, SymmetricMeanStd
+from iowbc.learning.symmetry import MirroredRolloutBuffer, SymmetricMeanStd
 from iowbc.recipe.teacher import Teacher
+from iowbc.robot.mirror import MirrorMap
 
 VARIANCE_FLOOR = 1e-4
 """Added to variances: an input that hardly moves in training is not blown up when it does."""
 
 
-def normalize(env: VecEnv, teacher: Teacher, mirror: MirrorMap | None) -> VecNormalize:
+Mirrors = tuple[MirrorMap, MirrorMap]
+"""Of the observation and of the action."""
+
+
+def normalize(env: VecEnv, teacher: Teacher, mirrors: Mirrors | None) -> VecNormalize:
     """Normalise observations and rewards of `env` by running statistics."""
     normalized = VecNormalize(env, gamma=teacher.gamma, clip_obs=teacher.normalization_clip, epsilon=VARIANCE_FLOOR)
-    if mirror is not None:
-        normalized.obs_rms = SymmetricMeanStd(mirror)
+    if mirrors is not None:
+        normalized.obs_rms = SymmetricMeanStd(mirrors[0])
     return normalized
 
 
-def make_ppo(
-    teacher: Teacher,
-    env: VecNormalize,
-    seed: int,
-    observation_mirror: MirrorMap | None,
-    action_mirror: MirrorMap | None,
-) -> PPO:
+def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | None) -> PPO:
     """PPO with the recipe's numbers; starts as the reference itself (the mean action begins near zero)."""
     first, last = teacher.learning_rate, teacher.learning_rate_end or teacher.learning_rate
     buffer: dict[str, Any] = {"rollout_buffer_class": RolloutBuffer}
-    if observation_mirror is not None and action_mirror is not None:
-        mirrors = {"observation_mirror": observation_mirror, "action_mirror": action_mirror}
-        buffer = {"rollout_buffer_class": MirroredRolloutBuffer, "rollout_buffer_kwargs": mirrors}
+    if mirrors is not None:
+        arguments = {"observation_mirror": mirrors[0], "action_mirror": mirrors[1]}
+        buffer = {"rollout_buffer_class": MirroredRolloutBuffer, "rollout_buffer_kwargs": arguments}
     hidden = list(teacher.hidden)
     model = PPO(
         "MlpPolicy",

@@ -1,6 +1,5 @@
 """Left-right mirror symmetry in learning: normalisation that commutes with the mirror, and mirrored samples."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,21 +10,12 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.type_aliases import RolloutBufferSamples
 from stable_baselines3.common.vec_env.vec_normalize import VecNormalize
 
+from iowbc.robot.mirror import MirrorMap
 
-@dataclass(frozen=True)
-class MirrorMap:
-    """The mirror image of a vector x is sign * x[permutation]."""
 
-    permutation: NDArray[np.intp]
-    sign: NDArray[np.float32]
-
-    def __call__(self, x: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Mirror the last axis of an array."""
-        return x[..., self.permutation] * self.sign
-
-    def tensor(self, x: torch.Tensor) -> torch.Tensor:
-        """Mirror the last axis of a tensor."""
-        return x[..., torch.from_numpy(self.permutation)] * torch.from_numpy(self.sign)
+def mirror_tensor(mirror: MirrorMap, x: torch.Tensor) -> torch.Tensor:
+    """The mirror image of a float32 tensor along its last axis."""
+    return x[..., torch.from_numpy(mirror.permutation)] * torch.from_numpy(mirror.sign.astype(np.float32))
 
 
 class SymmetricMeanStd(RunningMeanStd):  # type: ignore[misc]
@@ -56,7 +46,7 @@ class MirroredRolloutBuffer(RolloutBuffer):  # type: ignore[misc]
         mirrored = torch.from_numpy(np.random.rand(len(batch_inds), 1) < 0.5)  # noqa: NPY002 - SB3's own generator
         return samples._replace(
             observations=torch.where(
-                mirrored, self.observation_mirror.tensor(samples.observations), samples.observations
+                mirrored, mirror_tensor(self.observation_mirror, samples.observations), samples.observations
             ),
-            actions=torch.where(mirrored, self.action_mirror.tensor(samples.actions), samples.actions),
+            actions=torch.where(mirrored, mirror_tensor(self.action_mirror, samples.actions), samples.actions),
         )

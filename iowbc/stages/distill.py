@@ -26,7 +26,8 @@ def run(job: Job) -> None:
     from iowbc.learning.history import History
     from iowbc.learning.networks import StudentNetwork
     from iowbc.learning.storage import load_teacher, save_network
-    from iowbc.learning.symmetry import mirror_maps
+    from iowbc.robot.description import load_robot
+    from iowbc.task.mirror import action_mirror, observation_mirror
     from iowbc.task.vector_env import VectorEnv
 
     torch.set_num_threads(max(job.workers, 1))  # learner and workers take turns on the same cores
@@ -62,7 +63,8 @@ def run(job: Job) -> None:
         std = torch.clamp(teacher_net.log_std.exp(), min=settings.std_floor)
         optimizer = torch.optim.Adam(student.parameters(), settings.learning_rate)
         random = np.random.default_rng(recipe.seed)
-        observation_mirror, action_mirror = mirror_maps(environment, layout.observation)
+        robot = load_robot(job.robot)
+        mirrors = observation_mirror(robot, layout.state), action_mirror(robot)
         experience = Experience(settings.buffer, settings.environments, size, actions, settings.history)
         history = History(settings.environments, settings.history, size)
         starts = np.ones(settings.environments, np.bool_)
@@ -122,7 +124,7 @@ def run(job: Job) -> None:
             for _ in range(settings.gradient_steps):
                 histories, targets = experience.sample(settings.batch, random)
                 if recipe.teacher.symmetry == "augment":
-                    mirror_half(histories, targets, observation_mirror, action_mirror, random)
+                    mirror_half(histories, targets, *mirrors, random)
                 losses.append(gradient_step(student, optimizer, histories, targets, std))
 
             steps = current * settings.environments * settings.rollout

@@ -31,7 +31,8 @@ def run(job: Job) -> None:
     from iowbc.learning import checkpoint, ppo
     from iowbc.learning.curves import Curves
     from iowbc.learning.storage import save_network
-    from iowbc.learning.symmetry import mirror_maps
+    from iowbc.robot.description import load_robot
+    from iowbc.task.mirror import action_mirror, observation_mirror
     from iowbc.task.vector_env import VectorEnv
 
     torch.set_num_threads(max(job.workers, 1))  # learner and workers take turns on the same cores
@@ -45,9 +46,12 @@ def run(job: Job) -> None:
         seed=recipe.seed,
     )
     try:
-        mirrors = mirror_maps(environment) if settings.symmetry == "augment" else (None, None)
-        env = ppo.normalize(environment, settings, mirrors[0])
-        model = ppo.make_ppo(settings, env, recipe.seed, *mirrors)
+        robot = load_robot(job.robot)
+        mirrors = None
+        if settings.symmetry == "augment":
+            mirrors = observation_mirror(robot, environment.layout), action_mirror(robot)
+        env = ppo.normalize(environment, settings, mirrors)
+        model = ppo.make_ppo(settings, env, recipe.seed, mirrors)
         path = job.work / "checkpoint.safetensors"
         found = checkpoint.load_checkpoint(path, job.key)
         if found is not None:

@@ -8,8 +8,8 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.learning import checkpoint, ppo
-from iowbc.learning.symmetry import MirrorMap
 from iowbc.recipe.teacher import Teacher
+from iowbc.robot.mirror import MirrorMap
 
 SETTINGS = Teacher(
     steps=16 * 8 * 6,
@@ -57,8 +57,8 @@ class Stop(Exception):
 
 def train(path: Path, stop_after: int | None = None) -> dict[str, np.ndarray]:
     env = PushToCentre()
-    normalised = ppo.normalize(env, SETTINGS, ODD[0])
-    model = ppo.make_ppo(SETTINGS, normalised, 3, *ODD)
+    normalised = ppo.normalize(env, SETTINGS, ODD)
+    model = ppo.make_ppo(SETTINGS, normalised, 3, ODD)
     found = checkpoint.load_checkpoint(path, "key")
     if found:
         env.state = found[0]["environment/state"].copy()
@@ -93,7 +93,7 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(tmp_path
 def test_the_network_that_is_kept_acts_as_the_trained_policy(tmp_path: Path) -> None:
     env = PushToCentre()
     normalised = ppo.normalize(env, SETTINGS, None)
-    model = ppo.make_ppo(SETTINGS, normalised, 0, None, None)
+    model = ppo.make_ppo(SETTINGS, normalised, 0, None)
     model.learn(SETTINGS.steps)
     network, _ = ppo.teacher_network(model, normalised, SETTINGS)
     raw = np.random.default_rng(0).normal(size=(9, 2)).astype(np.float32)

@@ -6,7 +6,7 @@ import torch
 from iowbc.learning.distillation import Experience, gaussian_kl, gradient_step, mirror_half
 from iowbc.learning.history import History
 from iowbc.learning.networks import StudentNetwork
-from iowbc.learning.symmetry import MirrorMap
+from iowbc.robot.mirror import MirrorMap
 
 
 def test_the_kl_of_equal_gaussians_is_zero_and_a_worked_example_agrees() -> None:

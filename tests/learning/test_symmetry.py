@@ -2,7 +2,8 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
-from iowbc.learning.symmetry import MirroredRolloutBuffer, MirrorMap, SymmetricMeanStd
+from iowbc.learning.symmetry import MirroredRolloutBuffer, SymmetricMeanStd
+from iowbc.robot.mirror import MirrorMap
 
 SWAP = MirrorMap(np.array([1, 0, 2]), np.array([1, 1, -1], np.float32))
 
