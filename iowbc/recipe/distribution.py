@@ -8,7 +8,7 @@ from iowbc.recipe.section import Section
 
 
 class Distribution(Section):
-    """x ~ U(low, high), or its logarithm uniform, or normal with a 95 % interval of [low, high]; else the nominal value."""
+    """x ~ U(low, high), or its logarithm uniform, or normal with 95 % in [low, high]; or else the nominal value."""
 
     low: float
     """Lower end of the range."""

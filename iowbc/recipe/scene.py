@@ -15,12 +15,12 @@ class Grasp(Section):
     kind: Literal["compliant", "contact"] = "compliant"
     """A compliant connection that lets go above its slip force, or frictional squeeze between two palms."""
     time_constant: float = Field(default=0.02, gt=0.0)
-    """Time constant of the compliant connection [s]; four physics steps, below which MuJoCo's soft constraint gets stiff."""
+    """Time constant of the compliant connection [s]; at least two physics steps, as for every soft constraint of MuJoCo."""
     squeeze: float = Field(default=130.0, ge=0.0)
     """Force of each palm against the object [N]; times the surface friction it is the force at which a hand slips.
     At friction 1.0 two hands hold 26 kg; the tyre at 150 % weighs 27."""
     height: float = 0.08
-    """Height of the grip points above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
+    """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
     swing_damping: float = Field(default=3.0, ge=0.0)
     """Rate at which friction in the palms damps the object's rotation [1/s]; a box on two points swings at 1.5 Hz."""
 

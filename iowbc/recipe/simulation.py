@@ -17,10 +17,10 @@ class Physics(Section):
     timestep: float = Field(default=0.005, gt=0.0, le=0.02)
     """Physics step [s]; a whole number of them makes a control period."""
     pd: Literal["implicit", "explicit"] = "implicit"
-    """Whether the joint controllers' damping is integrated implicitly (stable at any gain) or, as on the robot, computed
-    explicitly from the measured state at the physics rate."""
-    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    """Friction cone: the pyramid inscribed in it, or the cone itself."""
+    """Whether the damping of the joint controllers is integrated implicitly (stable at any gain) or, as on the robot,
+    computed explicitly from the measured state at the physics rate."""
+    cone: Literal["pyramidal", "elliptic"] = "elliptic"
+    """Friction cone: a pyramid, or the cone itself, which is as fast here and slides alike in all directions."""
     solver: Literal["newton", "cg"] = "newton"
     """Constraint solver."""
     iterations: int = Field(default=5, ge=1)
@@ -32,7 +32,7 @@ class Physics(Section):
     contact_force: float = Field(default=1.0, gt=0.0)
     """Vertical force above which a foot counts as being on the ground [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
-    """Generalised speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
+    """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
     divergences_kept: int = Field(default=8, ge=0)
     """How many diverged simulations are kept for replay."""
 

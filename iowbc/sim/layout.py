@@ -62,9 +62,7 @@ class Layout:
         geoms = {model.geom(index).name: index for index in range(model.ngeom)}
         feet = np.array([bodies[name] for name in robot.sole_bodies])
         points = [
-            index
-            for index in range(model.ngeom)
-            if model.geom_bodyid[index] in feet and model.geom_conaffinity[index]
+            index for index in range(model.ngeom) if model.geom_bodyid[index] in feet and model.geom_conaffinity[index]
         ]
         thing = bodies.get("object")
         return cls(

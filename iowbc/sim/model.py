@@ -56,7 +56,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
 
 
 def compile_scene(robot: Robot, physics: Physics, scene: Scene) -> Any:
-    """The model that is stepped. Its one sensor makes MuJoCo compute `cfrc_ext`, from which all contact forces are read."""
+    """The model that is stepped. Its one sensor makes MuJoCo compute `cfrc_ext`, which holds all contact forces."""
     return scene_spec(robot, physics, scene, look=False).compile()
 
 

@@ -1,5 +1,6 @@
 """Adds a scene's object to a model: a box or tyre between the hands, or a crate on wheels."""
 
+from itertools import pairwise
 from typing import Any
 
 import mujoco
@@ -9,10 +10,12 @@ from iowbc.recipe.scene import Object, Scene
 from iowbc.robot.description import Robot
 
 OBJECT_BIT = 4
+OFF_CENTRE = [0.001, 0.001, 0.001]
+"""Centre of mass before one is drawn [m]; off the centre, or else the compiler hard-codes that it is there."""
 PALM_CONDIM = 4
 """Palms resist sliding and twisting."""
 TORSION = 0.02
-"""Torsional friction of a palm per unit of sliding friction [m]: two thirds of the radius of a contact patch of 3 cm."""
+"""Torsional friction of a palm per unit of sliding friction [m]: two thirds of the radius of a 3 cm contact patch."""
 HOLE = 0.55
 """Inner radius of a tyre as a part of its outer one."""
 RING_SEGMENTS = 16
@@ -28,10 +31,10 @@ def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, look: 
     thing = scene.object
     if thing is None:
         raise ValueError("a scene without an object has none to add")
-    body = spec.worldbody.add_body(name="object", pos=[1.0, 0.0, resting_height(scene)])
+    body = spec.worldbody.add_body(name="object", pos=[0.0, 0.0, resting_height(scene)])
     body.explicitinertial = True
     body.mass = thing.mass
-    body.ipos = [0.0, 0.0, 0.0]
+    body.ipos = OFF_CENTRE
     body.inertia = inertia_per_mass(thing) * thing.mass
     half = 0.5 * np.asarray(thing.size)
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
@@ -74,7 +77,7 @@ def resting_height(scene: Scene) -> float:
 
 
 def _add_grips(spec: Any, body: Any, robot: Robot, scene: Scene) -> None:
-    """A compliant point connection of each grip; its place on the object is set when the object is put between the hands."""
+    """A compliant point connection of each grip; its place on the object is set when that is put between the hands."""
     for side, grip, sign in (("left", robot.wrists[0], 1.0), ("right", robot.wrists[1], -1.0)):
         site = body.add_site(name=f"object_{side}_grip", pos=[0.0, sign * 0.15, scene.grasp.height])
         site.group = 4
@@ -135,7 +138,7 @@ def _add_ring(body: Any, thing: Object) -> None:
     middle = outer - thickness
     angles = np.linspace(0.0, 2.0 * np.pi, RING_SEGMENTS + 1)
     rim = np.stack([np.zeros_like(angles), middle * np.cos(angles), middle * np.sin(angles)], axis=1)
-    for start, end in zip(rim[:-1], rim[1:], strict=True):
+    for start, end in pairwise(rim):
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[*start, *end],

@@ -23,7 +23,7 @@ UNIT = 2.0**-53
 
 
 def mix(value: Keys) -> Keys:
-    """SplitMix64's output function on value + golden ratio (Steele, Lea, Flood 2014): a bijection that scatters all bits."""
+    """SplitMix64's output function (Steele, Lea, Flood 2014) of value + golden ratio: a bijection that scatters bits."""
     z = value + GOLDEN
     for shift, multiplier in zip(SHIFTS[:2], MULTIPLIERS, strict=True):
         z ^= z >> shift
@@ -34,19 +34,18 @@ def mix(value: Keys) -> Keys:
 
 def absorb(key: Keys, counter: Array | int) -> Keys:
     """A new key from a key and a counter, any broadcastable shapes."""
-    return mix(key ^ mix(np.asarray(counter).astype(np.uint64)))
+    return mix(key ^ mix(np.atleast_1d(counter).astype(np.uint64)))
 
 
 def environment_key(seed: Array | int, environment: Array) -> Keys:
     """Key of each environment, shape (n,)."""
-    start = mix(np.broadcast_to(np.asarray(seed), environment.shape).astype(np.uint64))
-    return absorb(start, environment)
+    return absorb(mix(np.atleast_1d(seed).astype(np.uint64)), environment)
 
 
 def bits(key: Keys, stream: str, width: int) -> Keys:
     """`width` random 64-bit words per key: shape (n,) to (n, width)."""
     named = absorb(key, zlib.crc32(stream.encode()))
-    return absorb(named[:, None], np.arange(width))
+    return mix(named[:, None] + np.arange(width, dtype=np.uint64) * GOLDEN)
 
 
 def uniform(key: Keys, stream: str, width: int) -> Array:
@@ -84,3 +83,23 @@ def draw(key: Keys, stream: str, distribution: Distribution, width: int = 1) -> 
         kept = uniform(key, f"{stream}/drawn", 1) < distribution.probability
         value = np.where(kept, value, distribution.nominal)
     return value
+
+
+PAIR = np.uint64(0x0000FFFF0000FFFF)
+HALF = np.uint64(0x00000000FFFFFFFF)
+SIXTEEN, THIRTY_TWO = np.uint64(16), np.uint64(32)
+STEP = np.uint64(0xD1342543DE82EF95)
+
+
+def noise(key: Keys, step: NDArray[np.uint64], width: int) -> Array:
+    """x ~ nearly N(0, 1) for each environment's step, shape (n, width): the sum of the four 16-bit parts of a word.
+
+    Mean 0 and variance 1 to 1e-9, kurtosis 2.7, bounded by 2√3. Several times faster than `normal`, for sensor noise.
+    """
+    word = mix((key + step * STEP)[:, None] + np.arange(width, dtype=np.uint64) * GOLDEN)
+    pairs = (word & PAIR) + ((word >> SIXTEEN) & PAIR)
+    total = (pairs & HALF) + (pairs >> THIRTY_TWO)
+    deviation = total.astype(np.float64)
+    deviation -= 2.0 * (2**16 - 1)
+    deviation *= np.sqrt(3.0 / (2.0**32 - 1.0))
+    return deviation

@@ -1,0 +1,57 @@
+"""A line of past values that is read some fraction of periods back."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+
+
+class DelayLine:
+    """The last values of a vector in n environments; each reads with its own latency, interpolated between periods."""
+
+    def __init__(self, n: int, width: int, longest: float) -> None:
+        """`longest`: largest latency that can be asked for [periods]."""
+        self._length = int(np.ceil(longest)) + 2
+        self._values = np.zeros((self._length, n, width))
+        self._newest = np.zeros(1, np.int64)
+        self._whole = np.zeros(n, np.int64)
+        self._part = np.zeros((n, 1))
+        self._rows = np.arange(n)
+
+    def set_latency(self, which: Indices, latency: Array) -> None:
+        """Latencies of some environments, (k,) [periods]."""
+        longest = self._length - 2
+        if np.any(latency > longest) or np.any(latency < 0.0):
+            worst = latency[np.argmax(np.abs(latency))]
+            raise ValueError(
+                f"a latency of {worst:g} periods is outside 0 to {longest}; see randomization.longest_latency"
+            )
+        self._whole[which] = np.floor(latency).astype(np.int64)
+        self._part[which, 0] = latency - np.floor(latency)
+
+    def fill(self, which: Indices, value: Array) -> None:
+        """Makes `value` (k, width) the whole past of some environments."""
+        self._values[:, which] = value
+
+    def push(self, value: Array) -> None:
+        """Adds the newest value, (n, width)."""
+        self._newest[0] = (self._newest[0] + 1) % self._length
+        self._values[self._newest[0]] = value
+
+    def read(self) -> Array:
+        """The values as each environment sees them, (n, width): (1 - f) x[k periods ago] + f x[k + 1 periods ago]."""
+        index = (self._newest[0] - self._whole) % self._length
+        value = self._values[index, self._rows]
+        earlier = self._values[index - 1, self._rows]
+        earlier -= value
+        earlier *= self._part
+        value += earlier
+        seen: Array = value
+        return seen
+
+    def arrays(self) -> dict[str, Array]:
+        """The line's memory, by name."""
+        return {"values": self._values, "newest": self._newest, "whole": self._whole, "part": self._part}

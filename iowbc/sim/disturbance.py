@@ -1,0 +1,79 @@
+"""Blows at random times: impulses on the object's centre of mass (paper III-D), pushes on the robot's base."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.distribution import Distribution
+from iowbc.sim import random
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+Keys = NDArray[np.uint64]
+
+
+class Blows:
+    """Constant forces of a short duration, in n environments; times, sizes and directions from the episode's key."""
+
+    def __init__(
+        self,
+        n: int,
+        *,
+        name: str,
+        enabled: bool,
+        interval: Distribution,
+        size: Distribution,
+        duration: float,
+        period: float,
+        level: bool,
+    ) -> None:
+        """`size` of the impulse [N·s], or its part per unit of `scale`; `level`: horizontal directions only."""
+        self._name, self._interval, self._size, self._level = name, interval, size, level
+        self._enabled, self._period = enabled, period
+        self._length = max(1, round(duration / period))
+        self._next, self._until = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        self._count = np.zeros(n, np.int64)
+        self.force = np.zeros((n, 3))
+
+    def reset(self, which: Indices, key: Keys) -> None:
+        """Starts the clocks of some environments; `key` of their episodes, (k,)."""
+        self._count[which] = 0
+        self._until[which] = 0
+        self.force[which] = 0.0
+        self._next[which] = self._wait(key, self._count[which])
+
+    def _wait(self, key: Keys, count: Indices) -> Indices:
+        seconds = random.draw(random.absorb(key, count), f"{self._name}/interval", self._interval)[:, 0]
+        return np.maximum(np.round(seconds / self._period), self._length).astype(np.int64)
+
+    def advance(self, step: Indices, key: Keys, scale: Array) -> Array:
+        """Forces over the period that starts at `step` (n,) of each episode, (n, 3) [N], times `scale` (n,)."""
+        if not self._enabled:
+            return self.force
+        due = step >= self._next
+        over = step >= self._until
+        over &= self._until > 0
+        if over.any():
+            self.force[over] = 0.0
+            self._until[over] = 0
+        if due.any():
+            self._strike(np.flatnonzero(due), step, key, scale)
+        return self.force
+
+    def _strike(self, which: Indices, step: Indices, key: Keys, scale: Array) -> None:
+        blow = random.absorb(key[which], self._count[which])
+        size = random.draw(blow, f"{self._name}/size", self._size)[:, 0]
+        direction = random.normal(blow, f"{self._name}/direction", 3)
+        if self._level:
+            direction[:, 2] = 0.0
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+        impulse = size * scale[which]
+        self.force[which] = direction * (impulse / (self._length * self._period))[:, None]
+        self._until[which] = step[which] + self._length
+        self._count[which] += 1
+        self._next[which] = step[which] + self._wait(key[which], self._count[which])
+
+    def arrays(self) -> dict[str, Array]:
+        """The clocks, by name."""
+        return {"next": self._next, "until": self._until, "count": self._count, "force": self.force}

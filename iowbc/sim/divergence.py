@@ -1,0 +1,38 @@
+"""Simulations that left the numbers: what led to it, kept for replay."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """One environment at the start of the control period in which it diverged."""
+
+    scene: str
+    environment: int
+    episode: int
+    step: int
+    arrays: Mapping[str, Array]
+    """MuJoCo's state row, the targets and wrenches of the period, and the fields of the environment's own model."""
+
+    def save(self, file: Path) -> None:
+        """Writes an .npz without pickles."""
+        about = {"scene": self.scene, "environment": self.environment, "episode": self.episode, "step": self.step}
+        stored: dict[str, Any] = {"about": np.array(json.dumps(about)), **self.arrays}
+        np.savez(file, **stored)
+
+    @classmethod
+    def load(cls, file: Path) -> Self:
+        """Reads what `save` wrote."""
+        with np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files if name != "about"}
+            about = json.loads(str(stored["about"]))
+        return cls(arrays=arrays, **about)

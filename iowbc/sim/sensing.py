@@ -1,0 +1,118 @@
+"""What the sensors deliver: the truth with bias, noise and latency."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.sensing import Sensing as Recipe
+from iowbc.robot import rotations
+from iowbc.sim.delay import DelayLine
+from iowbc.sim.state import JOINTS, MeasuredState, SimulationState
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+
+POSITION, VELOCITY = slice(0, JOINTS), slice(JOINTS, 2 * JOINTS)
+ANGULAR, GRAVITY = slice(2 * JOINTS, 2 * JOINTS + 3), slice(2 * JOINTS + 3, 2 * JOINTS + 6)
+ROBOT = slice(0, 2 * JOINTS + 6)
+PLACE, ORIENTATION = slice(0, 3), slice(3, 7)
+SPEED, TURNING = slice(7, 10), slice(10, 13)
+OBJECT_WIDTH = 13
+NOISE_WIDTH = ROBOT.stop + OBJECT_WIDTH
+"""Columns of noise that sensing takes each step."""
+
+
+class Sensing:
+    """Sensors of n environments; two delay lines, one for joints and inertial unit, one for the object's tracking."""
+
+    def __init__(self, recipe: Recipe, n: int, longest_latency: int) -> None:
+        self._robot, self._object = np.zeros((n, ROBOT.stop)), np.zeros((n, OBJECT_WIDTH))
+        self._robot_line = DelayLine(n, ROBOT.stop, longest_latency)
+        self._object_line = DelayLine(n, OBJECT_WIDTH, longest_latency)
+        self._bias = np.zeros((n, JOINTS))
+        self._deviation = np.zeros((n, NOISE_WIDTH))
+        self._nominal = _deviations(recipe)
+        self.rows = np.zeros((n, NOISE_WIDTH))
+        seen = self.rows[:, ROBOT.stop :]
+        self.measured = MeasuredState(
+            joint_position=self.rows[:, POSITION],
+            joint_velocity=self.rows[:, VELOCITY],
+            base_angular_velocity=self.rows[:, ANGULAR],
+            projected_gravity=self.rows[:, GRAVITY],
+            object_position=seen[:, PLACE],
+            object_quaternion=seen[:, ORIENTATION],
+            object_linear_velocity=seen[:, SPEED],
+            object_angular_velocity=seen[:, TURNING],
+        )
+
+    def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
+        """Fills the past of some environments with their present."""
+        self._bias[which] = drawn["encoder_bias"][which]
+        self._deviation[which] = self._nominal * drawn["noise_scale"][which, None]
+        self._deviation[which, ROBOT.stop :] *= state.has_object[which, None]
+        self._robot_line.set_latency(which, drawn["sensor_latency"][which])
+        self._object_line.set_latency(which, drawn["object_latency"][which])
+        self._sense(state)
+        self._robot_line.fill(which, self._robot[which])
+        self._object_line.fill(which, self._object[which])
+
+    def advance(self, state: SimulationState) -> None:
+        """Takes in the state after a period."""
+        self._sense(state)
+        self._robot_line.push(self._robot)
+        self._object_line.push(self._object)
+
+    def deliver(self, noise: Array) -> None:
+        """Refreshes `measured`; `noise` (n, NOISE_WIDTH) standard normal."""
+        rows = self.rows
+        np.multiply(noise, self._deviation, out=rows)
+        rows[:, ROBOT] += self._robot_line.read()
+        rows[:, ROBOT.stop :] += self._object_line.read()
+        rows[:, POSITION] += self._bias
+        quaternion = self.measured.object_quaternion
+        quaternion /= np.sqrt(np.einsum("ni,ni->n", quaternion, quaternion))[:, None]
+
+    def _sense(self, state: SimulationState) -> None:
+        robot, thing = self._robot, self._object
+        robot[:, POSITION] = state.joint_position
+        robot[:, VELOCITY] = state.joint_velocity
+        robot[:, ANGULAR] = state.base_angular_velocity
+        rotation = rotations.matrix(state.base_quaternion)
+        robot[:, GRAVITY] = -rotation[:, 2]
+        if not state.has_object.any():
+            thing[:, ORIENTATION.start] = 1.0
+            return
+        world = np.empty((len(robot), 3, 3))
+        np.subtract(state.object_position, state.base_position, out=world[:, 0])
+        np.subtract(state.object_linear_velocity, state.base_linear_velocity, out=world[:, 1])
+        world[:, 2] = state.object_angular_velocity
+        seen = world @ rotation
+        place, turning = seen[:, 0], state.base_angular_velocity
+        thing[:, PLACE] = place
+        thing[:, SPEED] = seen[:, 1] - rotations.cross(turning, place)
+        thing[:, TURNING] = seen[:, 2] - turning
+        relative = rotations.multiply(rotations.conjugate(state.base_quaternion), state.object_quaternion)
+        relative *= np.where(relative[:, :1] < 0.0, -1.0, 1.0)
+        thing[:, ORIENTATION] = relative
+        if not state.has_object.all():
+            thing[~state.has_object] = 0.0
+            thing[~state.has_object, ORIENTATION.start] = 1.0
+
+    def arrays(self) -> dict[str, Array]:
+        """The sensors' memory, by name."""
+        own = {"bias": self._bias, "deviation": self._deviation, "rows": self.rows}
+        for name, line in (("robot", self._robot_line), ("object", self._object_line)):
+            own |= {f"{name}/{key}": values for key, values in line.arrays().items()}
+        return own
+
+
+def _deviations(recipe: Recipe) -> Array:
+    """Standard deviation of each column, (NOISE_WIDTH,); a rotation by η changes a unit quaternion by η / 2."""
+    deviation = np.zeros(NOISE_WIDTH)
+    deviation[POSITION], deviation[VELOCITY] = recipe.joint_position, recipe.joint_velocity
+    deviation[ANGULAR], deviation[GRAVITY] = recipe.angular_velocity, recipe.gravity
+    seen = deviation[ROBOT.stop :]
+    seen[PLACE], seen[ORIENTATION] = recipe.object_position, 0.5 * recipe.object_orientation
+    seen[SPEED], seen[TURNING] = recipe.object_velocity, recipe.object_angular_velocity
+    return deviation

@@ -1,0 +1,275 @@
+"""n environments stepped in one process: worlds, partner, disturbances, randomisation and sensors."""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.simulation import Simulation as Recipe
+from iowbc.robot.description import Robot
+from iowbc.sim import partner, random, sensing
+from iowbc.sim.delay import DelayLine
+from iowbc.sim.disturbance import Blows
+from iowbc.sim.divergence import Divergence
+from iowbc.sim.randomization import Draws
+from iowbc.sim.state import MeasuredState, SimulationState
+from iowbc.sim.world import World
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+
+
+class Simulation:
+    """The environments of one process. Set `target` and `feed`, call `step`, read `state` and `measured`."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        recipe: Recipe,
+        *,
+        envs: Array,
+        seed: int | Array,
+        scenes: Sequence[str],
+        fixed: Mapping[str, Array] | None = None,
+        control_frequency: float = 50.0,
+    ) -> None:
+        """`envs`: global indices of the environments, (n,); with `seed` (one, or one each) they key all that is random.
+
+        `scenes`: name of each environment's scene. `fixed`: quantities held at values instead of drawn, (n,); NaN draws.
+        """
+        mujoco.set_mju_user_warning(_ignore)
+        self.robot, self.recipe = robot, recipe
+        self.envs = np.asarray(envs, np.int64)
+        self.n = n = len(self.envs)
+        self.period = 1.0 / control_frequency
+        self.scene_names = tuple(scenes)
+        self.fixed: dict[str, Array] = {}
+        models = [_scene(recipe, name) for name in self.scene_names]
+        if len(models) != n:
+            raise ValueError(f"{n} environments but {len(models)} scenes")
+        substeps = _substeps(self.period, recipe.physics.timestep)
+        self._worlds = [
+            World(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), substeps)
+            for name in dict.fromkeys(self.scene_names)
+        ]
+        links = self._worlds[0].layout.links
+        self._draws = Draws(recipe, models, robot, links.stop - links.start)
+        self.hold(fixed or {})
+        self._key = random.environment_key(seed, self.envs)
+        self._episode_key = self._key.copy()
+        self.episode = np.zeros(n, np.int64)
+        self.clock = np.zeros(n, np.int64)
+        self.state = SimulationState.empty(n)
+        self.state.has_object[:] = [model.object is not None for model in models]
+        self.target = np.tile(robot.default_position, (n, 1))
+        self.feed = np.zeros((n, 3))
+        self._partner = partner.Partner(recipe.partner, models, self.period)
+        self._sensing = sensing.Sensing(recipe.sensing, n, recipe.randomization.longest_latency)
+        self._targets = DelayLine(n, len(robot.joints), recipe.randomization.longest_latency)
+        self._impulses = Blows(
+            n,
+            name="impulse",
+            enabled=recipe.impulses.enabled,
+            interval=recipe.impulses.interval,
+            size=recipe.impulses.magnitude,
+            duration=recipe.impulses.duration,
+            period=self.period,
+            level=False,
+        )
+        self._pushes = Blows(
+            n,
+            name="push",
+            enabled=recipe.pushes.enabled,
+            interval=recipe.pushes.interval,
+            size=recipe.pushes.speed,
+            duration=recipe.pushes.duration,
+            period=self.period,
+            level=True,
+        )
+        self._robot_mass = np.zeros(n)
+        self._noise_width = sensing.NOISE_WIDTH + partner.NOISE_WIDTH
+        self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
+        self.divergence_count = 0
+
+    @property
+    def measured(self) -> MeasuredState:
+        """What the sensors deliver, refreshed by `reset` and `step`."""
+        return self._sensing.measured
+
+    @property
+    def drawn(self) -> dict[str, Array]:
+        """Everything that is random in the current episodes, by name, (n,) or (n, k)."""
+        return self._draws.values
+
+    def hold(self, fixed: Mapping[str, Array]) -> None:
+        """Holds quantities at values (n,) from the next reset on; NaN draws. Keeps what is held and not named here."""
+        unknown = [name for name in fixed if name not in self._draws.names]
+        if unknown:
+            raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self._draws.names))}")
+        for name, values in fixed.items():
+            self.fixed[name] = np.broadcast_to(np.asarray(values, np.float64), (self.n,)).copy()
+
+    def reset(
+        self,
+        which: Indices,
+        joint_position: Array,
+        base_pitch: Array | None = None,
+        yaw: Array | None = None,
+    ) -> None:
+        """Starts new episodes: draws what is random, puts the robot on its soles and the object into its hands.
+
+        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch`, `yaw` (k,) [rad], zero by default. The height
+        of the base follows from kinematics: the lowest corner of the soles touches the ground.
+        """
+        which = np.asarray(which, np.int64)
+        if len(which) == 0:
+            return
+        pitch = np.zeros(len(which)) if base_pitch is None else np.asarray(base_pitch)
+        heading = np.zeros(len(which)) if yaw is None else np.asarray(yaw)
+        self.episode[which] += 1
+        self.clock[which] = 0
+        key = random.absorb(self._key[which], self.episode[which])
+        self._episode_key[which] = key
+        self._draws.draw(which, key, self.fixed)
+        self.target[which] = joint_position
+        state = self.state
+        state.diverged[which] = False
+        for world, ids, chosen in self._parts(which):
+            drawn = {name: values[world.rows[ids]] for name, values in self.drawn.items()}
+            world.reset(ids, joint_position[chosen], pitch[chosen], heading[chosen], drawn)
+            world.gather(state)
+            self._robot_mass[world.place] = world.robot_mass
+        for name in ("slipped", "partner_force", "partner_energy", "external_force", "push_force"):
+            getattr(state, name)[which] = 0
+        state.grasped[which] = state.has_object[which, None]
+        self._targets.set_latency(which, self.drawn["action_latency"][which])
+        self._targets.fill(which, self.target[which])
+        self._impulses.reset(which, key)
+        self._pushes.reset(which, key)
+        self._partner.reset(which, self.drawn, state)
+        self._sensing.reset(which, self.drawn, state)
+        self._sensing.deliver(self._noise()[:, : sensing.NOISE_WIDTH])
+
+    def step(self) -> None:
+        """One control period."""
+        state, drawn = self.state, self.drawn
+        noise = self._noise()
+        wrench, diverged = state.external_force, state.diverged
+        self._partner.wrench(self.feed, noise[:, sensing.NOISE_WIDTH :], state, wrench)
+        wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
+        push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
+        np.multiply(push, self._robot_mass[:, None], out=state.push_force)
+        self._targets.push(self.target)
+        target = self._targets.read()
+        self.clock += 1
+        diverged[:] = False
+        for world in self._worlds:
+            place = world.place
+            failed = diverged[place]
+            world.step(target[place], wrench[place], state.push_force[place], failed)
+            if failed.any():
+                diverged[place] = failed
+                self._keep_divergences(world, np.flatnonzero(failed), target, wrench)
+            world.gather(state)
+            world.release(state, drawn["slip_force"])
+        self._partner.observe(state)
+        self._sensing.advance(state)
+        self._sensing.deliver(self._noise()[:, : sensing.NOISE_WIDTH])
+
+    def _noise(self) -> Array:
+        return random.noise(self._episode_key, self.clock.view(np.uint64), self._noise_width)
+
+    def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
+        """Worlds that some environments belong to, with their indices in the world and in `which`."""
+        for world in self._worlds:
+            chosen = np.flatnonzero(np.isin(which, world.rows))
+            if len(chosen):
+                yield world, np.searchsorted(world.rows, which[chosen]), chosen
+
+    def _keep_divergences(self, world: World, ids: Indices, target: Array, wrench: Array) -> None:
+        self.divergence_count += len(ids)
+        for index in ids:
+            row = int(world.rows[index])
+            arrays = world.record(int(index))
+            arrays |= {"target": target[row], "wrench": wrench[row], "push": self.state.push_force[row]}
+            self.divergences.append(
+                Divergence(
+                    scene=self.scene_names[row],
+                    environment=int(self.envs[row]),
+                    episode=int(self.episode[row]),
+                    step=int(self.clock[row]),
+                    arrays={name: values.copy() for name, values in arrays.items()},
+                )
+            )
+
+    def _memory(self) -> dict[str, Array]:
+        """Every array that the future depends on, besides the worlds'."""
+        own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
+        own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass}
+        parts: dict[str, dict[str, Array]] = {
+            "state": self.state.arrays(),
+            "drawn": self.drawn,
+            "partner": self._partner.arrays(),
+            "sensing": self._sensing.arrays(),
+            "targets": self._targets.arrays(),
+            "impulses": self._impulses.arrays(),
+            "pushes": self._pushes.arrays(),
+            "fixed": self.fixed,
+        }
+        return own | {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
+
+    def snapshot(self) -> dict[str, Array]:
+        """Copies of everything that the future depends on; `restore` continues bit for bit."""
+        saved = {name: values.copy() for name, values in self._memory().items()}
+        for index, world in enumerate(self._worlds):
+            saved |= {f"world{index}/{name}": values for name, values in world.snapshot().items()}
+        return saved
+
+    def restore(self, saved: Mapping[str, Array]) -> None:
+        """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes."""
+        self.hold({name.removeprefix("fixed/"): values for name, values in saved.items() if name.startswith("fixed/")})
+        for name, values in self._memory().items():
+            if name not in saved or saved[name].shape != values.shape:
+                found = saved[name].shape if name in saved else "nothing"
+                raise ValueError(f"snapshot of another simulation: {name} is {found}, expected {values.shape}")
+            values[...] = saved[name]
+        for index, world in enumerate(self._worlds):
+            start = f"world{index}/"
+            world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
+        self._partner.restored()
+
+    def render_model(self, env: int) -> tuple[Any, Any]:
+        """MuJoCo model and data of one environment, for pictures and queries; copies."""
+        for world in self._worlds:
+            found = np.flatnonzero(world.rows == env)
+            if len(found):
+                return world.batch.get_model(int(found[0])), world.batch.get_data(int(found[0]))
+        raise IndexError(f"no environment {env}; there are {self.n}")
+
+
+def _ignore(message: str) -> None:
+    """MuJoCo's warnings are read from its counters; without this it prints them and writes a log file."""
+
+
+def _scene(recipe: Recipe, name: str) -> Any:
+    known = tuple(type(recipe.scenes).model_fields)
+    if name not in known:
+        raise KeyError(f"no scene {name!r}; there are: {', '.join(known)}")
+    return getattr(recipe.scenes, name)
+
+
+def _rows(names: Sequence[str], name: str) -> Indices:
+    return np.array([index for index, given in enumerate(names) if given == name])
+
+
+def _substeps(period: float, timestep: float) -> int:
+    count = round(period / timestep)
+    if count < 1 or abs(count * timestep - period) > 1e-9:
+        raise ValueError(
+            f"a control period of {period:g} s is no whole number of physics steps of {timestep:g} s; "
+            f"choose simulation.physics.timestep as {period:g} s divided by a whole number"
+        )
+    return count

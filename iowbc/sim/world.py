@@ -1,0 +1,254 @@
+"""The environments of one scene: a model, and a batch of simulations of it stepped in one call."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+from numpy.typing import NDArray
+
+from iowbc.recipe.scene import Scene
+from iowbc.recipe.simulation import Physics
+from iowbc.robot import rotations
+from iowbc.robot.description import Robot
+from iowbc.sim.layout import BASE_ANGULAR, BASE_LINEAR, Layout
+from iowbc.sim.model import compile_scene
+from iowbc.sim.randomization import ModelFields
+from iowbc.sim.state import SimulationState
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+POSITION = mujoco.mjtStage.mjSTAGE_POS.value
+VELOCITY = mujoco.mjtStage.mjSTAGE_VEL.value
+NOTHING = mujoco.mjtStage.mjSTAGE_NONE.value
+AT_LIMIT = 0.999
+"""Part of the torque limit at which a motor counts as saturated."""
+PRESSED = 0.001
+"""Depth by which palms start inside the object that they squeeze [m]."""
+
+
+class World:
+    """n simulations of one scene, and their place among all environments.
+
+    One `mjData` per simulation: MuJoCo then computes positions and velocities of the new state as the first half of the
+    next step, so that exact observations cost nothing.
+    """
+
+    def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, substeps: int) -> None:
+        self.scene, self.rows, self._substeps, self._robot = scene, rows, substeps, robot
+        self.place: slice | Indices = _as_slice(rows)
+        self.model = compile_scene(robot, physics, scene)
+        self.layout = Layout.of(self.model, robot)
+        self.batch = Batch(self.model, len(rows), nthread=1, persistent=True)
+        self.fields = ModelFields(self.batch, self.layout, scene)
+        self._physics = physics
+        self._limit = AT_LIMIT * robot.effort
+        bind = self.batch.bind
+        self._qpos, self._qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
+        self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
+        self._acceleration, self._torque, self._external = bind("qacc"), bind("actuator_force"), bind("cfrc_ext")
+        self._body_position, self._body_quaternion, self._body_com = bind("xpos"), bind("xquat"), bind("xipos")
+        self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
+        self._warning_counts = self.batch.warning[:, :, 1]
+        self._warnings = self._warning_counts.copy()
+        self._before = self.batch.state.copy()
+        self._mass_cache()
+
+    def _mass_cache(self) -> None:
+        mass = self.fields.body_mass
+        robot = mass[:, self.layout.links]
+        self._weights = robot / robot.sum(axis=1, keepdims=True)
+        thing = mass[:, self.layout.object] if self.layout.object is not None else np.zeros(len(mass))
+        self._object_part = (thing / (thing + robot.sum(axis=1)))[:, None]
+        self.robot_mass = robot.sum(axis=1)
+
+    def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
+        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate before them."""
+        order = np.argsort(ids)
+        ids, joint_position, pitch, yaw = ids[order], joint_position[order], pitch[order], yaw[order]
+        self.batch.reset(ids, stage=NOTHING)
+        self.fields.write(ids, {name: values[order] for name, values in drawn.items()})
+        self._qpos[ids, :3] = (0.0, 0.0, 1.0)
+        self._qpos[ids, 3:7] = rotations.from_euler(np.zeros_like(pitch), pitch, yaw)
+        self._qpos[ids, self.layout.joints] = joint_position
+        self.control[ids] = joint_position
+        self.batch.forward(ids, stage=POSITION)
+        drop = self._lowest_sole(ids)
+        self._qpos[ids, 2] -= drop
+        if self.layout.object_position is not None:
+            self._place_object(ids, drop, yaw, self.layout.object_position.start)
+        self._connected[ids] = 1.0
+        self.batch.forward(ids)
+        self._warnings[ids] = self._warning_counts[ids]
+        self._mass_cache()
+
+    def _lowest_sole(self, ids: Indices) -> Array:
+        """Height of the lowest point of the soles, (k,) [m]."""
+        points = self.layout.foot_geoms
+        feet = self.model.geom_bodyid[points]
+        offset = np.broadcast_to(self.model.geom_pos[points], (len(ids), len(points), 3))
+        centre = self._body_position[ids][:, feet] + rotations.rotate(self._body_quaternion[ids][:, feet], offset)
+        lowest: Array = np.min(centre[..., 2] - self.model.geom_size[points, 0], axis=1)
+        return lowest
+
+    def _place_object(self, ids: Indices, drop: Array, yaw: Array, start: int) -> None:
+        turn = rotations.from_euler(np.zeros_like(yaw), np.zeros_like(yaw), yaw)
+        hands = self._sites[ids][:, self.layout.grips]
+        hands[..., 2] -= drop[:, None]
+        if self.layout.palms is not None:
+            hands = hands + self._palm_offset(ids)
+        in_heading = rotations.rotate_inverse(turn[:, None], hands)
+        middle = 0.5 * (in_heading[:, 0] + in_heading[:, 1])
+        radius = self.scene.palm_radius
+        if self.scene.kind == "push":
+            front = np.max(in_heading[:, :, 0], axis=1) + radius + self.scene.gap
+            middle[:, 0] = front + self.fields.half_size(ids)[:, 0]
+            self._qpos[ids, start : start + 2] = rotations.rotate(turn, middle)[:, :2]
+            self._qpos[ids, start + 2] = yaw
+            return
+        middle[:, 2] -= self.scene.grasp.height
+        self._qpos[ids, start : start + 3] = rotations.rotate(turn, middle)
+        self._qpos[ids, start + 3 : start + 7] = turn
+        if self.layout.palms is None:
+            self.fields.place_grips(ids, in_heading - middle[:, None])
+        else:
+            between = in_heading[:, 0, 1] - in_heading[:, 1, 1]
+            self.fields.fit_width(ids, between - 2.0 * (radius - PRESSED))
+
+    def _palm_offset(self, ids: Indices) -> Array:
+        """From the grips to the centres of the palms, world frame, (k, 2, 3) [m]."""
+        local = self.model.geom_pos[self.layout.palms] - self._robot.grip_offset
+        turned: Array = rotations.rotate(
+            self._body_quaternion[ids][:, self.layout.hands], np.broadcast_to(local, (len(ids), 2, 3))
+        )
+        return turned
+
+    def step(self, target: Array, wrench: Array, push: Array, diverged: Mask) -> None:
+        """One control period with joint targets held; `wrench` (n, 6) on the object's and `push` (n, 3) on the base's
+        centre of mass. Marks in `diverged` the simulations that left the numbers and puts them back."""
+        np.copyto(self._before, self.batch.state)
+        np.copyto(self.control, target)
+        self._applied[:, self.layout.base, :3] = push
+        if self.layout.object is not None:
+            self._applied[:, self.layout.object] = wrench
+        try:
+            self.batch.step(nstep=self._substeps, stage=VELOCITY)
+        except SimulationError as error:
+            diverged[error.ids] = True
+        self._check(diverged)
+
+    def _check(self, diverged: Mask) -> None:
+        counts = self._warning_counts
+        if not (counts == self._warnings).all():
+            diverged |= (counts != self._warnings).any(axis=1)
+            np.copyto(self._warnings, counts)
+        highest = np.abs(self._qvel).max(axis=1)
+        diverged |= ~(highest < self._physics.fastest)
+        if diverged.any():
+            ids = np.flatnonzero(diverged)
+            self.batch.state[ids] = self._before[ids]
+            self.batch.forward(ids)
+
+    def record(self, index: int) -> dict[str, Array]:
+        """What a simulation was at the start of the last control period: its state row and its model's own fields."""
+        return {"state": self._before[index]} | self.fields.of(index)
+
+    def release(self, state: SimulationState, slip_force: Array) -> None:
+        """Lets go the hands whose grip carries more than its slip force, (all environments,) [N]."""
+        if self.scene.kind == "free":
+            return
+        force = state.grip_force[self.place]
+        load = np.einsum("nhi,nhi->nh", force, force)
+        if self.layout.object_grips is None:
+            state.grasped[self.place] = load > 0.0
+            return
+        limit = slip_force[self.place]
+        slipped = load > (limit * limit)[:, None]
+        slipped &= self._connected > 0.5
+        if slipped.any():
+            self._connected[slipped] = 0.0
+        state.slipped[self.place] = slipped
+        state.grasped[self.place] = self._connected > 0.5
+
+    def gather(self, state: SimulationState) -> None:
+        """Writes the simulations' rows of the state."""
+        place, layout, qpos, qvel = self.place, self.layout, self._qpos, self._qvel
+        state.base_position[place] = qpos[:, :3]
+        state.base_quaternion[place] = qpos[:, 3:7]
+        state.base_linear_velocity[place] = qvel[:, BASE_LINEAR]
+        state.base_angular_velocity[place] = qvel[:, BASE_ANGULAR]
+        state.joint_position[place] = qpos[:, layout.joints]
+        state.joint_velocity[place] = qvel[:, layout.joint_speeds]
+        state.joint_acceleration[place] = self._acceleration[:, layout.joint_speeds]
+        state.joint_torque[place] = self._torque
+        state.saturation[place] = np.abs(self._torque) >= self._limit
+        state.torso_quaternion[place] = self._body_quaternion[:, layout.torso]
+        state.com_position[place] = self._subtree_com[:, layout.base]
+        state.foot_position[place] = self._sites[:, layout.soles]
+        state.foot_velocity[place] = self._sole_velocity()
+        force = self._external[:, layout.feet, 3:]
+        state.foot_force[place] = force
+        state.foot_contact[place] = force[:, :, 2] > self._physics.contact_force
+        self._gather_object(state)
+
+    def _sole_velocity(self) -> Array:
+        """Velocities of the sole centres, (n, 2, 3) [m/s], from the feet's spatial velocities at the robot's com."""
+        layout = self.layout
+        spatial = self._spatial_velocity[:, layout.feet]
+        arm = self._sites[:, layout.soles] - self._subtree_com[:, layout.base, None]
+        velocity: Array = spatial[..., 3:] + rotations.cross(spatial[..., :3], arm)
+        return velocity
+
+    def _robot_velocity(self) -> Array:
+        """Velocity of the robot's centre of mass, (n, 3) [m/s]: mean of the links' velocities, weighted by mass."""
+        layout = self.layout
+        spatial = self._spatial_velocity[:, layout.links]
+        arm = self._body_com[:, layout.links] - self._subtree_com[:, layout.base, None]
+        velocity = spatial[..., 3:] + rotations.cross(spatial[..., :3], arm)
+        velocity *= self._weights[..., None]
+        mean: Array = velocity.sum(axis=1)
+        return mean
+
+    def _gather_object(self, state: SimulationState) -> None:
+        place, layout = self.place, self.layout
+        velocity = self._robot_velocity()
+        if layout.object is None:
+            state.system_velocity[place] = velocity
+            return
+        spatial = self._spatial_velocity[:, layout.object]
+        turning, centre = spatial[:, :3], self._subtree_com[:, layout.object]
+        position = self._body_position[:, layout.object]
+        state.object_position[place] = position
+        state.object_quaternion[place] = self._body_quaternion[:, layout.object]
+        state.object_linear_velocity[place] = spatial[:, 3:] + rotations.cross(turning, position - centre)
+        state.object_angular_velocity[place] = turning
+        state.system_velocity[place] = velocity + self._object_part * (spatial[:, 3:] - velocity)
+        state.grip_force[place] = self._external[:, layout.hands, 3:]
+
+    def object_com(self) -> Array:
+        """Centre of mass of the object, (n, 3) [m]."""
+        com: Array = self._body_com[:, self.layout.object]
+        return com
+
+    def snapshot(self) -> dict[str, Array]:
+        """Everything that the next step depends on."""
+        return {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
+
+    def restore(self, values: Mapping[str, Array]) -> None:
+        """Inverse of `snapshot`; the simulations then take bit for bit the same course."""
+        self.fields.restore(values)
+        self.batch.state[...] = values["state"]
+        self._warning_counts[...] = values["warnings"]
+        self._warnings[...] = values["warnings"]
+        self.batch.forward(stage=VELOCITY)
+        self._mass_cache()
+
+
+def _as_slice(rows: Indices) -> slice | Indices:
+    """Rows that follow one another as a slice, which NumPy copies several times faster."""
+    if len(rows) and np.array_equal(rows, np.arange(rows[0], rows[0] + len(rows))):
+        return slice(int(rows[0]), int(rows[0]) + len(rows))
+    return rows
