@@ -13,9 +13,14 @@ from iowbc.recipe.section import Section
 CONTRACT = "contract.json"
 GRAPH = "policy.onnx"
 GOLDEN = "golden.npz"
-FEASIBLE = "feasible.npz"
+RECIPE = "recipe.json"
+"""The resolved recipe: with it the policy can be played in the simulation it was trained in."""
 ROBOT = "robot"
 """Folder with the robot's description inside the exported folder."""
+GENERATOR = "rg"
+"""Folder with the reference generator: its feasible map clamps commands; its network is in the graph already."""
+FEASIBLE = "feasible.npz"
+GENERATOR_FILES = ("rg.safetensors", "rg.json", FEASIBLE)
 
 
 class ContractBroken(Exception):
@@ -116,7 +121,7 @@ def read_contract(folder: Path) -> Contract:
     missing = [name for name in (CONTRACT, GRAPH) if not (folder / name).is_file()]
     if missing:
         raise ContractBroken(
-            f"{folder}: no exported policy, {' and '.join(missing)} missing; give the folder that the stage `export` made"
+            f"{folder}: no exported policy, {' and '.join(missing)} missing; give the folder that `export` made"
         )
     try:
         contract = Contract.model_validate_json((folder / CONTRACT).read_text())

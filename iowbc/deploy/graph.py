@@ -3,7 +3,6 @@
 It does in one graph what `iowbc.task` does in NumPy, from measured values to joint targets of the support branch.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,7 +71,7 @@ class GaitModule(nn.Module):
         self.register_buffer("amplitude", _tensor(amplitude))
 
     def forward(self, gait: Tensor) -> tuple[Tensor, Tensor]:
-        """gait: phase φ in [0, 1) and 1 while the clock runs, shape (n, 2). Returns swing (n, 15) [rad], signal (n, 2)."""
+        """gait: φ in [0, 1), and 1 while the clock runs, (n, 2). Returns swing (n, 15) [rad] and signal (n, 2)."""
         phase, stepping = gait[:, :1], gait[:, 1:]
         shifted = phase + HALF_STRIDE
         feet = torch.cat([phase, shifted - torch.floor(shifted)], dim=1)
@@ -113,32 +112,31 @@ class ControllerGraph(nn.Module):
 
     def input_ports(self) -> tuple[Port, ...]:
         """Inputs, in order."""
-        joints, support = len(self.robot.joints), len(self.robot.support)
-        ports = (
+        joints, support, arms = len(self.robot.joints), len(self.robot.support), len(self.robot.interaction)
+        return (
             Port("command", (11,), "m/s, m/s, rad/s, m, rad, m x 6", "heading", "the skill-level command C, clamped"),
             Port("projected_gravity", (3,), "1", "base", "direction of gravity; (0, 0, -1) when upright"),
             Port("base_angular_velocity", (3,), "rad/s", "base", "gyroscope"),
             Port("joint_position", (joints,), "rad", "joint", "all joints, in the order of `joints`"),
             Port("joint_velocity", (joints,), "rad/s", "joint", "all joints, in the order of `joints`"),
-            Port(
-                "arm_reference", (joints - support,), "rad", "joint", "θ_I_ref from differential IK, interaction order"
-            ),
+            Port("arm_reference", (arms,), "rad", "joint", "θ_I_ref from differential IK, interaction order"),
             Port("gait", (2,), "1, 1", "-", "gait phase in [0, 1), and 1 while the gait clock runs, else 0"),
-            Port(
-                "last_action", (support,), "action", "joint", "the output `action` of the step before, 0 at the start"
-            ),
+            Port("last_action", (support,), "action", "joint", "`action` of the step before, 0 at the start"),
             Port("restart", (1,), "1", "-", "1 at the first step of an episode: the history is filled with it"),
-            Port(
-                "history", (self.history, self.layout.size), "SI", "-", "the output `history_next` of the step before"
-            ),
+            Port("history", (self.history, self.layout.size), "SI", "-", "`history_next` of the step before"),
+            *self.object_ports(),
         )
-        seen = (
+
+    def object_ports(self) -> tuple[Port, ...]:
+        """The last inputs, where the policy observes the object."""
+        if not self.observes_object:
+            return ()
+        return (
             Port("object_position", (3,), "m", "base", "object's origin from the base"),
             Port("object_quaternion", (4,), "1", "base", "object's orientation, wxyz"),
             Port("object_linear_velocity", (3,), "m/s", "base", "object's velocity relative to the base"),
             Port("object_angular_velocity", (3,), "rad/s", "base", "object's angular velocity relative to the base"),
         )
-        return ports + seen if self.observes_object else ports
 
     def output_ports(self) -> tuple[Port, ...]:
         """Outputs, in order."""
@@ -162,12 +160,15 @@ class ControllerGraph(nn.Module):
         last_action: Tensor,
         restart: Tensor,
         history: Tensor,
-        *object_state: Tensor,
+        object_position: Tensor | None = None,
+        object_quaternion: Tensor | None = None,
+        object_linear_velocity: Tensor | None = None,
+        object_angular_velocity: Tensor | None = None,
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         swing, signal = self.gait(gait)
         support_reference = self.reference(arm_reference, command[:, HEIGHT : PITCH + 1]) + swing
-        joint_reference = torch.cat([support_reference, arm_reference], dim=1)[:, self.joint_order]
-        parts = {
+        joint_reference = torch.cat([support_reference, arm_reference], dim=1).index_select(1, self.joint_order)
+        parts: dict[str, Tensor | None] = {
             "command": command,
             "projected_gravity": projected_gravity,
             "base_angular_velocity": base_angular_velocity,
@@ -176,26 +177,19 @@ class ControllerGraph(nn.Module):
             "phase": signal,
             "last_action": last_action,
             "support_reference": support_reference,
-            **self._object_parts(object_state),
         }
+        if object_position is not None and object_quaternion is not None:
+            sign = 1.0 - 2.0 * (object_quaternion[:, :1] < 0.0).to(object_quaternion.dtype)
+            parts["object_position"] = object_position
+            parts["object_orientation"] = object_quaternion[:, 1:] * sign
+            parts["object_linear_velocity"] = object_linear_velocity
+            parts["object_angular_velocity"] = object_angular_velocity
         frame = torch.cat([parts[name] for name in self.layout.names], dim=1)[:, None]
         shifted = torch.cat([history[:, 1:], frame], dim=1)
         history_next = torch.where(restart[:, :, None] > 0.5, frame.expand(-1, self.history, -1), shifted)
         action = torch.clamp(self.student(history_next), -self.bound, self.bound)
         target = torch.clamp(support_reference + self.scale * action, self.lower, self.upper)
         return target, action, support_reference, history_next
-
-    def _object_parts(self, object_state: tuple[Tensor, ...]) -> Mapping[str, Tensor]:
-        if not self.observes_object:
-            return {}
-        position, quaternion, linear, angular = object_state
-        sign = 1.0 - 2.0 * (quaternion[:, :1] < 0.0).to(quaternion.dtype)
-        return {
-            "object_position": position,
-            "object_orientation": quaternion[:, 1:] * sign,
-            "object_linear_velocity": linear,
-            "object_angular_velocity": angular,
-        }
 
 
 def _tensor(values: np.ndarray) -> Tensor:

@@ -71,20 +71,24 @@ def play_episodes(
         recipe, robot, rg=rg, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)
     )
     try:
-        return _play(environment, recipe, episodes, policy, interrupted, progress)
+        return play_in(environment, recipe, policy, interrupted, progress)
     finally:
         environment.close()
 
 
-def _play(
+def play_in(
     environment: VectorEnv,
     recipe: Recipe,
-    episodes: Sequence[Episode],
     policy: Acting,
-    interrupted: Callable[[], bool],
-    progress: Callable[[float], None],
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+    look: Callable[[float], None] = lambda seconds: None,
 ) -> list[Played]:
-    count, dt = len(episodes), 1.0 / recipe.task.control_frequency
+    """Play the episodes of an environment that was made for them; see `play_episodes`.
+
+    look: called with the time [s] after the reset and after each step, while the first episode lasts.
+    """
+    count, dt = environment.num_envs, 1.0 / recipe.task.control_frequency
     layout = environment.layout
     observation = environment.reset()
     drawn = {name: np.array(values, np.float64).reshape(count, -1) for name, values in environment.drawn().items()}
@@ -93,6 +97,7 @@ def _play(
     length = np.zeros(count, np.int64)
     endings = {name: np.zeros(count, np.bool_) for name in ("fallen", "dropped")}
     finished = np.zeros(count, np.bool_)
+    look(0.0)
     while not length.all():
         if len(frames) % ASK_EVERY == 0:
             if interrupted():
@@ -101,6 +106,8 @@ def _play(
         action = policy.act(observation[:, layout.observation], observation[:, layout.privileged])
         observation, _, done, infos = environment.step(action)
         frames.append({name: np.array(environment.signals[name], np.float64) for name in RECORDED})
+        if not (length[0] or done[0]):
+            look(len(frames) * dt)
         ends = done & (length == 0)
         length[ends] = len(frames)
         for name, flags in endings.items():

@@ -50,8 +50,9 @@ class Sweep(Section):
     """Heavier masses, tried as long as one trial survives; empty stops at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
-    partner_share: float | None = Field(default=0.0, ge=0, le=1)
-    """Share of the weight that the partner bears; 0 leaves all of it to the robot, empty draws it as in training."""
+    partner_share: float | None = Field(default=0.0, ge=-1, le=1)
+    """Part of the weight (lifting) or of the rolling resistance (pushing; negative resists) that the partner bears; 0 leaves
+    all of it to the robot, empty draws it as in training."""
     fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
@@ -77,8 +78,8 @@ class HeavyCase(Section):
     """Object mass [kg]."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
-    partner_share: float | None = Field(default=0.5, ge=0, le=1)
-    """Share of the weight that the partner bears; empty draws it as in training."""
+    partner_share: float | None = Field(default=0.5, ge=-1, le=1)
+    """As in a sweep; half of the load by default, for these are carried by two."""
     fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()

@@ -15,7 +15,7 @@ class Acceptance(Section):
     """Scene of `simulation.scenes`."""
     mass: float = Field(default=4.0, ge=0)
     """Object mass [kg]; 0 is played in the scene without an object."""
-    partner_share: float = Field(default=0.0, ge=0, le=1)
+    partner_share: float = Field(default=0.0, ge=-1, le=1)
     """Share of the weight that the partner bears; 0 leaves all of it to the robot."""
     sequence: tuple[Segment, ...] = Field(default=(Segment(duration=10.0, ramp=0.0),), min_length=1)
     """Commands of the trial, in order; standing by default."""

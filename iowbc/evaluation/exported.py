@@ -1,0 +1,43 @@
+"""The exported controller as the driver of simulated episodes: it reads the simulated sensors, not the observation."""
+
+from dataclasses import fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.deploy.controller import Controller, Measured
+from iowbc.task.vector_env import VectorEnv
+
+
+class ExportedPolicy:
+    """Drives an in-process vector environment with an exported controller, and holds the two against each other.
+
+    The environment computes its joint targets from the action by itself; `largest_difference` is how far the
+    controller's own targets ever were from them [rad]: arm kinematics, reference generator, gait clock and scaling.
+    """
+
+    def __init__(self, controller: Controller, environment: VectorEnv, *, golden_steps: int = 0) -> None:
+        """`golden_steps`: how many steps of the first environment are kept as golden vectors."""
+        self.controller, self.environment = controller, environment
+        self.golden_steps = golden_steps
+        self.inputs: list[dict[str, NDArray[np.float32]]] = []
+        self.outputs: list[dict[str, NDArray[np.float32]]] = []
+        self.largest_difference = 0.0
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        scenes = self.environment.batch.scenes
+        for scene in sorted(set(scenes[which])):
+            self.controller.reset(which & (scenes == scene), scene=scene)
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        del observation, privileged
+        batch = self.environment.batch
+        sensors = batch.simulation.measured
+        measured = Measured(**{field.name: getattr(sensors, field.name) for field in fields(Measured)})
+        targets = self.controller.step(measured, batch.command, limit_rates=False)
+        expected = batch.targets(targets.action)
+        self.largest_difference = max(self.largest_difference, float(np.abs(expected - targets.position).max()))
+        if len(self.inputs) < self.golden_steps:
+            self.inputs.append({name: value[:1].copy() for name, value in self.controller.inputs.items()})
+            self.outputs.append({name: value[:1].copy() for name, value in self.controller.outputs.items()})
+        return targets.action

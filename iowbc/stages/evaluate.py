@@ -1,0 +1,86 @@
+"""Stage `eval`: mass sweeps and heavy cases with the trained policy, their tables, figures and films."""
+
+import json
+from typing import TYPE_CHECKING
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.contract import Interrupted, Job, Stage
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def acting_stage(recipe: Recipe) -> str:
+    """The stage whose artifact holds the policy to evaluate."""
+    return "distill" if recipe.eval.policy == "student" and "distill" in recipe.stages else "teacher"
+
+
+def _reads(recipe: Recipe) -> tuple[str, ...]:
+    return ("rg-fit", acting_stage(recipe)) if recipe.task.references.use_rg else (acting_stage(recipe),)
+
+
+def run(job: Job) -> None:
+    """Play all trials; leave `trials.parquet`, tables, figures, films and a summary."""
+    import torch
+
+    from iowbc.evaluation.film import film_episode, filmed
+    from iowbc.evaluation.protocol import Protocol
+    from iowbc.evaluation.report import write_report
+    from iowbc.evaluation.rollout import Stopped
+    from iowbc.learning.acting import load_policy
+
+    torch.set_num_threads(max(job.workers, 1))  # policy and workers take turns on the same cores
+    recipe, rg = job.recipe, job.inputs.get("rg-fit")
+    policy = load_policy(job.inputs[acting_stage(recipe)])
+    protocol = Protocol(
+        recipe,
+        job.robot,
+        rg,
+        policy,
+        work=job.work,
+        workers=job.workers,
+        interrupted=job.interrupted,
+        progress=job.report.progress,
+    )
+    try:
+        trials = protocol.run()
+        trials.to_parquet(job.out / "trials.parquet", index=False)
+        summary = write_report(trials, job.out, recipe.eval.success.capacity_rate)
+        (job.out / "videos").mkdir()
+        for name, row in filmed(trials, recipe.eval.video.count):
+            job.report.progress(len(trials), len(trials), f"film {name}")
+            film_episode(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
+    except Stopped as stopped:
+        raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
+    metrics = headline(summary)
+    job.report.metrics(metrics, 0)
+    (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
+    for suite, rows in summary.groupby("suite", sort=False):
+        counts = ", ".join(f"{row['mass']:g} kg {row['survived']}/{row['trials']}" for _, row in rows.iterrows())
+        job.report.say(f"eval: {suite}: survived {counts}")
+
+
+def headline(summary: "pd.DataFrame") -> dict[str, float]:
+    """The figures to show at the end of a run: survival and errors at the lightest and heaviest mass of each suite."""
+    from iowbc.evaluation.metrics import ERRORS
+
+    metrics = {"trials": float(summary["trials"].sum()), "survived": float(summary["survived"].sum())}
+    for _, row in summary.iterrows():
+        rows = summary[summary["suite"] == row["suite"]]
+        if row["suite"] != "heavy" and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
+            continue
+        name = f"{row['case']}/{row['mass']:g}kg".replace(" ", "_")
+        metrics[f"{name}/success"] = float(row["rate"])
+        if row["survived"]:
+            metrics |= {f"{name}/{error}": float(row[error]) for error in ERRORS}
+    return metrics
+
+
+STAGE = Stage(
+    name="eval",
+    version=1,
+    slice=("simulation", "task", "eval"),
+    reads=_reads,
+    run=run,
+    packages=("stages.evaluate", "evaluation", "learning", "task", "sim", "reference.network", "robot"),
+)

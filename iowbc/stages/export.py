@@ -1,0 +1,115 @@
+"""Stage `export`: one ONNX graph with everything baked in, its contract and golden vectors, checked and tried out."""
+
+import json
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+
+
+def _policy_stage(recipe: Recipe) -> str:
+    return "distill" if "distill" in recipe.stages else "teacher"
+
+
+def _reads(recipe: Recipe) -> tuple[str, ...]:
+    return ("rg-fit", _policy_stage(recipe)) if recipe.task.references.use_rg else (_policy_stage(recipe),)
+
+
+def run(job: Job) -> None:
+    """Export, hold the graph against torch, and let the exported controller carry its load in the simulation."""
+    import numpy as np
+    import torch
+
+    from iowbc.deploy import contract, golden
+    from iowbc.deploy.controller import open_session
+    from iowbc.deploy.folder import write_folder
+    from iowbc.deploy.graph import ControllerGraph
+    from iowbc.deploy.onnx_graph import run_torch
+    from iowbc.evaluation.acceptance import try_out
+    from iowbc.evaluation.rollout import Stopped
+    from iowbc.learning.storage import load_student
+    from iowbc.reference.network import ReferenceNetwork
+    from iowbc.robot.description import load_robot
+    from iowbc.task.observation import observation_layout
+
+    torch.set_num_threads(1)  # as on the robot, where the controller has one thread
+    recipe, task, settings = job.recipe, job.recipe.task, job.recipe.export
+    rg, source = job.inputs.get("rg-fit"), job.inputs[_policy_stage(job.recipe)]
+    if not (source / "student.json").is_file():
+        raise StageFailed(
+            f"{source} holds no student: a policy that needs privileged observations cannot run on a robot; "
+            "add the stage `distill` to the recipe, or leave `export` out of its stages"
+        )
+    student, about = load_student(source)
+    robot = load_robot(job.robot)
+    graph = ControllerGraph(
+        student,
+        ReferenceNetwork.load(rg) if rg is not None and task.references.use_rg else None,
+        robot,
+        observation_layout(task.observation.observe_object),
+        task.references.gait,
+        history=int(about["architecture"]["history"]),
+        action_scale=robot.action_scale
+        if task.action.scale is None
+        else np.full(len(robot.support), task.action.scale),
+        action_bound=task.action.bound,
+    )
+    sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
+    write_folder(job.out, graph, recipe, rg, sources)
+    try:
+        policy, played = try_out(recipe, job.robot, rg, job.out, job.interrupted)
+    except Stopped as stopped:
+        raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
+
+    inputs = golden.stacked(policy.inputs)
+    expected = run_torch(graph, inputs)
+    session = open_session(job.out / contract.GRAPH)
+    differences = golden.largest_difference(expected, golden.run_session(session, inputs))
+    golden.write_golden(inputs, expected, job.out / contract.GOLDEN)
+    seconds = golden.inference_seconds(session, inputs, settings.timing_steps)
+
+    survived = sum(trial.finished and not (trial.fallen or trial.dropped) for trial in played)
+    metrics = {
+        "parity": max(differences.values()),
+        "target_difference": policy.largest_difference,
+        "inference_ms": float(1e3 * np.median(seconds)),
+        "inference_p99_ms": float(1e3 * np.quantile(seconds, 0.99)),
+        "graph_kB": (job.out / contract.GRAPH).stat().st_size / 1e3,
+        "acceptance_trials": float(len(played)),
+        "acceptance_survived": float(survived),
+    }
+    job.report.metrics(metrics, 0)
+    summary = {"metrics": metrics, "parity_by_output": differences, "seconds": [trial.seconds for trial in played]}
+    (job.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+    job.report.say(
+        f"export: torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(policy.inputs)} steps; "
+        f"an inference takes {metrics['inference_ms']:.3f} ms"
+    )
+    worst = max(differences, key=lambda name: differences[name])
+    if not differences[worst] <= settings.parity_tolerance:
+        raise StageFailed(
+            f"parity: output {worst} differs by {differences[worst]:.2e} between torch and onnxruntime, "
+            f"export.parity_tolerance is {settings.parity_tolerance:.0e}; try another export.opset or raise the tolerance"
+        )
+    if settings.acceptance is not None:
+        asked = settings.acceptance
+        seconds_asked = sum(segment.duration for segment in asked.sequence)
+        result = (
+            f"the exported controller kept a {asked.mass:g} kg object ({asked.scene}) for {seconds_asked:g} s "
+            f"in {survived} of {len(played)} trials"
+        )
+        job.report.say(f"export: {result}")
+        if survived < asked.minimum:
+            raise StageFailed(
+                f"acceptance: {result}, export.acceptance.minimum is {asked.minimum}; "
+                "train longer (teacher.steps, distill.steps), or lower the mass or the minimum"
+            )
+
+
+STAGE = Stage(
+    name="export",
+    version=1,
+    slice=("name", "seed", "simulation", "task", "export"),
+    reads=_reads,
+    run=run,
+    packages=("stages.export", "deploy", "evaluation", "learning", "task", "sim", "reference.network", "robot"),
+)
