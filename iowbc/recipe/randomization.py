@@ -28,7 +28,7 @@ class Randomization(Section):
     link_inertia_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
     """Further factor on the inertia of each link."""
     joint_friction: Distribution = Distribution(low=0.0, high=0.3, nominal=0.0, probability=0.3)
-    """Dry friction of each joint [N·m]; in a part of the episodes, for its 29 constraint rows slow the physics by 15 %."""
+    """Dry friction of each joint [N·m]; in some episodes only, for its 29 constraint rows slow the physics by 15 %."""
     motor_damping: Distribution = Distribution(low=0.0, high=0.5, nominal=0.0)
     """Viscous friction of each joint beyond the controller's own damping [N·m·s/rad]."""
     kp_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)

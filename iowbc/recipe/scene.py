@@ -15,7 +15,7 @@ class Grasp(Section):
     kind: Literal["compliant", "contact"] = "compliant"
     """A compliant connection that lets go above its slip force, or frictional squeeze between two palms."""
     time_constant: float = Field(default=0.02, gt=0.0)
-    """Time constant of the compliant connection [s]; at least two physics steps, as for every soft constraint of MuJoCo."""
+    """Time constant of the compliant connection [s]; at least two physics steps, as for every soft constraint."""
     squeeze: float = Field(default=130.0, ge=0.0)
     """Force of each palm against the object [N]; times the surface friction it is the force at which a hand slips.
     At friction 1.0 two hands hold 26 kg; the tyre at 150 % weighs 27."""

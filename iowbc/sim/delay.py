@@ -20,6 +20,8 @@ class DelayLine:
         self._whole = np.zeros(n, np.int64)
         self._part = np.zeros((n, 1))
         self._rows = np.arange(n)
+        self._flat = self._values.reshape(-1, width)
+        self._seen, self._earlier = np.zeros((n, width)), np.zeros((n, width))
 
     def set_latency(self, which: Indices, latency: Array) -> None:
         """Latencies of some environments, (k,) [periods]."""
@@ -42,15 +44,21 @@ class DelayLine:
         self._values[self._newest[0]] = value
 
     def read(self) -> Array:
-        """The values as each environment sees them, (n, width): (1 - f) x[k periods ago] + f x[k + 1 periods ago]."""
-        index = (self._newest[0] - self._whole) % self._length
-        value = self._values[index, self._rows]
-        earlier = self._values[index - 1, self._rows]
-        earlier -= value
+        """The values as each environment sees them, (n, width): (1 - f) x[k periods ago] + f x[k + 1 periods ago].
+
+        The array is overwritten by the next call.
+        """
+        n = len(self._rows)
+        place = self._newest[0] - self._whole
+        place %= self._length
+        seen = self._flat.take(place * n + self._rows, axis=0, out=self._seen, mode="clip")
+        place += self._length - 1
+        place %= self._length
+        earlier = self._flat.take(place * n + self._rows, axis=0, out=self._earlier, mode="clip")
+        earlier -= seen
         earlier *= self._part
-        value += earlier
-        seen: Array = value
-        return seen
+        seen += earlier
+        return self._seen
 
     def arrays(self) -> dict[str, Array]:
         """The line's memory, by name."""

@@ -47,6 +47,10 @@ class Layout:
     """Contact points of the feet."""
     palms: Indices | None
     """Geoms of the palms, (2,)."""
+    momentum: Indices
+    """Entries of the inertia matrix that couple the base's translation to the robot's other velocities, (3, speeds)."""
+    momentum_speeds: slice
+    """Those velocities in qvel."""
     object_geom: int | None
     """Geom with which the object touches palms."""
 
@@ -81,6 +85,8 @@ class Layout:
             object_grips=_pair(sites, "object_left_grip", "object_right_grip"),
             foot_geoms=np.array(points),
             palms=_pair(geoms, "left_palm", "right_palm"),
+            momentum=np.array([model.M_rowadr[3 : 6 + count] + axis for axis in range(3)]),
+            momentum_speeds=slice(3, 6 + count),
             object_geom=geoms.get("object"),
         )
 

@@ -22,6 +22,8 @@ NOISE_WIDTH = 2
 """Columns of noise that the partner takes each step."""
 
 
+TINY = 1e-9
+"""Keeps a division by a length from dividing by zero."""
 REMEMBERED = (
     *("stiffness", "damping", "present", "weight", "resistance", "pace", "gust"),
     *("aim", "unsteady", "at", "speed", "arm", "height", "force", "energy"),
@@ -34,7 +36,7 @@ class Partner:
     def __init__(self, recipe: Recipe, scenes: list[Scene], period: float) -> None:
         n = len(scenes)
         self._recipe, self._period = recipe, period
-        self._handle = np.array([0.5 * scene.object.size[0] if scene.object else 0.0 for scene in scenes])
+        self._double_handle = np.array([scene.object.size[0] if scene.object else 0.0 for scene in scenes])
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
         self._line = DelayLine(n, 3, recipe.delay.high / period)
         self._stiffness, self._damping, self._present = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -78,42 +80,62 @@ class Partner:
         out[:] = 0.0
         if not self._any:
             return
+        recipe = self._recipe
         self._line.push(commanded)
-        wanted = self._line.read() * self._pace[:, None]
-        heading = _heading(state.base_quaternion)
-        velocity = heading * _planar(wanted)
-        direction = velocity / np.maximum(np.abs(velocity), 1e-9)
-        velocity += 1j * wanted[:, 2] * (self._at - _planar(state.base_position))
-        lead = self._aim + self._period * velocity - self._at
-        lead *= np.minimum(1.0, self._recipe.leash / np.maximum(np.abs(lead), 1e-9))
-        self._aim = self._at + lead
-        pull = self._stiffness * lead + self._damping * (velocity - self._speed)
-        pull *= np.minimum(1.0, self._recipe.strongest / np.maximum(np.abs(pull), 1e-9))
+        wanted = self._line.read()
+        wanted *= self._pace[:, None]
+        velocity = _planar(wanted)
+        velocity *= _heading(state.base_rotation)
+        push = velocity / (np.abs(velocity) + TINY)
+        push *= self._resistance
+        around = self._at - _planar(state.base_position)
+        around *= 1j
+        around *= wanted[:, 2]
+        velocity += around
+        lead = velocity * self._period
+        lead += self._aim
+        lead -= self._at
+        lead *= np.minimum(1.0, recipe.leash / (np.abs(lead) + TINY))
+        np.add(self._at, lead, out=self._aim)
+        lead *= self._stiffness
+        velocity -= self._speed
+        velocity *= self._damping
+        lead += velocity
+        lead *= np.minimum(1.0, recipe.strongest / (np.abs(lead) + TINY))
         self._unsteady *= self._keep
         self._unsteady += self._gust * _planar(gust)
-        pull += self._unsteady + self._resistance * direction
-        out[:, 0], out[:, 1] = pull.real, pull.imag
-        out[:, 2] = self._weight - self._damping * state.object_linear_velocity[:, 2]
-        out[:, 5] = (self._arm.conj() * pull).imag
+        lead += self._unsteady
+        lead += push
+        out[:, 0], out[:, 1] = lead.real, lead.imag
+        np.multiply(self._damping, state.object_linear_velocity[:, 2], out=out[:, 2])
+        np.subtract(self._weight, out[:, 2], out=out[:, 2])
+        lead *= self._arm.conj()
+        out[:, 5] = lead.imag
         self._force[:] = out[:, :3]
 
     def observe(self, state: SimulationState) -> None:
         """Follows the handle over a period, and adds up the work done on it."""
-        if self._any:
-            before, height = self._at, self._height
-            self._observe(state)
-            moved = self._at - before
-            self._energy += self._force[:, 0] * moved.real + self._force[:, 1] * moved.imag
-            self._energy += self._force[:, 2] * (self._height - height)
+        if not self._any:
+            return
+        before, height = self._at, self._height
+        self._observe(state)
+        before -= self._at
+        height -= self._height
+        moved = -(self._force[:, 0] * before.real + self._force[:, 1] * before.imag + self._force[:, 2] * height)
+        self._energy += moved
         state.partner_force[:] = self._force
         state.partner_energy[:] = self._energy
 
     def _observe(self, state: SimulationState) -> None:
         w, x, y, z = state.object_quaternion.T
-        self._arm = self._handle * ((1.0 - 2.0 * (y * y + z * z)) + 2j * (w * z + x * y))
-        self._at = _planar(state.object_position) + self._arm
-        self._speed = _planar(state.object_linear_velocity) + 1j * state.object_angular_velocity[:, 2] * self._arm
+        arm = np.empty(len(w), complex)
+        arm.real = 0.5 - (y * y + z * z)
+        arm.imag = w * z + x * y
+        arm *= self._double_handle
+        self._at = _planar(state.object_position) + arm
         self._height = state.object_position[:, 2].copy()
+        self._arm = arm
+        self._speed = _planar(state.object_linear_velocity) + 1j * state.object_angular_velocity[:, 2] * arm
 
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""
@@ -132,9 +154,8 @@ def _planar(vectors: Array) -> Planar:
     return out
 
 
-def _heading(quaternion: Array) -> Planar:
-    """Direction of the frames' x axes in the plane, of length one; (n, 4) to (n,)."""
-    w, x, y, z = quaternion.T
-    forward = (1.0 - 2.0 * (y * y + z * z)) + 2j * (w * z + x * y)
-    direction: Planar = forward / np.maximum(np.abs(forward), 1e-9)
-    return direction
+def _heading(rotation: Array) -> Planar:
+    """Direction of the frames' x axes in the plane, of length one; (n, 3, 3) to (n,)."""
+    forward = _planar(rotation[:, :2, 0])
+    forward /= np.abs(forward) + TINY
+    return forward

@@ -23,7 +23,7 @@ UNIT = 2.0**-53
 
 
 def mix(value: Keys) -> Keys:
-    """SplitMix64's output function (Steele, Lea, Flood 2014) of value + golden ratio: a bijection that scatters bits."""
+    """SplitMix64's output function (Steele, Lea, Flood 2014) of value + golden ratio: a scattering bijection."""
     z = value + GOLDEN
     for shift, multiplier in zip(SHIFTS[:2], MULTIPLIERS, strict=True):
         z ^= z >> shift
@@ -85,21 +85,27 @@ def draw(key: Keys, stream: str, distribution: Distribution, width: int = 1) -> 
     return value
 
 
-PAIR = np.uint64(0x0000FFFF0000FFFF)
-HALF = np.uint64(0x00000000FFFFFFFF)
-SIXTEEN, THIRTY_TWO = np.uint64(16), np.uint64(32)
+BYTES = np.uint64(0x00FF00FF00FF00FF)
+PAIRS = np.uint64(0x0000FFFF0000FFFF)
+EIGHT, SIXTEEN = np.uint64(8), np.uint64(16)
 STEP = np.uint64(0xD1342543DE82EF95)
+BYTE_MEAN, BYTE_VARIANCE = 127.5, (256.0**2 - 1.0) / 12.0
 
 
 def noise(key: Keys, step: NDArray[np.uint64], width: int) -> Array:
-    """x ~ nearly N(0, 1) for each environment's step, shape (n, width): the sum of the four 16-bit parts of a word.
+    """x ~ nearly N(0, 1) for each environment's step, shape (n, width), width even: sums of four random bytes.
 
-    Mean 0 and variance 1 to 1e-9, kurtosis 2.7, bounded by 2√3. Several times faster than `normal`, for sensor noise.
+    Mean 0, variance 1, kurtosis 2.7, bounded by 2√3, in steps of 0.007. Several times faster than `normal`.
     """
-    word = mix((key + step * STEP)[:, None] + np.arange(width, dtype=np.uint64) * GOLDEN)
-    pairs = (word & PAIR) + ((word >> SIXTEEN) & PAIR)
-    total = (pairs & HALF) + (pairs >> THIRTY_TWO)
-    deviation = total.astype(np.float64)
-    deviation -= 2.0 * (2**16 - 1)
-    deviation *= np.sqrt(3.0 / (2.0**32 - 1.0))
+    word = mix((key + step * STEP)[:, None] + np.arange(width // 2, dtype=np.uint64) * GOLDEN)
+    sums = word & BYTES
+    word >>= EIGHT
+    word &= BYTES
+    sums += word
+    np.right_shift(sums, SIXTEEN, out=word)
+    sums &= PAIRS
+    word &= PAIRS
+    sums += word
+    deviation = sums.view(np.uint32) - 4.0 * BYTE_MEAN
+    deviation *= (4.0 * BYTE_VARIANCE) ** -0.5
     return deviation

@@ -12,6 +12,7 @@ from iowbc.sim.state import JOINTS, MeasuredState, SimulationState
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 POSITION, VELOCITY = slice(0, JOINTS), slice(JOINTS, 2 * JOINTS)
 ANGULAR, GRAVITY = slice(2 * JOINTS, 2 * JOINTS + 3), slice(2 * JOINTS + 3, 2 * JOINTS + 6)
@@ -21,12 +22,21 @@ SPEED, TURNING = slice(7, 10), slice(10, 13)
 OBJECT_WIDTH = 13
 NOISE_WIDTH = ROBOT.stop + OBJECT_WIDTH
 """Columns of noise that sensing takes each step."""
+NOT_SEEN = np.zeros(OBJECT_WIDTH)
+NOT_SEEN[ORIENTATION.start] = 1.0
+"""What is delivered without an object: identity, at rest at the base."""
+CONJUGATE_PLACES = np.array([0, 1, 2, 3, 1, 0, 3, 2, 2, 3, 0, 1, 3, 2, 1, 0])
+CONJUGATE_SIGNS = np.array([1, 1, 1, 1, -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1.0])
+"""The matrix, row by row, with which the conjugate of a quaternion multiplies another from the left."""
 
 
 class Sensing:
     """Sensors of n environments; two delay lines, one for joints and inertial unit, one for the object's tracking."""
 
-    def __init__(self, recipe: Recipe, n: int, longest_latency: int) -> None:
+    def __init__(self, recipe: Recipe, has_object: Mask, longest_latency: int) -> None:
+        n = len(has_object)
+        self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
+        self._world = np.zeros((n, 3, 3))
         self._robot, self._object = np.zeros((n, ROBOT.stop)), np.zeros((n, OBJECT_WIDTH))
         self._robot_line = DelayLine(n, ROBOT.stop, longest_latency)
         self._object_line = DelayLine(n, OBJECT_WIDTH, longest_latency)
@@ -68,8 +78,11 @@ class Sensing:
         rows = self.rows
         np.multiply(noise, self._deviation, out=rows)
         rows[:, ROBOT] += self._robot_line.read()
-        rows[:, ROBOT.stop :] += self._object_line.read()
         rows[:, POSITION] += self._bias
+        if not self._see_object:
+            self.measured.object_quaternion[:, 0] = 1.0
+            return
+        rows[:, ROBOT.stop :] += self._object_line.read()
         quaternion = self.measured.object_quaternion
         quaternion /= np.sqrt(np.einsum("ni,ni->n", quaternion, quaternion))[:, None]
 
@@ -78,26 +91,25 @@ class Sensing:
         robot[:, POSITION] = state.joint_position
         robot[:, VELOCITY] = state.joint_velocity
         robot[:, ANGULAR] = state.base_angular_velocity
-        rotation = rotations.matrix(state.base_quaternion)
-        robot[:, GRAVITY] = -rotation[:, 2]
-        if not state.has_object.any():
-            thing[:, ORIENTATION.start] = 1.0
+        np.negative(state.base_rotation[:, 2], out=robot[:, GRAVITY])
+        if not self._see_object:
             return
-        world = np.empty((len(robot), 3, 3))
+        world, turning = self._world, state.base_angular_velocity
         np.subtract(state.object_position, state.base_position, out=world[:, 0])
         np.subtract(state.object_linear_velocity, state.base_linear_velocity, out=world[:, 1])
         world[:, 2] = state.object_angular_velocity
-        seen = world @ rotation
-        place, turning = seen[:, 0], state.base_angular_velocity
+        seen = world @ state.base_rotation
+        place = seen[:, 0]
         thing[:, PLACE] = place
-        thing[:, SPEED] = seen[:, 1] - rotations.cross(turning, place)
-        thing[:, TURNING] = seen[:, 2] - turning
-        relative = rotations.multiply(rotations.conjugate(state.base_quaternion), state.object_quaternion)
-        relative *= np.where(relative[:, :1] < 0.0, -1.0, 1.0)
+        np.subtract(seen[:, 1], rotations.cross(turning, place), out=thing[:, SPEED])
+        np.subtract(seen[:, 2], turning, out=thing[:, TURNING])
+        left = state.base_quaternion.take(CONJUGATE_PLACES, axis=1)
+        left *= CONJUGATE_SIGNS
+        relative = (left.reshape(-1, 4, 4) @ state.object_quaternion[:, :, None])[:, :, 0]
+        relative *= np.copysign(1.0, relative[:, :1])
         thing[:, ORIENTATION] = relative
-        if not state.has_object.all():
-            thing[~state.has_object] = 0.0
-            thing[~state.has_object, ORIENTATION.start] = 1.0
+        if not self._all_see:
+            thing[~state.has_object] = NOT_SEEN
 
     def arrays(self) -> dict[str, Array]:
         """The sensors' memory, by name."""

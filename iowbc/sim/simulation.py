@@ -38,7 +38,7 @@ class Simulation:
     ) -> None:
         """`envs`: global indices of the environments, (n,); with `seed` (one, or one each) they key all that is random.
 
-        `scenes`: name of each environment's scene. `fixed`: quantities held at values instead of drawn, (n,); NaN draws.
+        `scenes`: name of each environment's scene. `fixed`: quantities held at a value, not drawn, (n,); NaN draws.
         """
         mujoco.set_mju_user_warning(_ignore)
         self.robot, self.recipe = robot, recipe
@@ -67,7 +67,7 @@ class Simulation:
         self.target = np.tile(robot.default_position, (n, 1))
         self.feed = np.zeros((n, 3))
         self._partner = partner.Partner(recipe.partner, models, self.period)
-        self._sensing = sensing.Sensing(recipe.sensing, n, recipe.randomization.longest_latency)
+        self._sensing = sensing.Sensing(recipe.sensing, self.state.has_object, recipe.randomization.longest_latency)
         self._targets = DelayLine(n, len(robot.joints), recipe.randomization.longest_latency)
         self._impulses = Blows(
             n,
@@ -90,7 +90,8 @@ class Simulation:
             level=True,
         )
         self._robot_mass = np.zeros(n)
-        self._noise_width = sensing.NOISE_WIDTH + partner.NOISE_WIDTH
+        width = sensing.NOISE_WIDTH + partner.NOISE_WIDTH
+        self._noise = np.zeros((n, width + width % 2))
         self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
         self.divergence_count = 0
 
@@ -151,14 +152,13 @@ class Simulation:
         self._pushes.reset(which, key)
         self._partner.reset(which, self.drawn, state)
         self._sensing.reset(which, self.drawn, state)
-        self._sensing.deliver(self._noise()[:, : sensing.NOISE_WIDTH])
+        self._deliver()
 
     def step(self) -> None:
         """One control period."""
         state, drawn = self.state, self.drawn
-        noise = self._noise()
         wrench, diverged = state.external_force, state.diverged
-        self._partner.wrench(self.feed, noise[:, sensing.NOISE_WIDTH :], state, wrench)
+        self._partner.wrench(self.feed, self._noise[:, sensing.NOISE_WIDTH :], state, wrench)
         wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
@@ -177,10 +177,11 @@ class Simulation:
             world.release(state, drawn["slip_force"])
         self._partner.observe(state)
         self._sensing.advance(state)
-        self._sensing.deliver(self._noise()[:, : sensing.NOISE_WIDTH])
+        self._deliver()
 
-    def _noise(self) -> Array:
-        return random.noise(self._episode_key, self.clock.view(np.uint64), self._noise_width)
+    def _deliver(self) -> None:
+        self._noise = random.noise(self._episode_key, self.clock.view(np.uint64), self._noise.shape[1])
+        self._sensing.deliver(self._noise[:, : sensing.NOISE_WIDTH])
 
     def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
         """Worlds that some environments belong to, with their indices in the world and in `which`."""
@@ -219,6 +220,7 @@ class Simulation:
             "pushes": self._pushes.arrays(),
             "fixed": self.fixed,
         }
+        own["noise"] = self._noise
         return own | {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
 
     def snapshot(self) -> dict[str, Array]:

@@ -31,6 +31,8 @@ class SimulationState(_Arrays):
     """Pelvis, (n, 3) [m]."""
     base_quaternion: Array
     """(n, 4)."""
+    base_rotation: Array
+    """Rotation matrix of the base, (n, 3, 3)."""
     base_linear_velocity: Array
     """(n, 3) [m/s]."""
     base_angular_velocity: Array
@@ -103,6 +105,7 @@ class SimulationState(_Arrays):
             "joint_acceleration": (JOINTS,),
             "joint_torque": (JOINTS,),
             "base_quaternion": (4,),
+            "base_rotation": (3, 3),
             "torso_quaternion": (4,),
             "object_quaternion": (4,),
             "foot_position": (2, 3),

@@ -50,7 +50,8 @@ class World:
         self._qpos, self._qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
         self._acceleration, self._torque, self._external = bind("qacc"), bind("actuator_force"), bind("cfrc_ext")
-        self._body_position, self._body_quaternion, self._body_com = bind("xpos"), bind("xquat"), bind("xipos")
+        self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
+        self._inertia = bind("M")
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
@@ -59,11 +60,9 @@ class World:
 
     def _mass_cache(self) -> None:
         mass = self.fields.body_mass
-        robot = mass[:, self.layout.links]
-        self._weights = robot / robot.sum(axis=1, keepdims=True)
+        self.robot_mass = mass[:, self.layout.links].sum(axis=1)
         thing = mass[:, self.layout.object] if self.layout.object is not None else np.zeros(len(mass))
-        self._object_part = (thing / (thing + robot.sum(axis=1)))[:, None]
-        self.robot_mass = robot.sum(axis=1)
+        self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
         """Robot in the posture, lowest sole corner on the ground; object in the hands or crate before them."""
@@ -141,16 +140,17 @@ class World:
         self._check(diverged)
 
     def _check(self, diverged: Mask) -> None:
-        counts = self._warning_counts
-        if not (counts == self._warnings).all():
-            diverged |= (counts != self._warnings).any(axis=1)
-            np.copyto(self._warnings, counts)
-        highest = np.abs(self._qvel).max(axis=1)
-        diverged |= ~(highest < self._physics.fastest)
-        if diverged.any():
-            ids = np.flatnonzero(diverged)
-            self.batch.state[ids] = self._before[ids]
-            self.batch.forward(ids)
+        """Marks what warned, or moves too fast or not in numbers, and puts it back to the start of the period."""
+        counts, fastest = self._warning_counts, self._physics.fastest
+        calm = self._qvel.max() < fastest and self._qvel.min() > -fastest
+        if calm and np.array_equal(counts, self._warnings) and not diverged.any():
+            return
+        diverged |= (counts != self._warnings).any(axis=1)
+        diverged |= ~(np.abs(self._qvel).max(axis=1) < fastest)
+        np.copyto(self._warnings, counts)
+        ids = np.flatnonzero(diverged)
+        self.batch.state[ids] = self._before[ids]
+        self.batch.forward(ids)
 
     def record(self, index: int) -> dict[str, Array]:
         """What a simulation was at the start of the last control period: its state row and its model's own fields."""
@@ -167,17 +167,18 @@ class World:
             return
         limit = slip_force[self.place]
         slipped = load > (limit * limit)[:, None]
-        slipped &= self._connected > 0.5
         if slipped.any():
+            slipped &= self._connected > 0.5
             self._connected[slipped] = 0.0
+            state.grasped[self.place] = self._connected > 0.5
         state.slipped[self.place] = slipped
-        state.grasped[self.place] = self._connected > 0.5
 
     def gather(self, state: SimulationState) -> None:
         """Writes the simulations' rows of the state."""
         place, layout, qpos, qvel = self.place, self.layout, self._qpos, self._qvel
         state.base_position[place] = qpos[:, :3]
         state.base_quaternion[place] = qpos[:, 3:7]
+        state.base_rotation[place] = self._body_rotation[:, layout.base].reshape(-1, 3, 3)
         state.base_linear_velocity[place] = qvel[:, BASE_LINEAR]
         state.base_angular_velocity[place] = qvel[:, BASE_ANGULAR]
         state.joint_position[place] = qpos[:, layout.joints]
@@ -186,52 +187,44 @@ class World:
         state.joint_torque[place] = self._torque
         state.saturation[place] = np.abs(self._torque) >= self._limit
         state.torso_quaternion[place] = self._body_quaternion[:, layout.torso]
-        state.com_position[place] = self._subtree_com[:, layout.base]
-        state.foot_position[place] = self._sites[:, layout.soles]
-        state.foot_velocity[place] = self._sole_velocity()
+        com = self._subtree_com[:, layout.base]
+        state.com_position[place] = com
+        sole = self._sites[:, layout.soles]
+        state.foot_position[place] = sole
+        spatial = self._spatial_velocity[:, layout.feet]
+        state.foot_velocity[place] = spatial[..., 3:] + rotations.cross(spatial[..., :3], sole - com[:, None])
         force = self._external[:, layout.feet, 3:]
         state.foot_force[place] = force
         state.foot_contact[place] = force[:, :, 2] > self._physics.contact_force
-        self._gather_object(state)
-
-    def _sole_velocity(self) -> Array:
-        """Velocities of the sole centres, (n, 2, 3) [m/s], from the feet's spatial velocities at the robot's com."""
-        layout = self.layout
-        spatial = self._spatial_velocity[:, layout.feet]
-        arm = self._sites[:, layout.soles] - self._subtree_com[:, layout.base, None]
-        velocity: Array = spatial[..., 3:] + rotations.cross(spatial[..., :3], arm)
-        return velocity
-
-    def _robot_velocity(self) -> Array:
-        """Velocity of the robot's centre of mass, (n, 3) [m/s]: mean of the links' velocities, weighted by mass."""
-        layout = self.layout
-        spatial = self._spatial_velocity[:, layout.links]
-        arm = self._body_com[:, layout.links] - self._subtree_com[:, layout.base, None]
-        velocity = spatial[..., 3:] + rotations.cross(spatial[..., :3], arm)
-        velocity *= self._weights[..., None]
-        mean: Array = velocity.sum(axis=1)
-        return mean
-
-    def _gather_object(self, state: SimulationState) -> None:
-        place, layout = self.place, self.layout
         velocity = self._robot_velocity()
         if layout.object is None:
             state.system_velocity[place] = velocity
-            return
-        spatial = self._spatial_velocity[:, layout.object]
-        turning, centre = spatial[:, :3], self._subtree_com[:, layout.object]
-        position = self._body_position[:, layout.object]
-        state.object_position[place] = position
-        state.object_quaternion[place] = self._body_quaternion[:, layout.object]
-        state.object_linear_velocity[place] = spatial[:, 3:] + rotations.cross(turning, position - centre)
-        state.object_angular_velocity[place] = turning
-        state.system_velocity[place] = velocity + self._object_part * (spatial[:, 3:] - velocity)
-        state.grip_force[place] = self._external[:, layout.hands, 3:]
+        else:
+            self._gather_object(state, layout.object, velocity)
 
-    def object_com(self) -> Array:
-        """Centre of mass of the object, (n, 3) [m]."""
-        com: Array = self._body_com[:, self.layout.object]
-        return com
+    def _robot_velocity(self) -> Array:
+        """Velocity of the robot's centre of mass, (n, 3) [m/s]: its momentum, the first rows of M qvel, over its mass."""
+        momentum = self._inertia.take(self.layout.momentum, axis=1)
+        momentum *= self._qvel[:, None, self.layout.momentum_speeds]
+        velocity = momentum.sum(axis=2)
+        velocity /= self.robot_mass[:, None]
+        velocity += self._qvel[:, BASE_LINEAR]
+        moved: Array = velocity
+        return moved
+
+    def _gather_object(self, state: SimulationState, thing: int, robot_velocity: Array) -> None:
+        place, spatial, position = self.place, self._spatial_velocity[:, thing], self._body_position[:, thing]
+        turning, velocity = spatial[:, :3], spatial[:, 3:]
+        state.object_position[place] = position
+        state.object_quaternion[place] = self._body_quaternion[:, thing]
+        arm = position - self._subtree_com[:, thing]
+        state.object_linear_velocity[place] = velocity + rotations.cross(turning, arm)
+        state.object_angular_velocity[place] = turning
+        common = velocity - robot_velocity
+        common *= self._object_part
+        common += robot_velocity
+        state.system_velocity[place] = common
+        state.grip_force[place] = self._external[:, self.layout.hands, 3:]
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""
