@@ -99,11 +99,12 @@ class Controller:
         self.inputs: dict[str, NDArray[np.float32]] = {}
         self.outputs: dict[str, NDArray[np.float32]] = {}
         actions = len(contract.support)
-        self._command = np.zeros((robots, len(COMMAND)))
-        self._grasp = np.zeros((robots, 2, 3))
-        self._arms = np.zeros((robots, len(contract.interaction)))
-        self._support = np.zeros((robots, actions))
-        self._phase, self._stepping = np.zeros(robots), np.zeros(robots, np.bool_)
+        self._command: Array = np.zeros((robots, len(COMMAND)))
+        self._grasp: Array = np.zeros((robots, 2, 3))
+        self._arms: Array = np.zeros((robots, len(contract.interaction)))
+        self._support: Array = np.zeros((robots, actions))
+        self._phase: Array = np.zeros(robots)
+        self._stepping = np.zeros(robots, np.bool_)
         self._starts = np.ones(robots, np.bool_)
         self.reset()
 
@@ -137,7 +138,9 @@ class Controller:
         command: C, (n, 11) or (11,); clamped to the feasible map, and approached at the rates of training unless
         `limit_rates` is off. Raises ValueError for a shape that does not fit or a value that is not finite.
         """
-        wanted = np.broadcast_to(np.asarray(command, np.float64), self._command.shape)
+        wanted = np.asarray(command, np.float64)
+        if wanted.ndim == 1:
+            wanted = np.tile(wanted, (self.robots, 1))
         self._check("command", wanted, self._command.shape)
         starts = self._starts.copy()
         limited = approach(self._command, wanted, self._largest_step) if limit_rates else wanted
@@ -183,7 +186,7 @@ class Controller:
         return np.asarray(outputs["support_reference"], np.float64)
 
     @staticmethod
-    def _as_inputs(**values: Array) -> dict[str, NDArray[np.float32]]:
+    def _as_inputs(**values: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
         return {name: np.array(value, np.float32) for name, value in values.items()}
 
     def _run(self, inputs: dict[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:

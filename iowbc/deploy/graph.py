@@ -34,6 +34,14 @@ class Port:
 class ReferenceModule(nn.Module):
     """φ_RG in torch: (n, inputs) to the support reference (n, 15) [rad], or a constant posture without a generator."""
 
+    default: Tensor
+    input_mean: Tensor
+    input_std: Tensor
+    output_mean: Tensor
+    output_std: Tensor
+    lower: Tensor
+    upper: Tensor
+
     def __init__(self, network: ReferenceNetwork | None, default: np.ndarray, arms: int) -> None:
         super().__init__()
         self.constant = network is None
@@ -61,6 +69,8 @@ class ReferenceModule(nn.Module):
 class GaitModule(nn.Module):
     """The swing that the gait prior adds to θ_S_ref, and the phase signal of the observation."""
 
+    amplitude: Tensor
+
     def __init__(self, gait: GaitPrior, support_joints: int) -> None:
         super().__init__()
         self.stance = gait.stance
@@ -83,6 +93,11 @@ class GaitModule(nn.Module):
 
 class ControllerGraph(nn.Module):
     """One control step of the support branch; inputs and outputs as `input_ports` and `output_ports` list them."""
+
+    scale: Tensor
+    lower: Tensor
+    upper: Tensor
+    joint_order: Tensor
 
     def __init__(
         self,
@@ -168,7 +183,7 @@ class ControllerGraph(nn.Module):
         swing, signal = self.gait(gait)
         support_reference = self.reference(arm_reference, command[:, HEIGHT : PITCH + 1]) + swing
         joint_reference = torch.cat([support_reference, arm_reference], dim=1).index_select(1, self.joint_order)
-        parts: dict[str, Tensor | None] = {
+        parts = {
             "command": command,
             "projected_gravity": projected_gravity,
             "base_angular_velocity": base_angular_velocity,
@@ -178,12 +193,15 @@ class ControllerGraph(nn.Module):
             "last_action": last_action,
             "support_reference": support_reference,
         }
-        if object_position is not None and object_quaternion is not None:
+        if object_quaternion is not None:
             sign = 1.0 - 2.0 * (object_quaternion[:, :1] < 0.0).to(object_quaternion.dtype)
-            parts["object_position"] = object_position
             parts["object_orientation"] = object_quaternion[:, 1:] * sign
-            parts["object_linear_velocity"] = object_linear_velocity
-            parts["object_angular_velocity"] = object_angular_velocity
+        seen = {
+            "object_position": object_position,
+            "object_linear_velocity": object_linear_velocity,
+            "object_angular_velocity": object_angular_velocity,
+        }
+        parts |= {name: value for name, value in seen.items() if value is not None}
         frame = torch.cat([parts[name] for name in self.layout.names], dim=1)[:, None]
         shifted = torch.cat([history[:, 1:], frame], dim=1)
         history_next = torch.where(restart[:, :, None] > 0.5, frame.expand(-1, self.history, -1), shifted)

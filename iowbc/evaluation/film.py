@@ -1,19 +1,16 @@
-"""Films of trials: plays a trial again from its row of the table and draws it."""
+"""Films of episodes: plays one again from its seed and draws it."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.protocol import replayed
-from iowbc.evaluation.rollout import Acting, Played, play_in
 from iowbc.evaluation.video import Film, with_text
 from iowbc.recipe.evaluation import Video
-from iowbc.recipe.recipe import Recipe
 from iowbc.sim.rendering import SceneRenderer
-from iowbc.task.episode import Episode
 from iowbc.task.vector_env import VectorEnv
 
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
@@ -22,25 +19,49 @@ NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
     """The trials to film, with names: the first trial of up to `count` masses, spread over all of them."""
     first = trials[trials["trial"] == 0]
-    places = np.unique(np.linspace(0, len(first) - 1, min(count, len(first))).round().astype(int)) if count else []
-    rows = [first.iloc[place] for place in places]
+    places = np.linspace(0, len(first) - 1, min(count, len(first))).round().astype(int)
+    rows = [first.iloc[place] for place in dict.fromkeys(places.tolist())]
     return [(f"{row['case']}_{row['mass']:g}kg".translate(NOT_WORD), row) for row in rows]
 
 
-def film_episode(
-    recipe: Recipe,
-    robot: Path,
-    rg: Path | None,
-    policy: Acting,
-    row: "pd.Series[Any]",
-    path: Path,
-    interrupted: Callable[[], bool] = lambda: False,
-) -> Played:
-    """Play the trial of a row again and film it. Raises Stopped when interrupted."""
-    episode = replayed(row)
-    environment = VectorEnv(recipe, robot, rg=rg, num_envs=1, workers=0, seed=0, episodes=(episode,))
-    try:
-        with FilmedEnvironment(environment, path, recipe.eval.video, title(row, recipe)) as film:
-            return play_in(environment, recipe, policy, interrupted, look=film.look)
-    finally:
-        environment.close()
+def command_line(signals: dict[str, Any], seconds: float) -> str:
+    """Time and command of the first environment, in words."""
+    forward, left, turn = signals["commanded_velocity"][0]
+    height, pitch = float(signals["height_command"][0, 0]), float(signals["torso_pitch_command"][0, 0])
+    walk = f"v {forward:+.2f} {left:+.2f} m/s, turn {turn:+.2f} rad/s"
+    return f"{seconds:4.1f} s   {walk}   H {height:.2f} m, pitch {pitch:+.2f} rad"
+
+
+class EpisodeFilm:
+    """A film of the first environment of an in-process vector environment; give `look` to `play_in`."""
+
+    def __init__(self, environment: VectorEnv, path: Path, video: Video, title: Sequence[str]) -> None:
+        """`title`: lines of text in every frame, above the line with time and command."""
+        self.environment, self.video, self.title = environment, video, list(title)
+        self._film = Film(path, video.fps)
+        self._renderer: SceneRenderer | None = None
+        self.frames = 0
+
+    def look(self, seconds: float) -> None:
+        """Draw a frame if one is due at this time [s]."""
+        if seconds > self.video.duration or seconds * self.video.fps < self.frames - 1e-6:
+            return
+        simulation = self.environment.batch.simulation
+        if self._renderer is None:
+            self._renderer = SceneRenderer(simulation, 0, width=self.video.width, height=self.video.height)
+        frame = self._renderer.frame()
+        if self.video.traces:
+            frame = with_text(frame, [*self.title, command_line(self.environment.signals, seconds)])
+        self._film.add(frame)
+        self.frames += 1
+
+    def __enter__(self) -> Self:
+        self._film.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+        self._film.__exit__(kind, error, trace)

@@ -104,14 +104,15 @@ def play_in(
                 raise Stopped(f"stopped after {len(frames) * dt:.1f} s of {count} episodes")
             progress(len(frames) * dt)
         action = policy.act(observation[:, layout.observation], observation[:, layout.privileged])
-        observation, _, done, infos = environment.step(action)
+        observation, _, ended, infos = environment.step(action)
+        done = np.asarray(ended, np.bool_)
         frames.append({name: np.array(environment.signals[name], np.float64) for name in RECORDED})
         if not (length[0] or done[0]):
             look(len(frames) * dt)
         ends = done & (length == 0)
         length[ends] = len(frames)
         for name, flags in endings.items():
-            flags[ends] = np.asarray(environment.signals[name]).reshape(count, -1).any(axis=1)[ends]
+            flags[ends] = environment.signals[name].reshape(count)[ends] > 0
         for index in np.flatnonzero(ends):
             finished[index] = bool(infos[index].get("TimeLimit.truncated", False))
         if done.any():

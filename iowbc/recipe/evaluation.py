@@ -51,7 +51,7 @@ class Sweep(Section):
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
     partner_share: float | None = Field(default=0.0, ge=-1, le=1)
-    """Part of the weight (lifting) or of the rolling resistance (pushing; negative resists) that the partner bears; 0 leaves
+    """Part of the weight, or in pushing of the rolling resistance, that the partner bears; negative resists, 0 leaves
     all of it to the robot, empty draws it as in training."""
     fixed: dict[str, float] = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""

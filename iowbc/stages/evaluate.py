@@ -23,7 +23,8 @@ def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, tables, figures, films and a summary."""
     import torch
 
-    from iowbc.evaluation.film import film_episode, filmed
+    from iowbc.evaluation.film import filmed
+    from iowbc.evaluation.playing import film_row
     from iowbc.evaluation.protocol import Protocol
     from iowbc.evaluation.report import write_report
     from iowbc.evaluation.rollout import Stopped
@@ -49,7 +50,7 @@ def run(job: Job) -> None:
         (job.out / "videos").mkdir()
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
-            film_episode(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
+            film_row(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
     except Stopped as stopped:
         raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
     metrics = headline(summary)

@@ -88,7 +88,7 @@ def run(job: Job) -> None:
     if not differences[worst] <= settings.parity_tolerance:
         raise StageFailed(
             f"parity: output {worst} differs by {differences[worst]:.2e} between torch and onnxruntime, "
-            f"export.parity_tolerance is {settings.parity_tolerance:.0e}; try another export.opset or raise the tolerance"
+            f"export.parity_tolerance is {settings.parity_tolerance:.0e}; try another export.opset or raise it"
         )
     if settings.acceptance is not None:
         asked = settings.acceptance
