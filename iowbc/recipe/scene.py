@@ -16,11 +16,19 @@ class Grasp(Section):
     """A compliant connection that lets go above its slip force, or frictional squeeze between two palms."""
     time_constant: float = Field(default=0.02, gt=0.0)
     """Time constant of the compliant connection [s]; at least two physics steps, as for every soft constraint."""
-    squeeze: float = Field(default=130.0, ge=0.0)
-    """Force of each palm against the object [N]; times the surface friction it is the force at which a hand slips.
-    At friction 1.0 two hands hold 26 kg; the tyre at 150 % weighs 27."""
+    strength: float = Field(default=140.0, ge=0.0)
+    """Normal force of each hand that a compliant grasp stands for [N]; times the surface friction it is the force at
+    which the hand slips. At friction 1.0 two hands hold 28 kg; the tyre at 150 % weighs 27."""
+    squeeze: float = Field(default=60.0, ge=0.0)
+    """Force with which the arms press each palm against an object held by contact [N]: motor torques beside the joint
+    control. At friction 1.0 it holds 12 kg and takes 15 of the 25 N·m at the shoulders."""
     height: float = 0.08
     """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
+    settling: int = Field(default=5, ge=0)
+    """Iterations in each physics step that take the creep out of a grasp by contact (MuJoCo's noslip solver)."""
+    handover: float = Field(default=0.5, ge=0.0)
+    """Time over which an object's weight comes to bear at the start of an episode [s]; dropped into the hands at once,
+    it would pull with twice its weight."""
     swing_damping: float = Field(default=3.0, ge=0.0)
     """Rate at which friction in the palms damps the object's rotation [1/s]; a box on two points swings at 1.5 Hz."""
 

@@ -137,6 +137,10 @@ class Partner:
         self._arm = arm
         self._speed = _planar(state.object_linear_velocity) + 1j * state.object_angular_velocity[:, 2] * arm
 
+    def handle(self, env: int) -> Array:
+        """The far handle of one environment's object, (3,) [m]."""
+        return np.array([self._at[env].real, self._at[env].imag, self._height[env]])
+
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""
         own = {name: getattr(self, f"_{name}") for name in REMEMBERED}

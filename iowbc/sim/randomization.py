@@ -35,12 +35,12 @@ class Draws:
         self._with_object = np.array([scene.object is not None for scene in scenes])
         self._nominal_mass = np.array([scene.object.mass if scene.object else 0.0 for scene in scenes])
         self._smallest_mass = np.array([scene.object.smallest_mass if scene.object else 0.0 for scene in scenes])
-        self._squeeze = np.array([scene.grasp.squeeze for scene in scenes])
+        self._strength = np.array([scene.grasp.strength for scene in scenes])
         self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES}
         for name, (distribution, width) in self._entries.items():
             self.values[name] = np.full((n, width) if width > 1 else n, distribution.nominal)
         self.values["object_mass"] = self._nominal_mass.copy()
-        self.values["slip_force"] = self._squeeze.copy()
+        self.values["slip_force"] = self._strength.copy()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ class Draws:
             self._hold("object_mass", which, fixed["object_mass"])
         mass = np.maximum(self.values["object_mass"][which], self._smallest_mass[which])
         self.values["object_mass"][which] = np.where(self._with_object[which], mass, 0.0)
-        self.values["slip_force"][which] = self.values["surface_friction"][which] * self._squeeze[which]
+        self.values["slip_force"][which] = self.values["surface_friction"][which] * self._strength[which]
 
     def _draw_partner_share(self, which: Indices, key: NDArray[np.uint64]) -> None:
         partner = self.recipe.partner

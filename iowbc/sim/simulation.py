@@ -14,7 +14,7 @@ from iowbc.sim import partner, random, sensing
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.disturbance import Blows
 from iowbc.sim.divergence import Divergence
-from iowbc.sim.randomization import Draws
+from iowbc.sim.randomization import GRAVITY, Draws
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.world import World
 
@@ -90,6 +90,9 @@ class Simulation:
             level=True,
         )
         self._robot_mass = np.zeros(n)
+        self._handover = (
+            np.array([model.grasp.handover if model.kind == "lift" else 0.0 for model in models]) / self.period
+        )
         width = sensing.NOISE_WIDTH + partner.NOISE_WIDTH
         self._noise = np.zeros((n, width + width % 2))
         self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
@@ -160,6 +163,7 @@ class Simulation:
         wrench, diverged = state.external_force, state.diverged
         self._partner.wrench(self.feed, self._noise[:, sensing.NOISE_WIDTH :], state, wrench)
         wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
+        self._hand_over(wrench)
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
         self._targets.push(self.target)
@@ -178,6 +182,12 @@ class Simulation:
         self._partner.observe(state)
         self._sensing.advance(state)
         self._deliver()
+
+    def _hand_over(self, wrench: Array) -> None:
+        """Bears the weight of held objects at first, less and less: f = m g (1 - t / T)."""
+        if np.any(self.clock < self._handover):
+            left = np.maximum(1.0 - self.clock / np.maximum(self._handover, 1.0), 0.0)
+            wrench[:, 2] += GRAVITY * left * self.drawn["object_mass"]
 
     def _deliver(self) -> None:
         self._noise = random.noise(self._episode_key, self.clock.view(np.uint64), self._noise.shape[1])
@@ -243,13 +253,31 @@ class Simulation:
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
         self._partner.restored()
 
-    def render_model(self, env: int) -> tuple[Any, Any]:
-        """MuJoCo model and data of one environment, for pictures and queries; copies."""
+    def _world_of(self, env: int) -> tuple[World, int]:
         for world in self._worlds:
             found = np.flatnonzero(world.rows == env)
             if len(found):
-                return world.batch.get_model(int(found[0])), world.batch.get_data(int(found[0]))
+                return world, int(found[0])
         raise IndexError(f"no environment {env}; there are {self.n}")
+
+    def physics_model(self, env: int) -> tuple[Any, Any]:
+        """Copies of the MuJoCo model and data with which an environment is stepped."""
+        world, index = self._world_of(env)
+        return world.batch.get_model(index), world.batch.get_data(index)
+
+    def render_model(self, env: int) -> tuple[Any, Any]:
+        """A model of the environment for the eye, one for all of its scene, and data in its present state."""
+        world, index = self._world_of(env)
+        return world.look(index)
+
+    def partner_handle(self, env: int) -> Array:
+        """Where the partner takes hold, (3,) [m]."""
+        return self._partner.handle(env)
+
+    def hand_position(self, env: int) -> Array:
+        """Positions of the grips, (2, 3) [m]."""
+        world, index = self._world_of(env)
+        return world.hand_position(index)
 
 
 def _ignore(message: str) -> None:

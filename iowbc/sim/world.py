@@ -13,8 +13,10 @@ from iowbc.recipe.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.sim.layout import BASE_ANGULAR, BASE_LINEAR, Layout
+from iowbc.sim.look import look_model
 from iowbc.sim.model import compile_scene
 from iowbc.sim.randomization import ModelFields
+from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.state import SimulationState
 
 Array = NDArray[Any]
@@ -45,6 +47,7 @@ class World:
         self.batch = Batch(self.model, len(rows), nthread=1, persistent=True)
         self.fields = ModelFields(self.batch, self.layout, scene)
         self._physics = physics
+        self._look: Any = None
         self._limit = AT_LIMIT * robot.effort
         bind = self.batch.bind
         self._qpos, self._qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
@@ -53,6 +56,8 @@ class World:
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
+        by_contact = scene.kind == "lift" and scene.grasp.kind == "contact"
+        self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
         self._before = self.batch.state.copy()
@@ -130,6 +135,8 @@ class World:
         centre of mass. Marks in `diverged` the simulations that left the numbers and puts them back."""
         np.copyto(self._before, self.batch.state)
         np.copyto(self.control, target)
+        if self._squeeze is not None:
+            self._squeeze.add(self.control)
         self._applied[:, self.layout.base, :3] = push
         if self.layout.object is not None:
             self._applied[:, self.layout.object] = wrench
@@ -225,6 +232,24 @@ class World:
         common += robot_velocity
         state.system_velocity[place] = common
         state.grip_force[place] = self._external[:, self.layout.hands, 3:]
+
+    def hand_position(self, index: int) -> Array:
+        """Positions of the grips of one simulation, (2, 3) [m]."""
+        hands: Array = self._sites[index, self.layout.grips].copy()
+        return hands
+
+    def look(self, index: int) -> tuple[Any, Any]:
+        """The model for the eye, made at the first call, and new data in the state of a simulation."""
+        if self._look is None:
+            self._look = look_model(self._robot, self._physics, self.scene)
+        data = mujoco.MjData(self._look)
+        data.qpos[:], data.qvel[:] = self._qpos[index], self._qvel[index]
+        if self.layout.object_geom is not None:
+            self._look.geom("object").size[:] = self.fields.half_size(np.array([index]))[0]
+        mujoco.mj_kinematics(self._look, data)
+        mujoco.mj_comPos(self._look, data)
+        mujoco.mj_camlight(self._look, data)
+        return self._look, data
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""
