@@ -29,6 +29,7 @@ def run(job: Job) -> None:
     from iowbc.evaluation.report import write_report
     from iowbc.evaluation.rollout import Stopped
     from iowbc.learning.acting import load_policy
+    from iowbc.sim.headless import NoRenderer
 
     torch.set_num_threads(max(job.workers, 1))  # policy and workers take turns on the same cores
     recipe, rg = job.recipe, job.inputs.get("rg-fit")
@@ -51,6 +52,8 @@ def run(job: Job) -> None:
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
             film_row(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
+    except NoRenderer as reason:
+        job.report.say(f"eval: no films: {reason}")
     except Stopped as stopped:
         raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
     metrics = headline(summary)
