@@ -19,14 +19,15 @@ class Physics(Section):
     pd: Literal["implicit", "explicit"] = "implicit"
     """Whether the damping of the joint controllers is integrated implicitly (stable at any gain) or, as on the robot,
     computed explicitly from the measured state at the physics rate."""
-    cone: Literal["pyramidal", "elliptic"] = "elliptic"
-    """Friction cone: a pyramid, or the cone itself, which is as fast here and slides alike in all directions."""
+    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
+    """Friction cone: the pyramid inscribed in it, or the cone itself, with which a step costs half as much again."""
     solver: Literal["newton", "cg"] = "newton"
     """Constraint solver."""
-    iterations: int = Field(default=5, ge=1)
-    """Solver iterations at most."""
-    line_search_iterations: int = Field(default=8, ge=1)
-    """Line search iterations at most."""
+    iterations: int = Field(default=10, ge=1)
+    """Solver iterations at most. Ten give the trajectories of a hundred to machine precision at no cost, for the solver
+    stops when it has converged; at five, joints are off by 0.1 rad after half a second."""
+    line_search_iterations: int = Field(default=20, ge=1)
+    """Line search iterations at most; as above."""
     body_contact: bool = False
     """Whether links touch one another, the ground and the object; without, only soles and palms touch anything."""
     contact_force: float = Field(default=1.0, gt=0.0)

@@ -126,7 +126,7 @@ def _dress(spec: Any) -> None:
     )
     material = spec.add_material(name="tiles", texrepeat=(1.0, 1.0), texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
-    spec.geom("ground").material = "tiles"
+    spec.geom("ground").material, spec.geom("ground").castshadow = "tiles", False
     spec.body(spec.worldbody.first_body().name).add_light(
         pos=(1.0, 2.0, 4.0),
         dir=(-0.22, -0.44, -0.87),

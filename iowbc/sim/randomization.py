@@ -186,6 +186,12 @@ class ModelFields:
         """The fields of one simulation."""
         return {name: field[index] for name, field in self._fields.items()}
 
+    def set(self, index: int, values: Mapping[str, Array]) -> None:
+        """Inverse of `of`."""
+        for name, field in self._fields.items():
+            field[index] = values[name]
+        self._batch.set_const()
+
     def restore(self, values: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`."""
         for name, field in self._fields.items():

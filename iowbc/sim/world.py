@@ -210,7 +210,7 @@ class World:
             self._gather_object(state, layout.object, velocity)
 
     def _robot_velocity(self) -> Array:
-        """Velocity of the robot's centre of mass, (n, 3) [m/s]: its momentum, the first rows of M qvel, over its mass."""
+        """Velocity of the robot's centre of mass, (n, 3) [m/s]: its momentum, in the first rows of M qvel, by its mass."""
         momentum = self._inertia.take(self.layout.momentum, axis=1)
         momentum *= self._qvel[:, None, self.layout.momentum_speeds]
         velocity = momentum.sum(axis=2)
@@ -232,6 +232,13 @@ class World:
         common += robot_velocity
         state.system_velocity[place] = common
         state.grip_force[place] = self._external[:, self.layout.hands, 3:]
+
+    def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
+        """Puts a simulation into what `record` kept."""
+        self.fields.set(index, recorded)
+        self.batch.state[index] = recorded["state"]
+        self.batch.forward(np.array([index]), stage=VELOCITY)
+        self._mass_cache()
 
     def hand_position(self, index: int) -> Array:
         """Positions of the grips of one simulation, (2, 3) [m]."""
