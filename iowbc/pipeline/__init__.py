@@ -1,1 +1,1 @@
-"""The staged runner: plan, keys, artifact store, locks, tracking and console."""
+"""Runs a recipe: keys, store, plan, locks, tracking, console. Nothing heavy is imported before a stage needs it."""

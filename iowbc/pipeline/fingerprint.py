@@ -1,0 +1,81 @@
+"""Digests: of data, of files, of folders, and of code without its comments and docstrings."""
+
+import ast
+import functools
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+CHUNK = 1 << 20
+
+
+def canonical_json(data: Any) -> str:
+    """The one way to write this data as JSON: sorted keys, no spaces, no NaN."""
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+
+
+def data_digest(data: Any) -> str:
+    """SHA-256 of the data's canonical JSON, hexadecimal."""
+    return hashlib.sha256(canonical_json(data).encode()).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's bytes, hexadecimal."""
+    digest = hashlib.sha256()
+    with path.open("rb", buffering=0) as file:
+        while chunk := file.read(CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def content_digest(files: Mapping[str, str]) -> str:
+    """Digest of a set of files from their relative names and digests."""
+    return data_digest(sorted(files.items()))
+
+
+def folder_files(folder: Path) -> list[Path]:
+    """Regular files below a folder in a fixed order, without hidden ones and caches."""
+    found = (path for path in folder.rglob("*") if path.is_file())
+    return sorted(
+        path
+        for path in found
+        if not any(part.startswith(".") or part == "__pycache__" for part in path.relative_to(folder).parts)
+    )
+
+
+def folder_digest(folder: Path) -> str:
+    """Digest of all files of a folder, names and contents."""
+    return content_digest({path.relative_to(folder).as_posix(): file_digest(path) for path in folder_files(folder)})
+
+
+def code_digests(package: Path, names: Sequence[str], modules: Iterable[Path] = ()) -> dict[str, str]:
+    """Digest of the syntax trees of each named subpackage, and of single modules by their path in the package."""
+    digests = {name: _sources_digest(package, tuple(sorted((package / name).rglob("*.py")))) for name in sorted(names)}
+    for module in sorted(modules):
+        digests[module.relative_to(package).as_posix()] = _sources_digest(package, (module,))
+    return digests
+
+
+def _sources_digest(package: Path, sources: Sequence[Path]) -> str:
+    return content_digest({path.relative_to(package).as_posix(): _syntax_digest(path) for path in sources})
+
+
+@functools.cache
+def _syntax_digest(source: Path) -> str:
+    tree = ast.parse(source.read_bytes(), filename=str(source))
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [statement for statement in body if not _is_text(statement)]  # type: ignore[attr-defined]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _is_text(statement: ast.AST) -> bool:
+    """A bare string: a docstring, or the sentence under a field."""
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )

@@ -1,0 +1,78 @@
+"""Where everything that runs leave behind is kept."""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+RUNS_VARIABLE = "IOWBC_RUNS"
+"""Environment variable that names another folder than `./runs`."""
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The folder `runs/` and its parts."""
+
+    root: Path
+
+    @property
+    def store(self) -> Path:
+        """Finished artifacts, `<stage>/<key>/`."""
+        return self.root / "store"
+
+    @property
+    def work(self) -> Path:
+        """Scratch and checkpoints of stages that are not finished, `<key>/`."""
+        return self.root / "work"
+
+    @property
+    def damaged(self) -> Path:
+        """Artifacts that were found damaged and set aside."""
+        return self.root / "damaged"
+
+    @property
+    def locks(self) -> Path:
+        """One lock file a key, with its holder's name in it."""
+        return self.root / "locks"
+
+    @property
+    def recipes(self) -> Path:
+        """What each recipe used last, `<name>.json`."""
+        return self.root / "recipes"
+
+    @property
+    def tracking(self) -> Path:
+        """Journals of what MLflow is told, until it has taken it."""
+        return self.root / "tracking"
+
+    @property
+    def database(self) -> Path:
+        """MLflow's embedded database."""
+        return self.root / "mlflow.db"
+
+    @property
+    def tracked_files(self) -> Path:
+        """Files of MLflow's runs, where it uses the embedded database."""
+        return self.root / "mlartifacts"
+
+
+def default_runs() -> Runs:
+    """`./runs`, or the folder that the environment names."""
+    return Runs(Path(os.environ.get(RUNS_VARIABLE) or "runs"))
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Replace a file so that a reader, or a crash, meets the old text or the new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.write_text(text, encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file, or None where it is missing or not JSON."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,226 @@
+"""What would run, and why."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import iowbc
+from iowbc.pipeline.fingerprint import code_digests, data_digest, folder_digest
+from iowbc.pipeline.history import previous
+from iowbc.pipeline.store import Artifact, Damaged, Store
+from iowbc.recipe.loading import LoadedRecipe
+from iowbc.recipe.problems import Problem, RecipeError, shown
+from iowbc.stages.contract import Stage
+
+OnCodeChange = Literal["report", "rerun"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a run was asked for."""
+
+    until: str | None = None
+    force: frozenset[str] = frozenset()
+    on_code_change: OnCodeChange = "report"
+    workers: int | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stage of a recipe: its key, whether its artifact can be used, and why not."""
+
+    stage: Stage
+    key: str | None
+    """None while an input's content is not known."""
+    ingredients: Mapping[str, Any] | None
+    artifact: Artifact | None
+    """The stored artifact with this key, whole; also where it would be replaced."""
+    reasons: tuple[str, ...]
+    """Why it would run; empty where it is cached."""
+    notes: tuple[str, ...] = ()
+    damage: str = ""
+    """What is wrong with the stored artifact with this key."""
+    expected: float | None = None
+    """Time that it took last [s]."""
+    code: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def cached(self) -> bool:
+        """True where the stored artifact is used as it is."""
+        return not self.reasons
+
+
+class Planner:
+    """Decides, stage by stage, for one recipe on one store."""
+
+    def __init__(
+        self, loaded: LoadedRecipe, registry: Mapping[str, Stage], store: Store, robot: Path, options: Options
+    ) -> None:
+        self.loaded = loaded
+        self.store = store
+        self.options = options
+        self.robot_digest = folder_digest(robot)
+        self.resolved = loaded.recipe.model_dump(mode="json")
+        self.stages = self._selected(registry)
+
+    def _selected(self, registry: Mapping[str, Stage]) -> list[Stage]:
+        """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
+        names = [str(name) for name in self.loaded.recipe.stages]
+        for option, asked in (("--until", [self.options.until or names[-1]]), ("--force", sorted(self.options.force))):
+            for name in asked:
+                if name not in names:
+                    text = f"'{name}' is not a stage of this recipe; valid: {', '.join(names)}"
+                    raise RecipeError([Problem(f"{option} {name}", text)])
+        stages = [registry[name] for name in names]
+        for stage in stages:
+            for wanted in stage.reads(self.loaded.recipe):
+                if wanted not in names:
+                    text = f"key 'stages': {stage.name} reads {wanted}, which is not among them: {', '.join(names)}"
+                    raise RecipeError([Problem(self.loaded.place("stages"), text)])
+        last = names.index(self.options.until) if self.options.until else len(names) - 1
+        return stages[: last + 1]
+
+    def plan(self) -> list[Step]:
+        """A step for each stage, as things stand; nothing is changed."""
+        steps: dict[str, Step] = {}
+        for stage in self.stages:
+            inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
+            steps[stage.name] = self.decide(stage, inputs)
+        return list(steps.values())
+
+    def reads(self, stage: Stage) -> tuple[str, ...]:
+        """Names of the stages whose artifacts a stage reads."""
+        return stage.reads(self.loaded.recipe)
+
+    def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> Step:
+        """What is to be done for a stage whose inputs are these; None is an input that would be made anew."""
+        code = stage_code(stage)
+        former = previous(self.store, self.loaded.recipe.name, stage.name)
+        expected = former.manifest.seconds if former else None
+        unknown = [name for name, artifact in inputs.items() if artifact is None]
+        ingredients = {
+            "stage": stage.name,
+            "version": stage.version,
+            "recipe": {path: _value(self.resolved, path, stage) for path in stage.slice},
+            "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
+            "robot": self.robot_digest,
+        }
+        if unknown:
+            reasons = [*self._differences(ingredients, former), *(f"{name} is made anew" for name in unknown)]
+            return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
+        key = data_digest(ingredients)
+        damage = ""
+        artifact: Artifact | None = None
+        try:
+            artifact = self.store.find(stage.name, key)
+            if artifact is not None:
+                self.store.verify(artifact)
+        except Damaged as error:
+            damage = str(error)
+            artifact = None
+        found: list[str] = []
+        notes: list[str] = []
+        if stage.name in self.options.force:
+            found.append("forced by --force")
+        if damage:
+            found.append(f"damaged: {damage}")
+        elif artifact is None:
+            found.extend(self._differences(ingredients, former) or ["nothing stored yet"])
+        else:
+            expected = artifact.manifest.seconds
+            changed = changed_code(artifact.manifest.code, code)
+            if changed:
+                text = f"code changed since it was made: {', '.join(changed)}"
+                (found if self.options.on_code_change == "rerun" else notes).append(text)
+        return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code)
+
+    def _differences(self, ingredients: Mapping[str, Any], former: Artifact | None) -> list[str]:
+        """How a key's ingredients differ from those of an earlier artifact, each with its place in the recipe."""
+        if former is None:
+            return ["nothing stored yet"]
+        old = former.ingredients
+        texts = []
+        before, after = flattened(old.get("recipe", {})), flattened(ingredients["recipe"])
+        for path in sorted(before.keys() | after.keys()):
+            if before.get(path, MISSING) != after.get(path, MISSING):
+                change = f"{_shown(before, path)} -> {_shown(after, path)}"
+                texts.append(f"{path} ({self.loaded.place(path)}): {change}")
+        if old.get("version") != ingredients["version"]:
+            texts.append(f"stage version {old.get('version')} -> {ingredients['version']}")
+        if old.get("robot") != ingredients["robot"]:
+            texts.append("the robot's files changed")
+        old_inputs = old.get("inputs", {})
+        for name, digest in ingredients["inputs"].items():
+            if digest is not None and old_inputs.get(name) != digest:
+                texts.append(f"{name} changed" if name in old_inputs else f"{name} is read now")
+        texts.extend(f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
+        if texts and former.manifest.recipe != self.loaded.recipe.name:
+            texts.append(f"compared with that of recipe {former.manifest.recipe}")
+        return texts
+
+
+MISSING = object()
+
+
+def flattened(value: Any, path: str = "") -> dict[str, Any]:
+    """Leaves of nested mappings, and of lists of mappings, by dotted path; a list of plain values is one leaf."""
+    if isinstance(value, Mapping) and value:
+        entries = value.items()
+    elif isinstance(value, (list, tuple)) and any(isinstance(item, Mapping) for item in value):
+        entries = {str(index): item for index, item in enumerate(value)}.items()
+    else:
+        return {path: value}
+    return {
+        leaf: found
+        for name, entry in entries
+        for leaf, found in flattened(entry, f"{path}.{name}" if path else str(name)).items()
+    }
+
+
+def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
+    """Names of the subpackages and modules whose code differs."""
+    return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
+
+
+def stage_code(stage: Stage) -> dict[str, str]:
+    """Digests of a stage's own module and of the subpackages that it declares."""
+    package = Path(iowbc.__file__).parent
+    module = Path(stage.run.__code__.co_filename)
+    return code_digests(package, stage.packages, [module] if module.is_relative_to(package) else [])
+
+
+def describe(steps: Sequence[Step]) -> list[tuple[str, str, str, str]]:
+    """Rows of a plan: stage, `cached` or `run`, why (lines), expected time."""
+    rows = []
+    for step in steps:
+        state = "cached" if step.cached else "run"
+        why = "\n".join((*step.reasons, *step.notes)) or (step.key or "")[:12]
+        rows.append((step.stage.name, state, why, "" if step.cached else duration(step.expected)))
+    return rows
+
+
+def duration(seconds: float | None) -> str:
+    """A time span for people: `42 s`, `12 min`, `3 h 05 min`; empty for None."""
+    if seconds is None:
+        return ""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def _shown(values: Mapping[str, Any], path: str) -> str:
+    return shown(values[path]) if path in values else "(absent)"
+
+
+def _value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:
+    """The part of a recipe at a dotted path."""
+    if path.split(".")[0] in ("execution", "name", "description", "stages"):
+        raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
+    value: Any = resolved
+    for part in path.split("."):
+        if not isinstance(value, Mapping) or part not in value:
+            raise ValueError(f"stage {stage.name}: its slice names '{path}', which no recipe has")
+        value = value[part]
+    return value

@@ -1,0 +1,37 @@
+"""A stage's report: to the console, to the tracking journal, and to its record on disk."""
+
+from collections.abc import Mapping
+
+from iowbc.pipeline.display import Display, StageView
+from iowbc.pipeline.tracking import Tracker
+from iowbc.pipeline.workspace import Workspace
+
+
+class StageReport:
+    """Implements the `Report` that a stage receives."""
+
+    def __init__(self, view: StageView, display: Display, tracker: Tracker | None, workspace: Workspace) -> None:
+        self._view = view
+        self._display = display
+        self._tracker = tracker
+        self._workspace = workspace
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        """Record named values at a step; the first name is the stage's main metric."""
+        if not values:
+            return
+        name = self._view.metric if self._view.metric in values else next(iter(values))
+        self._view.measured(name, float(values[name]))
+        if self._tracker is not None:
+            self._tracker.metrics(self._view.name, values, step)
+        self._display.moved(self._view)
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        """Say how far the stage is, in units of its own."""
+        self._view.progress(done, total, note)
+        self._workspace.progress(done, total, note)
+        self._display.moved(self._view)
+
+    def say(self, text: str) -> None:
+        """Print one line."""
+        self._display.say(f"{self._view.name}: {text}")

@@ -1,0 +1,185 @@
+"""Runs the stages of a recipe: reuses what is stored, makes the rest, loses nothing."""
+
+import traceback
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import yaml
+
+from iowbc.pipeline.display import Display, StageView
+from iowbc.pipeline.history import remember
+from iowbc.pipeline.locking import key_lock
+from iowbc.pipeline.machine import available_cores, host, versions
+from iowbc.pipeline.planning import Options, Planner, Step, changed_code
+from iowbc.pipeline.reporting import StageReport
+from iowbc.pipeline.store import Artifact, Damaged, Store
+from iowbc.pipeline.tracking import Tracker
+from iowbc.pipeline.workspace import Workspace
+from iowbc.recipe.loading import LoadedRecipe
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+
+
+class PipelineFailed(Exception):
+    """A stage failed; the text names it, the reason, and what to do next."""
+
+
+class Runner:
+    """One run of a recipe."""
+
+    def __init__(
+        self,
+        loaded: LoadedRecipe,
+        registry: Mapping[str, Stage],
+        store: Store,
+        robot: Path,
+        options: Options,
+        display: Display,
+        tracker: Tracker | None,
+        interrupted: Callable[[], bool],
+    ) -> None:
+        self.loaded = loaded
+        self.store = store
+        self.robot = robot
+        self.options = options
+        self.display = display
+        self.tracker = tracker
+        self.interrupted = interrupted
+        self.planner = Planner(loaded, registry, store, robot, options)
+        self.artifacts: dict[str, Artifact] = {}
+        self.made: list[str] = []
+        """Stages that were not cached."""
+
+    def run(self) -> dict[str, Artifact]:
+        """Bring every stage's artifact about. Raises `PipelineFailed` or `Interrupted`."""
+        views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
+        self.display.begin(list(views.values()))
+        try:
+            for stage in self.planner.stages:
+                if self.interrupted():
+                    raise Interrupted
+                self.artifacts[stage.name] = self._artifact(stage, views[stage.name])
+                remember(self.store.runs, self.loaded, stage.name, self.artifacts[stage.name].manifest.key)
+        finally:
+            self.display.end()
+        return self.artifacts
+
+    def _artifact(self, stage: Stage, view: StageView) -> Artifact:
+        """The stage's artifact: the stored one where it can be used, else a new one."""
+        step = self._decide(stage)
+        if step.cached and step.artifact is not None:
+            return self._reused(step, step.artifact, view)
+        assert step.key is not None
+
+        def waits(holder: object) -> None:
+            view.state, view.note = "waits", f"{holder} is making it"
+            self.display.changed(view)
+            self.display.say(f"{stage.name}: busy, held by {holder}; waiting for it, to use what it makes")
+
+        with key_lock(self.store.runs, step.key, waits, self.interrupted) as held:
+            if not held:
+                raise Interrupted
+            workspace = Workspace(self.store.runs, stage.name, step.key)
+            self._finish_publishing(stage, step.key, workspace)
+            step = self._decide(stage)
+            if step.cached and step.artifact is not None:
+                workspace.remove()
+                return self._reused(step, step.artifact, view)
+            if step.damage:
+                assert step.key is not None
+                aside = self.store.set_aside(stage.name, step.key)
+                self.display.say(f"{stage.name}: its artifact is damaged ({step.damage}); set aside in {aside}")
+            return self._made(step, workspace, view)
+
+    def _decide(self, stage: Stage) -> Step:
+        return self.planner.decide(stage, {name: self.artifacts[name] for name in self.planner.reads(stage)})
+
+    def _reused(self, step: Step, artifact: Artifact, view: StageView) -> Artifact:
+        view.state, view.note = "cached", "; ".join(step.notes)
+        self.display.changed(view)
+        if self.tracker is not None:
+            self.tracker.finished(step.stage.name, artifact, cached=True)
+        return artifact
+
+    def _finish_publishing(self, stage: Stage, key: str, workspace: Workspace) -> None:
+        """Publish output that was sealed when its process died on the threshold."""
+        try:
+            if workspace.out.is_dir() and self.store.sealed(workspace.out, stage.name, key):
+                self.store.publish(workspace.out, stage.name, key)
+                workspace.remove()
+        except Damaged:
+            return
+
+    def _made(self, step: Step, workspace: Workspace, view: StageView) -> Artifact:
+        """Run the stage and publish what it leaves."""
+        stage, key = step.stage, step.key
+        assert key is not None
+        earlier = workspace.record.get("code", step.code)
+        resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code))
+        view.state, view.note = "runs", "; ".join(step.reasons)
+        self.display.changed(view)
+        if resumed:
+            changed = changed_code(earlier, step.code)
+            warning = f"; code changed since it began: {', '.join(changed)}" if changed else ""
+            self.display.say(f"{stage.name}: goes on from attempt {workspace.attempts - 1}{warning}")
+        if self.tracker is not None:
+            self.tracker.stage(stage.name, key, resumed)
+        workers = self.options.workers or self.loaded.recipe.execution.workers or available_cores()
+        job = Job(
+            recipe=self.loaded.recipe,
+            key=key,
+            robot=self.robot,
+            inputs={name: self.artifacts[name].folder for name in self.planner.reads(stage)},
+            out=workspace.out,
+            work=workspace.scratch,
+            workers=workers,
+            report=StageReport(view, self.display, self.tracker, workspace),
+            interrupted=self.interrupted,
+        )
+        self._attempt(job, stage, workspace, view)
+        details = {
+            "stage": stage.name,
+            "version": stage.version,
+            "key": key,
+            "recipe": self.loaded.recipe.name,
+            "seconds": workspace.seconds,
+            "attempts": workspace.attempts,
+            "workers": workers,
+            "host": host(),
+            "code": dict(step.code),
+            "versions": versions(),
+        }
+        resolved = yaml.safe_dump(self.loaded.recipe.model_dump(mode="json"), sort_keys=False)
+        self.store.seal(workspace.out, details, step.ingredients or {}, resolved)
+        artifact = self.store.publish(workspace.out, stage.name, key)
+        workspace.remove()
+        self.made.append(stage.name)
+        view.state, view.note, view.seconds = "done", "", artifact.manifest.seconds
+        self.display.changed(view)
+        if self.tracker is not None:
+            self.tracker.finished(stage.name, artifact, cached=False)
+        return artifact
+
+    def _attempt(self, job: Job, stage: Stage, workspace: Workspace, view: StageView) -> None:
+        """Run the stage; whatever ends it early is recorded before it goes on."""
+        try:
+            stage.run(job)
+        except (Interrupted, KeyboardInterrupt) as error:
+            self._ended(workspace, view, "stopped", "KILLED", "")
+            raise Interrupted from error
+        except StageFailed as error:
+            self._ended(workspace, view, "failed", "FAILED", str(error))
+            raise PipelineFailed(f"{stage.name} failed: {error}") from error
+        except Exception as error:
+            details = workspace.root / "error.txt"
+            details.write_text(traceback.format_exc(), encoding="utf-8")
+            summary = f"{type(error).__name__}: {error}"
+            self._ended(workspace, view, "failed", "FAILED", summary)
+            self.display.say(traceback.format_exc())
+            raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is in {details}") from error
+
+    def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
+        workspace.write()
+        view.state, view.note, view.seconds = state, message.partition("\n")[0], workspace.seconds
+        self.display.changed(view)
+        if self.tracker is not None:
+            self.tracker.end(view.name, status, message)

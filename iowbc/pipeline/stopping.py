@@ -1,0 +1,39 @@
+"""SIGINT, SIGTERM and SIGHUP: the first asks the stage to stop after a checkpoint, the second aborts."""
+
+import os
+import signal
+from types import FrameType, TracebackType
+from typing import Self
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class StopRequest:
+    """While entered, turns the signals into a flag."""
+
+    def __init__(self) -> None:
+        self.signal: signal.Signals | None = None
+        self._former: dict[signal.Signals, object] = {}
+
+    def __call__(self) -> bool:
+        """True once a stop was asked for."""
+        return self.signal is not None
+
+    def __enter__(self) -> Self:
+        for number in SIGNALS:
+            self._former[number] = signal.signal(number, self._received)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, former in self._former.items():
+            signal.signal(number, former)  # type: ignore[arg-type]
+
+    def _received(self, number: int, frame: FrameType | None) -> None:
+        """Writes past Python's buffers, which the interrupted code may be using."""
+        if self.signal is not None:
+            os.write(2, b"\naborting\n")
+            raise KeyboardInterrupt
+        self.signal = signal.Signals(number)
+        os.write(2, f"\n{self.signal.name}: stopping at the next checkpoint; once more to abort at once\n".encode())

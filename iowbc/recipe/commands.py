@@ -1,0 +1,70 @@
+"""The 11-D skill-level command and how it is drawn in training."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import Section
+
+Range = tuple[float, float]
+Vector = tuple[float, float, float]
+
+
+class CommandRates(Section):
+    """How fast a command may change; a new value is approached at this rate."""
+
+    velocity: float = Field(default=1.0, gt=0.0)
+    """Change of the planar velocity, per axis [m/s²]."""
+    yaw_rate: float = Field(default=1.0, gt=0.0)
+    """Change of the yaw rate [rad/s²]."""
+    height: float = Field(default=0.15, gt=0.0)
+    """Change of the height [m/s]."""
+    pitch: float = Field(default=0.5, gt=0.0)
+    """Change of the torso pitch [rad/s]."""
+    offset: float = Field(default=0.15, gt=0.0)
+    """Change of a wrist offset, per axis [m/s]."""
+
+
+class Commands(Section):
+    """Ranges, resampling and limits of the command [v_x, v_y, ω_yaw, H, α_pitch, Δp_left, Δp_right]."""
+
+    velocity_x: Range = (-0.3, 0.5)
+    """Forward velocity, heading frame [m/s]."""
+    velocity_y: Range = (-0.2, 0.2)
+    """Velocity to the left, heading frame [m/s]."""
+    yaw_rate: Range = (-0.4, 0.4)
+    """Yaw rate [rad/s]."""
+    height: Range = (0.5, 0.78)
+    """Height H [m]; 0.78 m is where the legs are nearly straight. The feasible map clamps further."""
+    pitch: Range = (-0.25, 0.75)
+    """Torso pitch against gravity, positive leaning forward [rad]. The feasible map clamps further."""
+    common_offset: Vector = (0.05, 0.05, 0.08)
+    """Largest offset that both wrists share, per axis of the heading frame [m]."""
+    single_offset: Vector = (0.02, 0.0, 0.02)
+    """Largest further offset of one wrist alone, per axis [m]; small, because a held object does not stretch."""
+    nominal_height: float = Field(default=0.72, gt=0.0)
+    """Height of the nominal posture [m], taken when a command leaves the posture alone."""
+    nominal_pitch: float = 0.0
+    """Torso pitch of the nominal posture [rad]."""
+    standing_share: float = Field(default=0.3, ge=0.0, le=1.0)
+    """Part of the commands that ask for standing still."""
+    straight_share: float = Field(default=0.4, ge=0.0, le=1.0)
+    """Part of the walking commands without yaw rate and lateral velocity."""
+    nominal_share: float = Field(default=0.4, ge=0.0, le=1.0)
+    """Part of the commands with nominal height, pitch and wrists."""
+    smallest_speed: float = Field(default=0.15, ge=0.0)
+    """Planar speed [m/s] under which a drawn walking velocity is lengthened, so that walking is worth a step."""
+    resampling: Range = (3.0, 7.0)
+    """Time from one command to the next [s]."""
+    rates: CommandRates = CommandRates()
+    """Rate limits."""
+
+    @model_validator(mode="after")
+    def _ranges_ascend(self) -> Self:
+        for name in ("velocity_x", "velocity_y", "yaw_rate", "height", "pitch", "resampling"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"{name}: the lower end {low} is above the upper end {high}")
+        if self.resampling[0] <= 0.0:
+            raise ValueError(f"resampling: {self.resampling[0]} s is no positive time")
+        return self

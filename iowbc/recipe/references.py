@@ -1,0 +1,70 @@
+"""How a command becomes joint references."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import Section
+
+Vector = tuple[float, float, float]
+
+
+class Grasps(Section):
+    """Base grasp of each scene: position of the left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
+
+    free: Vector = (0.26, 0.16, 0.10)
+    """Forearms before the body, as when carrying."""
+    lift: Vector = (0.26, 0.16, 0.10)
+    """Beside the object. Near the body, where shoulder and waist pitch hold most."""
+    tyre: Vector = (0.30, 0.27, 0.06)
+    """At the widest place of the tyre."""
+    push: Vector = (0.30, 0.16, 0.20)
+    """Behind the crate's upper edge."""
+
+
+class ArmReference(Section):
+    """Differential inverse kinematics of the arms (eq. 3)."""
+
+    settling: int = Field(default=12, ge=1)
+    """Iterations at the start of an episode, so that it begins in the grasp."""
+
+
+class GaitPrior(Section):
+    """The gait clock, and the swing that it adds to the support reference while a velocity is commanded."""
+
+    enabled: bool = True
+    """Off gives the paper's literal reference; the clock still runs."""
+    frequency: float = Field(default=1.35, gt=0.0)
+    """Strides a second [Hz]."""
+    stance: float = Field(default=0.58, gt=0.5, lt=1.0)
+    """Part of the stride in which a foot is on the ground; above one half both are, twice a stride."""
+    hip_pitch: float = -0.35
+    """Amplitude of the swing at the hip pitch joint [rad]; negative lifts the knee forward."""
+    knee: float = 0.7
+    """Amplitude of the swing at the knee [rad]."""
+    ankle_pitch: float = -0.35
+    """Amplitude of the swing at the ankle pitch joint [rad]; keeps the sole level."""
+    moving_speed: float = Field(default=0.05, gt=0.0)
+    """Commanded planar speed above which the clock runs [m/s]."""
+    moving_yaw_rate: float = Field(default=0.1, gt=0.0)
+    """Commanded yaw rate above which the clock runs [rad/s]."""
+
+
+class References(Section):
+    """The reference generation layer of the control loop."""
+
+    use_rg: bool = True
+    """Whether θ_S_ref comes from the reference generator; otherwise it is the constant default posture ("w/o RG")."""
+    grasps: Grasps = Grasps()
+    """Base grasp of each scene."""
+    arms: ArmReference = ArmReference()
+    """Arm references."""
+    gait: GaitPrior = GaitPrior()
+    """Gait clock and swing."""
+
+    @model_validator(mode="after")
+    def _wrists_apart(self) -> Self:
+        for name, grasp in self.grasps:
+            if grasp[1] <= 0.0:
+                raise ValueError(f"grasps.{name}: the left wrist's y is {grasp[1]}, it must be positive (left of the body)")
+        return self

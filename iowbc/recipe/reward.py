@@ -1,0 +1,95 @@
+"""Terms and weights of the reward."""
+
+from pydantic import Field
+
+from iowbc.recipe.section import Section
+
+
+class Kernel(Section):
+    """A term weight·exp(−error²/width²), between 0 and its weight."""
+
+    weight: float
+    """Reward a second at zero error."""
+    width: float = Field(gt=0.0)
+    """Error at which the term has fallen to 37 %, in the unit of the error."""
+
+
+class Synchronisation(Section):
+    """r_sync: coupled motion consistency (eq. 7)."""
+
+    support_reference: Kernel = Kernel(weight=1.0, width=0.8)
+    """‖θ_S − θ_S_ref‖ [rad]."""
+    system_velocity: Kernel = Kernel(weight=2.0, width=0.25)
+    """‖v_sys − v_coll‖ in the plane, filtered [m/s]; narrow, because at 0.5 m/s standing still would score well."""
+    yaw_rate: Kernel = Kernel(weight=1.0, width=0.4)
+    """Filtered yaw rate against its command [rad/s]."""
+    height: Kernel = Kernel(weight=1.0, width=0.08)
+    """Height against its command [m]."""
+    torso_pitch: Kernel = Kernel(weight=1.0, width=0.2)
+    """Torso pitch against its command [rad]."""
+    torso_roll: float = -2.0
+    """Weight of the torso's roll squared [rad²]."""
+    filter_time: float = Field(default=0.2, gt=0.0)
+    """Time constant of the filter on velocity and yaw rate [s]; the raw yaw rate is mostly exploration noise."""
+
+
+class ObjectEquilibrium(Section):
+    """r_obj: deviation of the held object's pose and its vertical motion."""
+
+    position: float = -4.0
+    """Weight of the squared distance of the object from its place in the grasp, heading frame [m²]."""
+    orientation: float = -0.5
+    """Weight of the squared tilt of the object against gravity, sin² of the angle."""
+    vertical_velocity: float = -0.5
+    """Weight of the squared vertical velocity beyond the one that a commanded change of height asks for [m²/s²]."""
+
+
+class Smoothness(Section):
+    """r_smooth: what wears a robot out."""
+
+    joint_acceleration: float = -2.5e-7
+    """Weight of Σ q̈² over all joints [rad²/s⁴]."""
+    action_rate: float = -0.02
+    """Weight of ‖a_t − a_{t−1}‖²."""
+    power: float = -1.0e-3
+    """Weight of Σ |τ·q̇| [W]."""
+    base_rates: float = -0.05
+    """Weight of the squared roll and pitch rates of the base [rad²/s²]."""
+    vertical_velocity: float = -0.5
+    """Weight of the squared vertical velocity of the base [m²/s²]."""
+    saturation: float = -0.5
+    """Weight of the fraction of support joints at their torque limit."""
+
+
+class GaitConstraint(Section):
+    """r_gait: swing height and contact timing by the phase."""
+
+    contact_timing: float = 1.0
+    """Weight of the fraction of feet whose contact is what the phase asks for, counted from −1 to 1."""
+    swing_height: Kernel = Kernel(weight=1.0, width=0.04)
+    """Height of the swinging foot against the profile [m]; only while a foot swings."""
+    swing_clearance: float = Field(default=0.08, gt=0.0)
+    """Height of the sole at mid-swing [m]."""
+    foot_slip: float = -0.25
+    """Weight of Σ |horizontal velocity|² of feet in contact [m²/s²]."""
+    foot_distance: float = -5.0
+    """Weight of the squared lack of lateral distance between the feet [m²]."""
+    smallest_foot_distance: float = Field(default=0.16, ge=0.0)
+    """Lateral distance of the feet below which `foot_distance` counts [m]."""
+
+
+class Reward(Section):
+    """Sum of the terms, per second; a step's reward is the sum times the control period, plus the cost of a fall."""
+
+    sync: Synchronisation = Synchronisation()
+    """Coupled motion consistency."""
+    object: ObjectEquilibrium = ObjectEquilibrium()
+    """Object equilibrium."""
+    smooth: Smoothness = Smoothness()
+    """Whole-body smoothness."""
+    gait: GaitConstraint = GaitConstraint()
+    """Gait constraint."""
+    alive: float = 0.5
+    """Reward a second for not having fallen."""
+    termination: float = -3.0
+    """Added once when an episode ends in a fall or a drop, not scaled by the control period."""

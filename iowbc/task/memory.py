@@ -1,0 +1,85 @@
+"""What the task remembers of each environment between two control steps."""
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.task.command import COMMAND
+
+Array = NDArray[Any]
+
+
+@dataclass
+class Memory:
+    """State of the task, one row an environment; together with the simulation's it is the whole state."""
+
+    episode: Array
+    """Episodes begun, (n,) int64; a counter of the random numbers."""
+    draws: Array
+    """Command goals drawn in the episode, (n,) int64; a counter of the random numbers."""
+    steps: Array
+    """Control steps made in the episode, (n,) int64."""
+    limit: Array
+    """Time limit of the episode in control steps, (n,) int64."""
+    goal_until: Array
+    """Control step at which the next goal is drawn, (n,) int64."""
+    level: Array
+    """Curriculum level, (n,)."""
+    command: Array
+    """C in force, rate-limited and clamped, (n, 11)."""
+    goal: Array
+    """Where the command goes, (n, 11)."""
+    phase: Array
+    """Gait phase, (n,)."""
+    stepping: Array
+    """Whether the gait clock runs, (n,) bool."""
+    arms: Array
+    """θ_I_ref, (n, 14) [rad]."""
+    posture: Array
+    """θ_S_ref without the gait prior, (n, 15) [rad]."""
+    support: Array
+    """θ_S_ref with the gait prior, (n, 15) [rad]."""
+    action: Array
+    """a_{t−1}, (n, 15)."""
+    filtered_velocity: Array
+    """Low-passed v_sys in the plane, heading frame, (n, 2) [m/s]."""
+    filtered_yaw_rate: Array
+    """(n,) [rad/s]."""
+    heading_reference: Array
+    """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
+    object_place: Array
+    """Object from the middle of the wrist targets at the start of the episode, heading frame, (n, 3) [m]."""
+    tracking: Array
+    """Sum of the tracking score over the episode, (n,)."""
+    total: Array
+    """Sum of the rewards of the episode, (n,)."""
+
+    @classmethod
+    def blank(cls, n: int, arms: int, support: int) -> Self:
+        """All zero."""
+        counters = {name: np.zeros(n, np.int64) for name in ("episode", "draws", "steps", "limit", "goal_until")}
+        scalars = ("level", "phase", "filtered_yaw_rate", "heading_reference", "tracking", "total")
+        return cls(
+            **counters,
+            **{name: np.zeros(n) for name in scalars},
+            stepping=np.zeros(n, np.bool_),
+            command=np.zeros((n, len(COMMAND))),
+            goal=np.zeros((n, len(COMMAND))),
+            arms=np.zeros((n, arms)),
+            posture=np.zeros((n, support)),
+            support=np.zeros((n, support)),
+            action=np.zeros((n, support)),
+            filtered_velocity=np.zeros((n, 2)),
+            object_place=np.zeros((n, 3)),
+        )
+
+    def arrays(self) -> dict[str, Array]:
+        """Copies of all arrays, by name."""
+        return {field.name: getattr(self, field.name).copy() for field in fields(self)}
+
+    def restore(self, arrays: dict[str, Array]) -> None:
+        """Inverse of `arrays`; shapes must agree."""
+        for field in fields(self):
+            getattr(self, field.name)[...] = arrays[field.name]

@@ -1,0 +1,96 @@
+"""The reference layer: a command becomes arm references by differential IK (eq. 2, 3) and support references by the RG.
+
+Pure arrays over n environments; the deployed controller uses it too.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.references import References
+from iowbc.reference.feasibility import FeasibleMap
+from iowbc.reference.network import ReferenceNetwork
+from iowbc.robot.arms import ArmKinematics
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import VECTOR_SIGN
+from iowbc.task.command import HEIGHT, OFFSET, PITCH
+
+Array = NDArray[np.floating[Any]]
+
+WAIST = slice(12, 15)
+"""Waist yaw, roll and pitch among the support joints."""
+
+
+def both_wrists(left: tuple[float, float, float]) -> Array:
+    """Base grasp of both wrists, (2, 3), from the left one's position in the heading frame [m]."""
+    return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
+
+
+class ReferenceLayer:
+    """Arm and support references of n environments. Holds constants only; the references themselves are the caller's."""
+
+    def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
+        """`rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture, and commands are
+        not clamped to a feasible map."""
+        self.arms = ArmKinematics(robot)
+        self.network = ReferenceNetwork.load(rg) if rg is not None and references.use_rg else None
+        self.feasible = FeasibleMap.load(rg / "feasible.npz") if rg is not None else None
+        self.settling = references.arms.settling
+        self.default_arms = robot.default_position[robot.interaction]
+        self.default_support = robot.default_position[robot.support]
+        self.default_height = robot.default_height
+
+    def clamp(self, command: Array) -> Array:
+        """The command with height and torso pitch brought into the feasible map; (n, 11)."""
+        if self.feasible is None:
+            return command
+        clamped = command.copy()
+        clamped[:, HEIGHT], clamped[:, PITCH] = self.feasible.clamp(command[:, HEIGHT], command[:, PITCH])
+        return clamped
+
+    def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
+        """References at the start of an episode, settled in the commanded posture.
+
+        command (n, 11), grasp (n, 2, 3) base grasp wrist positions in the heading frame [m]; arms (n, 14), support (n, 15).
+        """
+        arms = np.tile(self.default_arms, (len(command), 1))
+        support = self.support(arms, command)
+        for _ in range(self.settling):
+            arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt=1.0)
+            support = self.support(arms, command)
+        return arms, support
+
+    def advance(self, arms: Array, support: Array, command: Array, grasp: Array, dt: float) -> tuple[Array, Array]:
+        """References one control period later; shapes as in `start`."""
+        arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt)
+        return arms, self.support(arms, command)
+
+    def support(self, arms: Array, command: Array) -> Array:
+        """θ_S_ref = φ_RG(θ_I_ref, σ_base), (n, 15) [rad], without the gait prior."""
+        if self.network is None:
+            return np.tile(self.default_support, (len(command), 1))
+        base = np.zeros((len(command), len(self.network.inputs) - arms.shape[1]))
+        base[:, :2] = command[:, HEIGHT : PITCH + 1]
+        return self.network(arms, base)
+
+    def pelvis_pitch(self, support: Array, command: Array) -> Array:
+        """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""
+        pitch: Array = command[:, PITCH] - support[:, WAIST.stop - 1]
+        return pitch
+
+    def pelvis_height(self, command: Array) -> Array:
+        """Pelvis height of the reference posture, (n,) [m]."""
+        if self.network is None:
+            return np.full(len(command), self.default_height)
+        return command[:, HEIGHT].copy()
+
+    def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:
+        """x_wrist = x_task_base + Δp (eq. 2), turned from the heading frame into the torso frame; (n, 2, 3) [m].
+
+        The torso stands where the references put it, not where it is measured: the arms do not answer to swaying.
+        """
+        wrists = grasp + command[:, OFFSET].reshape(-1, 2, 3)
+        rotation, position = self.arms.torso_in_heading(support[:, WAIST], self.pelvis_pitch(support, command))
+        return np.asarray((wrists - position[:, None]) @ rotation)

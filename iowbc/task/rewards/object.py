@@ -1,0 +1,30 @@
+"""r_obj: equilibrium of the held object; every term is zero where nothing is held."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.task.rewards.kernel import squared_norm
+
+Array = NDArray[np.floating[Any]]
+Mask = NDArray[np.bool_]
+
+
+def position(object_offset: Array, place: Array, held: Mask) -> Array:
+    """‖x_obj − x_grasp‖², (n,) [m²]; object and its place in the grasp from the base, heading frame, (n, 3) [m]."""
+    return squared_norm(object_offset - place) * held
+
+
+def orientation(object_quaternion: Array, held: Mask) -> Array:
+    """sin² of the angle between the object's vertical axis and gravity, (n,); world orientation (n, 4)."""
+    x, y = object_quaternion[:, 1], object_quaternion[:, 2]
+    up = 1.0 - 2.0 * (x * x + y * y)
+    tilt: Array = (1.0 - np.square(up)) * held
+    return tilt
+
+
+def vertical_velocity(object_velocity: Array, commanded: Array, held: Mask) -> Array:
+    """(ż_obj − ż_command)², (n,) [m²/s²]; world velocity (n, 3), rate of the commanded height (n,) [m/s]."""
+    fluctuation: Array = np.square(object_velocity[:, 2] - commanded) * held
+    return fluctuation

@@ -1,0 +1,43 @@
+"""r_smooth: whole-body smoothness."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.task.rewards.kernel import squared_norm
+
+Array = NDArray[np.floating[Any]]
+Mask = NDArray[np.bool_]
+
+
+def joint_acceleration(acceleration: Array) -> Array:
+    """Σ q̈², (n,) [rad²/s⁴]; joints (n, 29)."""
+    return squared_norm(acceleration)
+
+
+def action_rate(action: Array, previous: Array) -> Array:
+    """‖a_t − a_{t−1}‖², (n,); actions (n, 15)."""
+    return squared_norm(action - previous)
+
+
+def power(torque: Array, velocity: Array) -> Array:
+    """Σ |τ·q̇|, (n,) [W]; joints (n, 29). Braking costs as much as driving: the motors do not recover it."""
+    total: Array = np.abs(torque * velocity).sum(axis=1)
+    return total
+
+
+def base_rates(angular_velocity: Array) -> Array:
+    """ω_roll² + ω_pitch² of the base, (n,) [rad²/s²]; base frame (n, 3)."""
+    return squared_norm(angular_velocity[:, :2])
+
+
+def vertical_velocity(base_velocity: Array, commanded: Array) -> Array:
+    """(ż − ż_command)² of the base, (n,) [m²/s²]; velocity (n, 3), rate of the commanded height (n,) [m/s]."""
+    fluctuation: Array = np.square(base_velocity[:, 2] - commanded)
+    return fluctuation
+
+
+def saturation(saturated: Mask) -> Array:
+    """Fraction of joints at their torque limit, (n,); joints (n, k)."""
+    return np.asarray(saturated.mean(axis=1), np.float64)

@@ -1,0 +1,65 @@
+"""Memory that the parent and its workers share: anonymous, so that nothing is left behind whoever dies."""
+
+import mmap
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+ALIGNMENT = 64
+"""Arrays start on a cache line, so that workers never write into one another's lines."""
+
+Fields = Mapping[str, tuple[tuple[int, ...], str]]
+"""Shape of one environment's part and dtype, by name."""
+
+
+@dataclass(frozen=True)
+class Buffers:
+    """What an environment batch reads and writes each step; rows are environments."""
+
+    arrays: dict[str, NDArray[Any]]
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.arrays[name]
+
+    def rows(self, first: int, last: int) -> "Buffers":
+        """Views of the rows of some environments."""
+        return Buffers({name: array[first:last] for name, array in self.arrays.items()})
+
+
+def private_buffers(fields: Fields, rows: int) -> Buffers:
+    """Buffers in this process alone."""
+    return Buffers({name: np.zeros((rows, *shape), dtype) for name, (shape, dtype) in fields.items()})
+
+
+def create_shared(fields: Fields, rows: int) -> tuple[int, Buffers]:
+    """Shared buffers and the file descriptor that a worker inherits. The memory has no name in the file system and
+    goes when its last holder does."""
+    descriptor = os.memfd_create("iowbc-buffers", os.MFD_CLOEXEC)
+    os.ftruncate(descriptor, _place(fields, rows)[1])
+    return descriptor, attach_shared(descriptor, fields, rows)
+
+
+def attach_shared(descriptor: int, fields: Fields, rows: int) -> Buffers:
+    """The buffers behind a file descriptor made by `create_shared` with the same fields and rows."""
+    offsets, size = _place(fields, rows)
+    memory = mmap.mmap(descriptor, size)
+    return Buffers(
+        {
+            name: np.ndarray((rows, *shape), dtype, buffer=memory, offset=offsets[name])
+            for name, (shape, dtype) in fields.items()
+        }
+    )
+
+
+def _place(fields: Fields, rows: int) -> tuple[dict[str, int], int]:
+    """Offset of each array and the total size [bytes]."""
+    offsets, end = {}, 0
+    for name, (shape, dtype) in fields.items():
+        offsets[name] = end
+        size = rows * int(np.prod(shape, dtype=int)) * np.dtype(dtype).itemsize
+        end += -(-size // ALIGNMENT) * ALIGNMENT
+    return offsets, max(end, 1)
