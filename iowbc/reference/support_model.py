@@ -26,7 +26,9 @@ class SupportModel:
         self.model = pinocchio.buildReducedModel(self.full, self._arms, self._neutral)
         expected = [robot.joints[index] for index in robot.support]
         if list(self.model.names)[2:] != expected:
-            raise ValueError(f"{robot.folder}: the support joints must stand in the MJCF's order: {self.model.names[2:]}")
+            raise ValueError(
+                f"{robot.folder}: the support joints must stand in the MJCF's order: {self.model.names[2:]}"
+            )
         self.data = self.model.createData()
         self.soles = [self.model.getFrameId(site) for site in robot.soles]
         self.torso = self.model.getFrameId(robot.torso)
