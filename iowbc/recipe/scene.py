@@ -25,7 +25,8 @@ class Grasp(Section):
     height: float = 0.08
     """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
     settling: int = Field(default=5, ge=0)
-    """Iterations in each physics step that take the creep out of a grasp by contact (MuJoCo's noslip solver)."""
+    """Iterations in each physics step that take the creep out of a grasp by contact (MuJoCo's noslip solver, with the
+    elliptic friction cone)."""
     handover: float = Field(default=0.5, ge=0.0)
     """Time over which an object's weight comes to bear at the start of an episode [s]; dropped into the hands at once,
     it would pull with twice its weight."""

@@ -29,7 +29,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
     option.solver, option.cone = SOLVERS[physics.solver], CONES[physics.cone]
     option.iterations, option.ls_iterations = physics.iterations, physics.line_search_iterations
     if scene.kind == "lift" and scene.grasp.kind == "contact":
-        option.noslip_iterations = scene.grasp.settling
+        option.cone, option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, scene.grasp.settling
     spec.memory = ARENA
     foot_points = [geom for geom in spec.geoms if geom.parent.name in robot.sole_bodies and geom.conaffinity]
     for geom in list(spec.geoms):

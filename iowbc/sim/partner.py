@@ -1,6 +1,7 @@
 """The second carrier: spring and damper at the object's far handle that follow the command; a share of the load.
 
-Planar vectors are complex numbers x + iy, so that turning is a product and length an absolute value.
+Planar vectors are rows x and y of arrays (2, n). All is real sums, products and roots, which round alike however many
+environments there are; NumPy's complex products do not.
 """
 
 from typing import Any
@@ -16,7 +17,6 @@ from iowbc.sim.state import SimulationState
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
-Planar = NDArray[np.complex128]
 
 NOISE_WIDTH = 2
 """Columns of noise that the partner takes each step."""
@@ -41,9 +41,9 @@ class Partner:
         self._line = DelayLine(n, 3, recipe.delay.high / period)
         self._stiffness, self._damping, self._present = np.zeros(n), np.zeros(n), np.zeros(n)
         self._weight, self._resistance, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
-        self._aim, self._unsteady = np.zeros(n, complex), np.zeros(n, complex)
-        self._at, self._speed = np.zeros(n, complex), np.zeros(n, complex)
-        self._arm, self._height = np.zeros(n, complex), np.zeros(n)
+        self._aim, self._unsteady = np.zeros((2, n)), np.zeros((2, n))
+        self._at, self._speed = np.zeros((2, n)), np.zeros((2, n))
+        self._arm, self._height = np.zeros((2, n)), np.zeros(n)
         self._force, self._energy = np.zeros((n, 3)), np.zeros(n)
         self._keep = float(np.exp(-period / recipe.noise_time))
         self._any = False
@@ -64,11 +64,11 @@ class Partner:
         self._gust[which] = present * drawn["partner_noise"][which] * np.sqrt(1.0 - self._keep**2)
         self._line.set_latency(which, drawn["partner_delay"][which] / self._period)
         self._line.fill(which, np.zeros((len(which), 3)))
-        self._unsteady[which] = 0.0
+        self._unsteady[:, which] = 0.0
         self._energy[which] = 0.0
         self._force[which] = 0.0
         self._observe(state)
-        self._aim[which] = self._at[which]
+        self._aim[:, which] = self._at[:, which]
         self._any = bool(self._present.any())
 
     def wrench(self, commanded: Array, gust: Array, state: SimulationState, out: Array) -> None:
@@ -84,33 +84,29 @@ class Partner:
         self._line.push(commanded)
         wanted = self._line.read()
         wanted *= self._pace[:, None]
-        velocity = _planar(wanted)
-        velocity *= _heading(state.base_rotation)
-        push = velocity / (np.abs(velocity) + TINY)
-        push *= self._resistance
+        velocity = _turned(_heading(state.base_rotation), _planar(wanted))
+        push = velocity * (self._resistance / (_length(velocity) + TINY))
         around = self._at - _planar(state.base_position)
-        around *= 1j
         around *= wanted[:, 2]
-        velocity += around
+        velocity[0] -= around[1]
+        velocity[1] += around[0]
         lead = velocity * self._period
         lead += self._aim
         lead -= self._at
-        lead *= np.minimum(1.0, recipe.leash / (np.abs(lead) + TINY))
+        lead *= np.minimum(1.0, recipe.leash / (_length(lead) + TINY))
         np.add(self._at, lead, out=self._aim)
         lead *= self._stiffness
         velocity -= self._speed
         velocity *= self._damping
         lead += velocity
-        lead *= np.minimum(1.0, recipe.strongest / (np.abs(lead) + TINY))
+        lead *= np.minimum(1.0, recipe.strongest / (_length(lead) + TINY))
         self._unsteady *= self._keep
         self._unsteady += self._gust * _planar(gust)
         lead += self._unsteady
         lead += push
-        out[:, 0], out[:, 1] = lead.real, lead.imag
-        np.multiply(self._damping, state.object_linear_velocity[:, 2], out=out[:, 2])
-        np.subtract(self._weight, out[:, 2], out=out[:, 2])
-        lead *= self._arm.conj()
-        out[:, 5] = lead.imag
+        out[:, :2] = lead.T
+        out[:, 2] = self._weight - self._damping * state.object_linear_velocity[:, 2]
+        out[:, 5] = self._arm[0] * lead[1] - self._arm[1] * lead[0]
         self._force[:] = out[:, :3]
 
     def observe(self, state: SimulationState) -> None:
@@ -121,25 +117,27 @@ class Partner:
         self._observe(state)
         before -= self._at
         height -= self._height
-        moved = -(self._force[:, 0] * before.real + self._force[:, 1] * before.imag + self._force[:, 2] * height)
-        self._energy += moved
+        self._energy -= self._force[:, 0] * before[0] + self._force[:, 1] * before[1] + self._force[:, 2] * height
         state.partner_force[:] = self._force
         state.partner_energy[:] = self._energy
 
     def _observe(self, state: SimulationState) -> None:
         w, x, y, z = state.object_quaternion.T
-        arm = np.empty(len(w), complex)
-        arm.real = 0.5 - (y * y + z * z)
-        arm.imag = w * z + x * y
+        arm = np.empty((2, len(w)))
+        arm[0] = 0.5 - (y * y + z * z)
+        arm[1] = w * z + x * y
         arm *= self._double_handle
-        self._at = _planar(state.object_position) + arm
-        self._height = state.object_position[:, 2].copy()
-        self._arm = arm
-        self._speed = _planar(state.object_linear_velocity) + 1j * state.object_angular_velocity[:, 2] * arm
+        turning = state.object_angular_velocity[:, 2]
+        self._speed = _planar(state.object_linear_velocity)
+        self._speed[0] -= turning * arm[1]
+        self._speed[1] += turning * arm[0]
+        self._at = _planar(state.object_position)
+        self._at += arm
+        self._arm, self._height = arm, state.object_position[:, 2].copy()
 
     def handle(self, env: int) -> Array:
         """The far handle of one environment's object, (3,) [m]."""
-        return np.array([self._at[env].real, self._at[env].imag, self._height[env]])
+        return np.array([self._at[0, env], self._at[1, env], self._height[env]])
 
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""
@@ -151,15 +149,29 @@ class Partner:
         self._any = bool(self._present.any())
 
 
-def _planar(vectors: Array) -> Planar:
-    """First two columns as complex numbers, (n, k) to (n,)."""
-    out = np.empty(len(vectors), complex)
-    out.real, out.imag = vectors[:, 0], vectors[:, 1]
-    return out
+def _planar(vectors: Array) -> Array:
+    """First two columns as rows, (n, k) to (2, n)."""
+    rows: Array = vectors[:, :2].T.copy()
+    return rows
 
 
-def _heading(rotation: Array) -> Planar:
-    """Direction of the frames' x axes in the plane, of length one; (n, 3, 3) to (n,)."""
-    forward = _planar(rotation[:, :2, 0])
-    forward /= np.abs(forward) + TINY
+def _length(vectors: Array) -> Array:
+    """Lengths of planar vectors, (2, n) to (n,)."""
+    squares = vectors * vectors
+    length: Array = np.sqrt(squares[0] + squares[1])
+    return length
+
+
+def _turned(direction: Array, vectors: Array) -> Array:
+    """Planar vectors turned by the angle that a unit vector makes with the x axis, (2, n) each."""
+    turned: Array = direction[0] * vectors
+    turned[0] -= direction[1] * vectors[1]
+    turned[1] += direction[1] * vectors[0]
+    return turned
+
+
+def _heading(rotation: Array) -> Array:
+    """Direction of the frames' x axes in the plane, of length one; (n, 3, 3) to (2, n)."""
+    forward = _planar(rotation[:, :, 0])
+    forward /= _length(forward) + TINY
     return forward

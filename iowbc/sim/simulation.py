@@ -184,10 +184,10 @@ class Simulation:
         self._deliver()
 
     def _hand_over(self, wrench: Array) -> None:
-        """Bears the weight of held objects at first, less and less: f = m g (1 - t / T)."""
+        """Bears at first the robot's part of a held object's weight, less and less: f = (1 - share) m g (1 - t / T)."""
         if np.any(self.clock < self._handover):
             left = np.maximum(1.0 - self.clock / np.maximum(self._handover, 1.0), 0.0)
-            wrench[:, 2] += GRAVITY * left * self.drawn["object_mass"]
+            wrench[:, 2] += GRAVITY * left * (1.0 - self.drawn["partner_share"]) * self.drawn["object_mass"]
 
     def _deliver(self) -> None:
         self._noise = random.noise(self._episode_key, self.clock.view(np.uint64), self._noise.shape[1])

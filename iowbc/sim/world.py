@@ -210,7 +210,7 @@ class World:
             self._gather_object(state, layout.object, velocity)
 
     def _robot_velocity(self) -> Array:
-        """Velocity of the robot's centre of mass, (n, 3) [m/s]: its momentum, in the first rows of M qvel, by its mass."""
+        """Velocity of the robot's centre of mass, (n, 3) [m/s]: momentum, in the first rows of M qvel, by mass."""
         momentum = self._inertia.take(self.layout.momentum, axis=1)
         momentum *= self._qvel[:, None, self.layout.momentum_speeds]
         velocity = momentum.sum(axis=2)

@@ -1,0 +1,98 @@
+"""What is drawn for an episode, and that it reaches the models."""
+
+import numpy as np
+import pytest
+from conftest import changed
+
+from iowbc.recipe.simulation import Simulation as Recipe
+
+COUNT = 64
+
+
+def test_draws_cover_the_ranges_of_table_one(start):
+    simulation = start(Recipe(), ["push"] * COUNT)
+    for name, low, high in (
+        ("object_mass_scale", 0.5, 1.5),
+        ("ground_friction", 0.5, 1.2),
+        ("object_ground_friction", 0.02, 0.15),
+        ("surface_friction", 1.0, 1.5),
+    ):
+        drawn = simulation.drawn[name]
+        assert drawn.min() >= low
+        assert drawn.max() <= high
+        assert np.ptp(drawn) > 0.8 * (high - low)
+    assert np.allclose(simulation.drawn["object_mass"], 65.0 * simulation.drawn["object_mass_scale"])
+
+
+def test_every_episode_draws_anew(start, carrying):
+    simulation = start(Recipe(), ["lift"] * 4)
+    first = {name: values.copy() for name, values in simulation.drawn.items()}
+    simulation.reset(np.array([1, 3]), np.tile(carrying, (2, 1)))
+    again = simulation.drawn["object_mass"] == first["object_mass"]
+    assert np.array_equal(again, [True, False, True, False])
+
+
+def test_one_seed_meets_the_same_trial_in_any_environment(start):
+    trials = [start(Recipe(), ["lift"] * 2, envs=[0, 0], seed=[8, 9]), start(Recipe(), ["lift"], envs=[0], seed=9)]
+    for name, values in trials[1].drawn.items():
+        assert np.array_equal(values[0], trials[0].drawn[name][1]), name
+
+
+def test_held_quantities_are_not_drawn_and_nan_draws(start):
+    masses = np.array([2.0, np.nan, 0.0])
+    simulation = start(Recipe(), ["lift"] * 3, object_mass=masses, partner_share=0.0)
+    drawn = simulation.drawn["object_mass"]
+    assert drawn[0] == 2.0
+    assert 3.5 <= drawn[1] <= 10.5
+    assert drawn[2] == Recipe().scenes.lift.object.smallest_mass
+    assert np.all(simulation.drawn["partner_share"] == 0.0)
+
+
+def test_load_scale_lowers_the_upper_end_of_the_mass_range(start):
+    simulation = start(Recipe(), ["lift"] * COUNT, load_scale=0.25)
+    mass = simulation.drawn["object_mass"] / 7.0
+    assert mass.min() >= 0.5
+    assert 0.7 < mass.max() <= 0.75
+
+
+def test_holding_an_unknown_quantity_names_the_known_ones(start):
+    with pytest.raises(KeyError, match=r"no randomised quantities \['mass'\]; there are: .*object_mass"):
+        start(Recipe(), ["lift"], mass=2.0)
+
+
+def test_without_randomisation_everything_is_nominal(start):
+    simulation = start(changed(Recipe(), "randomization.enabled", False), ["lift"] * 8)
+    assert np.all(simulation.drawn["object_mass"] == 7.0)
+    assert np.all(simulation.drawn["kp_scale"] == 1.0)
+    assert np.all(simulation.drawn["ground_friction"] == Recipe().randomization.ground_friction.nominal)
+
+
+def test_drawn_values_reach_the_model(start, robot):
+    simulation = start(Recipe(), ["lift", "push"])
+    drawn = simulation.drawn
+    for env in range(2):
+        model, _ = simulation.physics_model(env)
+        thing = model.body("object")
+        assert thing.mass[0] == drawn["object_mass"][env]
+        assert np.array_equal(thing.ipos, drawn["object_com_offset"][env])
+        assert model.geom("left_foot_heel_outer").friction[0] == drawn["ground_friction"][env]
+        assert model.body("torso_link").mass[0] == pytest.approx(7.818 * drawn["link_mass_scale"][env][15])
+        assert np.allclose(model.actuator_gainprm[:, 0], robot.kp * drawn["kp_scale"][env])
+        assert np.allclose(model.actuator_biasprm[:, 2], -robot.kd * drawn["kd_scale"][env])
+        assert np.allclose(model.dof_damping[6:35], drawn["motor_damping"][env])
+        assert np.allclose(model.dof_frictionloss[6:35], drawn["joint_friction"][env])
+        assert model.body_subtreemass[0] == pytest.approx(model.body_mass.sum())
+    model, _ = simulation.physics_model(1)
+    resistance = drawn["object_ground_friction"][1] * drawn["object_mass"][1] * 9.81
+    assert np.allclose(model.dof_frictionloss[35:37], resistance)
+    assert model.geom("left_palm").friction[0] == drawn["surface_friction"][1]
+
+
+def test_slip_force_is_surface_friction_times_the_strength_of_the_grasp(start):
+    simulation = start(Recipe(), ["lift"] * 3)
+    assert np.allclose(simulation.drawn["slip_force"], 140.0 * simulation.drawn["surface_friction"])
+
+
+def test_latency_beyond_the_delay_line_names_the_recipe(start):
+    with pytest.raises(ValueError, match=r"latency of 9 periods.*randomization\.longest_latency"):
+        start(Recipe(), ["lift"], action_latency=9.0)

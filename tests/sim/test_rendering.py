@@ -1,0 +1,71 @@
+"""Pictures."""
+
+import numpy as np
+import pytest
+from conftest import run
+
+from iowbc.recipe.simulation import Simulation as Recipe
+from iowbc.sim import headless, look
+from iowbc.sim.rendering import GRIP, SceneRenderer
+
+
+@pytest.mark.parametrize("scene", ["free", "lift", "tyre", "push"])
+def test_a_frame_shows_robot_and_object(start, scene, monkeypatch):
+    monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
+    simulation = start(Recipe(), [scene])
+    with SceneRenderer(simulation, 0, width=160, height=120) as renderer:
+        frame = renderer.frame()
+        again = renderer.frame()
+    assert frame.shape == (120, 160, 3)
+    assert frame.dtype == np.uint8
+    assert len(np.unique(frame.reshape(-1, 3), axis=0)) > 100
+    assert frame.std() > 10.0
+    assert np.abs(frame.astype(int) - again).mean() < 10.0
+
+
+def test_the_camera_follows_the_robot(start, monkeypatch):
+    monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
+    simulation = start(Recipe(), ["free"])
+    with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
+        before = renderer._camera.lookat.copy()
+        simulation.state.base_position[0, 0] += 10.0
+        for _ in range(60):
+            renderer.frame()
+        assert renderer._camera.lookat[0] > before[0] + 9.0
+
+
+def test_forces_are_drawn_as_arrows(start, monkeypatch):
+    monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
+    simulation = start(Recipe(), ["lift"], partner_share=0.5)
+    run(simulation, 30)
+    with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
+        renderer.frame()
+        colours = np.array([renderer._scene.geoms[index].rgba for index in range(renderer._scene.ngeom)])
+    assert np.sum(np.all(np.isclose(colours, GRIP), axis=1)) == 2
+
+
+def test_meshes_sit_on_the_links_of_the_robot_where_they_are_installed(robot):
+    meshes = {mesh.link: mesh for mesh in look.installed_meshes(robot)}
+    if not meshes:
+        pytest.skip("example-robot-data has no meshes of this robot here")
+    assert meshes["left_knee_link"].body == "left_knee_link"
+    assert meshes["head_link"].body == "torso_link"
+    assert all(mesh.file.is_file() for mesh in meshes.values())
+
+
+def test_drawing_switched_off_says_how_to_switch_it_on(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "off")
+    with pytest.raises(headless.NoRenderer, match="unset it or set it to one of egl, osmesa"):
+        headless.backend()
+
+
+def test_without_libraries_the_error_names_the_package(monkeypatch):
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(headless.ctypes.util, "find_library", lambda name: None)
+    with pytest.raises(headless.NoRenderer, match="apt-get install libosmesa6"):
+        headless.backend()
+
+
+def test_a_picture_larger_than_the_buffer_is_refused(start):
+    with pytest.raises(ValueError, match="larger than 1920 x 1080"):
+        SceneRenderer(start(Recipe(), ["free"]), 0, width=4000, height=100)
