@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TextIO
+from typing import IO, Protocol
 
 from iowbc.pipeline.planning import duration
 
@@ -87,7 +87,7 @@ class Display(Protocol):
 class PlainDisplay:
     """Lines for logs: each change of state, and progress once in a while."""
 
-    def __init__(self, interval: float, stream: TextIO | None = None) -> None:
+    def __init__(self, interval: float, stream: IO[str] | None = None) -> None:
         self.interval = interval
         self.stream = stream or sys.stdout
         self._last = time.monotonic()

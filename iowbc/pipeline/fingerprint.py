@@ -4,7 +4,7 @@ import ast
 import functools
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -50,16 +50,18 @@ def folder_digest(folder: Path) -> str:
     return content_digest({path.relative_to(folder).as_posix(): file_digest(path) for path in folder_files(folder)})
 
 
-def code_digests(package: Path, names: Sequence[str], modules: Iterable[Path] = ()) -> dict[str, str]:
-    """Digest of the syntax trees of each named subpackage, and of single modules by their path in the package."""
-    digests = {name: _sources_digest(package, tuple(sorted((package / name).rglob("*.py")))) for name in sorted(names)}
-    for module in sorted(modules):
-        digests[module.relative_to(package).as_posix()] = _sources_digest(package, (module,))
-    return digests
+def code_digests(package: Path, names: Iterable[str]) -> dict[str, str]:
+    """Digest of the syntax trees of each named part of a package: a subpackage (`task`) or a module (`stages.eval`)."""
+    return {name: _part_digest(package, name) for name in sorted(names)}
 
 
-def _sources_digest(package: Path, sources: Sequence[Path]) -> str:
-    return content_digest({path.relative_to(package).as_posix(): _syntax_digest(path) for path in sources})
+def _part_digest(package: Path, name: str) -> str:
+    path = package.joinpath(*name.split("."))
+    module = path.with_name(f"{path.name}.py")
+    sources = [module] if module.is_file() else sorted(path.rglob("*.py"))
+    if not sources:
+        raise ValueError(f"{package.name} has no subpackage or module '{name}'")
+    return content_digest({source.relative_to(package).as_posix(): _syntax_digest(source) for source in sources})
 
 
 @functools.cache

@@ -1,8 +1,8 @@
 """The journal of a run: all that MLflow is to know, as lines of JSON on disk before anything is sent.
 
-The first line says where it goes. Each further line is one event: `run` (a run begins, `parent` for a nested one), `reopen`, `tags`,
-`metrics`, `text`, `files` or `end`. While its process lives, the journal is locked; a journal that is not locked and
-has runs without an end belonged to a process that died.
+The first line says where it goes. Each further line is one event: `run` (a run begins, `parent` for a nested one),
+`reopen`, `tags`, `metrics`, `text`, `files` or `end`. While its process lives, the journal is locked; a journal that is
+not locked and has runs without an end belonged to a process that died.
 """
 
 import fcntl
@@ -30,12 +30,20 @@ class Journal:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = path.open("ab")
 
-    def acquire(self) -> bool:
-        """Take the journal for this process; False where another one has it. A half-written last line is cut off."""
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
+    def acquire(self, patience: float = 0.0) -> bool:
+        """Take the journal for this process; False where another one keeps it longer than `patience` [s].
+
+        A half-written last line is cut off.
+        """
+        limit = time.monotonic() + patience
+        while True:
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() >= limit:
+                    return False
+                time.sleep(0.01)
         content = self.path.read_bytes()
         whole = content.rfind(b"\n") + 1
         if whole != len(content):

@@ -1,6 +1,7 @@
 """The live table of a run on a terminal."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from rich.console import Console
 from rich.live import Live
@@ -32,7 +33,7 @@ def sparkline(values: Sequence[float], width: int = CURVE_WIDTH) -> str:
         return ""
     count = min(width, len(finite))
     edges = [index * len(finite) // count for index in range(count + 1)]
-    means = [sum(finite[a:b]) / (b - a) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    means = [sum(finite[a:b]) / (b - a) for a, b in pairwise(edges)]
     low, high = min(means), max(means)
     scale = (len(BLOCKS) - 1) / (high - low) if high > low else 0.0
     return "".join(BLOCKS[round((mean - low) * scale)] for mean in means)

@@ -184,10 +184,10 @@ def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
 
 
 def stage_code(stage: Stage) -> dict[str, str]:
-    """Digests of a stage's own module and of the subpackages that it declares."""
-    package = Path(iowbc.__file__).parent
-    module = Path(stage.run.__code__.co_filename)
-    return code_digests(package, stage.packages, [module] if module.is_relative_to(package) else [])
+    """Digests of a stage's own module and of the parts of the package that it declares."""
+    module = stage.run.__module__.removeprefix("iowbc.")
+    own = {module} if module != stage.run.__module__ else set()
+    return code_digests(Path(iowbc.__file__).parent, own | set(stage.packages))
 
 
 def describe(steps: Sequence[Step]) -> list[tuple[str, str, str, str]]:
@@ -201,9 +201,11 @@ def describe(steps: Sequence[Step]) -> list[tuple[str, str, str, str]]:
 
 
 def duration(seconds: float | None) -> str:
-    """A time span for people: `42 s`, `12 min`, `3 h 05 min`; empty for None."""
+    """A time span for people: `0.4 s`, `42 s`, `12 min`, `3 h 05 min`; empty for None."""
     if seconds is None:
         return ""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
     if seconds < 100:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
@@ -216,7 +218,7 @@ def _shown(values: Mapping[str, Any], path: str) -> str:
 
 def _value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:
     """The part of a recipe at a dotted path."""
-    if path.split(".")[0] in ("execution", "name", "description", "stages"):
+    if path.split(".")[0] in ("execution", "stages"):
         raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
     value: Any = resolved
     for part in path.split("."):

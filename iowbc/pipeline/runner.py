@@ -1,7 +1,7 @@
 """Runs the stages of a recipe: reuses what is stored, makes the rest, loses nothing."""
 
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import yaml
@@ -10,12 +10,11 @@ from iowbc.pipeline.display import Display, StageView
 from iowbc.pipeline.history import remember
 from iowbc.pipeline.locking import key_lock
 from iowbc.pipeline.machine import available_cores, host, versions
-from iowbc.pipeline.planning import Options, Planner, Step, changed_code
+from iowbc.pipeline.planning import Planner, Step, changed_code
 from iowbc.pipeline.reporting import StageReport
-from iowbc.pipeline.store import Artifact, Damaged, Store
+from iowbc.pipeline.store import Artifact, Damaged
 from iowbc.pipeline.tracking import Tracker
 from iowbc.pipeline.workspace import Workspace
-from iowbc.recipe.loading import LoadedRecipe
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
 
 
@@ -28,23 +27,20 @@ class Runner:
 
     def __init__(
         self,
-        loaded: LoadedRecipe,
-        registry: Mapping[str, Stage],
-        store: Store,
+        planner: Planner,
         robot: Path,
-        options: Options,
         display: Display,
         tracker: Tracker | None,
         interrupted: Callable[[], bool],
     ) -> None:
-        self.loaded = loaded
-        self.store = store
+        self.planner = planner
+        self.loaded = planner.loaded
+        self.store = planner.store
+        self.options = planner.options
         self.robot = robot
-        self.options = options
         self.display = display
         self.tracker = tracker
         self.interrupted = interrupted
-        self.planner = Planner(loaded, registry, store, robot, options)
         self.artifacts: dict[str, Artifact] = {}
         self.made: list[str] = []
         """Stages that were not cached."""
@@ -135,11 +131,36 @@ class Runner:
             report=StageReport(view, self.display, self.tracker, workspace),
             interrupted=self.interrupted,
         )
-        self._attempt(job, stage, workspace, view)
+        try:
+            stage.run(job)
+            artifact = self._published(step, workspace, workers)
+        except (Interrupted, KeyboardInterrupt) as error:
+            self._ended(workspace, view, "stopped", "KILLED", str(error))
+            raise Interrupted(str(error)) from error
+        except StageFailed as error:
+            self._ended(workspace, view, "failed", "FAILED", str(error))
+            raise PipelineFailed(f"{stage.name} failed: {error}") from error
+        except Exception as error:
+            details = workspace.root / "error.txt"
+            details.write_text(traceback.format_exc(), encoding="utf-8")
+            summary = f"{type(error).__name__}: {error}"
+            self._ended(workspace, view, "failed", "FAILED", summary)
+            self.display.say(traceback.format_exc())
+            raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is also in {details}") from error
+        self.made.append(stage.name)
+        view.state, view.note, view.seconds = "done", "", artifact.manifest.seconds
+        self.display.changed(view)
+        if self.tracker is not None:
+            self.tracker.finished(stage.name, artifact, cached=False)
+        return artifact
+
+    def _published(self, step: Step, workspace: Workspace, workers: int) -> Artifact:
+        """Seal what the stage left and move it into the store."""
+        assert step.key is not None
         details = {
-            "stage": stage.name,
-            "version": stage.version,
-            "key": key,
+            "stage": step.stage.name,
+            "version": step.stage.version,
+            "key": step.key,
             "recipe": self.loaded.recipe.name,
             "seconds": workspace.seconds,
             "attempts": workspace.attempts,
@@ -150,32 +171,9 @@ class Runner:
         }
         resolved = yaml.safe_dump(self.loaded.recipe.model_dump(mode="json"), sort_keys=False)
         self.store.seal(workspace.out, details, step.ingredients or {}, resolved)
-        artifact = self.store.publish(workspace.out, stage.name, key)
+        artifact = self.store.publish(workspace.out, step.stage.name, step.key)
         workspace.remove()
-        self.made.append(stage.name)
-        view.state, view.note, view.seconds = "done", "", artifact.manifest.seconds
-        self.display.changed(view)
-        if self.tracker is not None:
-            self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
-
-    def _attempt(self, job: Job, stage: Stage, workspace: Workspace, view: StageView) -> None:
-        """Run the stage; whatever ends it early is recorded before it goes on."""
-        try:
-            stage.run(job)
-        except (Interrupted, KeyboardInterrupt) as error:
-            self._ended(workspace, view, "stopped", "KILLED", "")
-            raise Interrupted from error
-        except StageFailed as error:
-            self._ended(workspace, view, "failed", "FAILED", str(error))
-            raise PipelineFailed(f"{stage.name} failed: {error}") from error
-        except Exception as error:
-            details = workspace.root / "error.txt"
-            details.write_text(traceback.format_exc(), encoding="utf-8")
-            summary = f"{type(error).__name__}: {error}"
-            self._ended(workspace, view, "failed", "FAILED", summary)
-            self.display.say(traceback.format_exc())
-            raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is in {details}") from error
 
     def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
         workspace.write()

@@ -1,7 +1,8 @@
 """The process that sends journals to MLflow: `python -m iowbc.pipeline.sender RUNS`.
 
-One at a time works on a `runs/` folder, so that a fresh database is set up by one process alone. It stays as long as a journal's process
-lives, ends the runs of processes that died as KILLED, and leaves what a server does not take for the next one.
+One at a time works on a `runs/` folder, so that a fresh database is set up by one process alone. It stays as long as a
+journal's process lives, ends the runs of processes that died as KILLED, and leaves what a server does not take for the
+next one.
 """
 
 import contextlib
@@ -65,7 +66,7 @@ def sole_sender(runs: Runs) -> Iterator[None]:
 
 
 def delivered(runs: Runs, path: Path) -> bool:
-    """Send what is new in a journal, and remove it once its run has finished; False where MLflow could not be reached."""
+    """Send what is new in a journal, and remove it once its run has finished; False where MLflow was not reached."""
     try:
         if unsent(path):
             _Delivery(runs, path).send()

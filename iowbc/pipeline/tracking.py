@@ -1,4 +1,7 @@
-"""What a run tells MLflow. Written to a journal at once; a process of its own sends it, so that nothing here waits for a server."""
+"""What a run tells MLflow.
+
+It is written to a journal at once; a process of its own sends it, so that nothing here waits for a server.
+"""
 
 import os
 import re
@@ -23,6 +26,8 @@ PARENT = "recipe"
 """Identifier of the parent run within a journal; a nested run has its stage's name."""
 SHOWN_FOLDERS = ("figures", "tables", "videos")
 """Folders of an artifact that go to MLflow."""
+CHECKING_TIME = 1.0
+"""Seconds within which a sender that looks at a journal has let go of it again."""
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
 
 
@@ -44,7 +49,7 @@ class Tracker:
         recipe = loaded.recipe
         stamp = time.strftime("%Y%m%d-%H%M%S")
         journal = Journal(self.runs.tracking / f"{stamp}-{recipe.name}-{os.getpid()}.jsonl")
-        journal.acquire()
+        journal.acquire(CHECKING_TIME)
         resolved = recipe.model_dump(mode="json")
         uri = tracking_uri(self.runs)
         journal.write(
@@ -66,7 +71,7 @@ class Tracker:
             if statuses(path).get(PARENT) == "FINISHED":
                 return None
             journal = Journal(path)
-            if journal.acquire():
+            if journal.acquire(CHECKING_TIME):
                 journal.write("reopen", id=PARENT, tags=_process_tags())
                 return journal
             journal.close()

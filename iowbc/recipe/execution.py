@@ -10,6 +10,8 @@ class Execution(Section):
 
     workers: int | None = Field(default=None, ge=1)
     """Worker processes of the parallel stages; all available cores when empty. `--workers` goes before it."""
+    track: bool = True
+    """Whether runs are recorded in MLflow."""
     experiment: str = Field(default="iowbc", min_length=1)
     """MLflow experiment in which runs are recorded."""
     line_interval: float = Field(default=10.0, gt=0)

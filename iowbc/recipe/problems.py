@@ -18,7 +18,11 @@ class Problem:
         return f"{self.place}: {self.text}"
 
 
-class RecipeError(Exception):
+class UsageError(Exception):
+    """What was asked for cannot be done; the text says why, what is valid, and what to do."""
+
+
+class RecipeError(UsageError):
     """A recipe, or an override of it, is wrong. Holds every problem found."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:

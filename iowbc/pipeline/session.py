@@ -1,0 +1,124 @@
+"""`iowbc run` and `iowbc plan`: from a recipe file to an exit code, with signals, console and tracking around it."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.pipeline.display import Display, PlainDisplay
+from iowbc.pipeline.layout import Runs
+from iowbc.pipeline.live import LiveDisplay
+from iowbc.pipeline.planning import Options, Planner, describe, duration
+from iowbc.pipeline.results import print_results
+from iowbc.pipeline.runner import PipelineFailed, Runner
+from iowbc.pipeline.stopping import StopRequest
+from iowbc.pipeline.store import Store
+from iowbc.pipeline.tracking import Tracker, backlog
+from iowbc.recipe.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.problems import Problem, RecipeError
+from iowbc.stages.contract import Interrupted, Stage
+
+DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
+"""Exit codes."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What `iowbc run` was asked for."""
+
+    file: Path
+    overrides: Sequence[str]
+    runs: Runs
+    options: Options
+
+    def command(self, unfinished: Sequence[str]) -> str:
+        """The command that goes on with this run, where `unfinished` stages are not made yet."""
+        words = ["iowbc", "run", str(self.file)]
+        for override in self.overrides:
+            words += ["--set", override]
+        if self.options.until:
+            words += ["--until", self.options.until]
+        for stage in unfinished:
+            if stage in self.options.force:
+                words += ["--force", stage]
+        if self.options.workers:
+            words += ["--workers", str(self.options.workers)]
+        if self.options.on_code_change != "report":
+            words += ["--on-code-change", self.options.on_code_change]
+        if self.runs.root != Path("runs"):
+            words += ["--runs", str(self.runs.root)]
+        return shlex.join(words)
+
+
+def prepared(request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
+    """The planner of a request and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
+    from iowbc.robot.description import robot_folder
+
+    loaded = load_recipe(request.file, request.overrides)
+    try:
+        robot = robot_folder(loaded.recipe.robot)
+    except FileNotFoundError as error:
+        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
+    return Planner(loaded, registry, Store(request.runs), robot, request.options), robot
+
+
+def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
+    """Print what would run, and why."""
+    planner, _ = prepared(request, registry)
+    steps = planner.plan()
+    table = Table(box=None, padding=(0, 1))
+    for name in ("stage", "plan", "why", "takes about"):
+        table.add_column(name, no_wrap=name != "why")
+    for stage, state, why, time in describe(steps):
+        table.add_row(stage, Text(state, style="cyan" if state == "cached" else "bold yellow"), Text(why), time)
+    console.print(table)
+    missing = [step for step in steps if not step.cached]
+    known = [step.expected for step in missing if step.expected is not None]
+    if not missing:
+        console.print("all stages are cached", highlight=False)
+    elif known:
+        rest = "" if len(known) == len(missing) else f", and {len(missing) - len(known)} stages of unknown length"
+        console.print(f"{len(missing)} stages would run: about {duration(sum(known))}{rest}", highlight=False)
+    return DONE
+
+
+def run(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
+    """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`."""
+    planner, robot = prepared(request, registry)
+    loaded = planner.loaded
+    tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
+    with StopRequest() as stop:
+        runner = Runner(planner, robot, _display(loaded, console), tracker, stop)
+        status, code, closing = "FAILED", STAGE_FAILED, ""
+        try:
+            artifacts = runner.run()
+            status, code = "FINISHED", DONE
+        except PipelineFailed as error:
+            closing = f"{error}\nfinished stages are kept; after a remedy: {_rest(request, runner)}"
+        except (Interrupted, KeyboardInterrupt) as error:
+            status, code = "KILLED", INTERRUPTED
+            closing = "\n".join(filter(None, (str(error), f"interrupted; to go on: {_rest(request, runner)}")))
+        finally:
+            if tracker is not None:
+                delivered = tracker.close(status, wait=bool(runner.made) and not stop())
+    if code == DONE:
+        print_results(artifacts, console)
+    if tracker is not None and not delivered and backlog(request.runs):
+        console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
+    if closing:
+        Console(stderr=True, soft_wrap=True).print(closing, markup=False, highlight=False)
+    return code
+
+
+def _rest(request: Request, runner: Runner) -> str:
+    return request.command([stage.name for stage in runner.planner.stages if stage.name not in runner.made])
+
+
+def _display(loaded: LoadedRecipe, console: Console) -> Display:
+    if console.is_terminal:
+        return LiveDisplay(console)
+    return PlainDisplay(loaded.recipe.execution.line_interval, console.file)

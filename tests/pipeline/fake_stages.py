@@ -1,0 +1,85 @@
+"""A pipeline of small stages that count instead of learn, and `main`: the command line on top of it.
+
+`FAKE_BEHAVIOUR` (JSON by stage name) makes stages slow or faulty: `steps`, `pause` [s], `fail` (StageFailed), `raise`.
+"""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages import contract
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+
+
+def counting(name: str) -> Callable[[Job], None]:
+    """A stage that counts to `steps` with a checkpoint after each, and writes what its key says it depends on."""
+
+    def run(job: Job) -> None:
+        behaviour = json.loads(os.environ.get("FAKE_BEHAVIOUR", "{}")).get(name, {})
+        checkpoint = job.work / "checkpoint.json"
+        done = json.loads(checkpoint.read_text()) if checkpoint.exists() else 0
+        started_at = done
+        steps = behaviour.get("steps", 3)
+        while done < steps:
+            time.sleep(behaviour.get("pause", 0.0))
+            done += 1
+            checkpoint.write_text(json.dumps(done))
+            job.report.metrics({"count": float(done), "half": done / 2}, done)
+            job.report.progress(done, steps, f"at {done}")
+            if job.interrupted():
+                raise Interrupted(f"{name}: stopped at {done} of {steps}, checkpoint written")
+        if behaviour.get("fail"):
+            raise StageFailed(behaviour["fail"])
+        if behaviour.get("raise"):
+            raise RuntimeError(behaviour["raise"])
+        for folder in ("tables", "figures"):
+            (job.out / folder).mkdir()
+        (job.out / "tables" / "counts.md").write_text(f"| {name} |\n|---|\n| {done} |\n")
+        (job.out / "figures" / "curve.png").write_bytes(b"not really a picture")
+        (job.out / "result.json").write_text(json.dumps({"seed": job.recipe.seed, "started_at": started_at}))
+        (job.out / "summary.json").write_text(json.dumps({"metrics": {"count": float(done)}}))
+
+    return run
+
+
+def stage(name: str, reads: tuple[str, ...], slice: tuple[str, ...], version: int = 1) -> Stage:
+    """A counting stage that reads the others that its recipe has."""
+
+    def known(recipe: Recipe) -> tuple[str, ...]:
+        return tuple(read for read in reads if read in recipe.stages)
+
+    return Stage(name=name, version=version, slice=slice, reads=known, run=counting(name))
+
+
+STAGES = {
+    made.name: made
+    for made in (
+        stage("rg-dataset", (), ("seed", "rg")),
+        stage("rg-fit", ("rg-dataset",), ("seed", "rg")),
+        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher")),
+        stage("distill", ("rg-fit", "teacher"), ("distill",)),
+        stage("eval", ("distill",), ("eval",)),
+        stage("export", ("distill",), ("name", "export")),
+    )
+}
+
+
+def main() -> None:
+    """The command line, on these stages."""
+    from types import ModuleType
+
+    registry = ModuleType("iowbc.stages.registry")
+    registry.STAGES = STAGES  # type: ignore[attr-defined]
+    sys.modules["iowbc.stages.registry"] = registry
+    sys.modules[contract.__package__].registry = registry  # type: ignore[attr-defined, index]
+
+    from iowbc.cli import main as command
+
+    command()
+
+
+if __name__ == "__main__":
+    main()
