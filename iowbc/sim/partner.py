@@ -26,8 +26,10 @@ TINY = 1e-9
 """Keeps a division by a length from dividing by zero."""
 REMEMBERED = (
     *("stiffness", "damping", "present", "weight", "resistance", "pace", "gust"),
-    *("aim", "unsteady", "at", "speed", "arm", "height", "force", "energy"),
+    *("height", "force", "energy"),
 )
+PLANAR = ("aim", "unsteady", "at", "speed", "arm")
+"""What partners remember; planar vectors are (2, n) here and (n, 2) to others."""
 
 
 class Partner:
@@ -142,6 +144,7 @@ class Partner:
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""
         own = {name: getattr(self, f"_{name}") for name in REMEMBERED}
+        own |= {name: getattr(self, f"_{name}").T for name in PLANAR}
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
 
     def restored(self) -> None:

@@ -5,6 +5,7 @@ import pytest
 from conftest import changed, run
 
 from iowbc.recipe.simulation import Simulation as Recipe
+from iowbc.sim import random
 from iowbc.sim.divergence import Divergence
 from iowbc.sim.replay import replay
 from iowbc.sim.simulation import Simulation
@@ -56,6 +57,19 @@ def test_restored_snapshot_draws_the_same_next_episode(start, carrying):
         each.reset(np.array([0, 4]), np.tile(carrying, (2, 1)))
     assert all(np.array_equal(simulation.drawn[name], other.drawn[name]) for name in other.drawn)
     assert same(wander(simulation, 5), wander(other, 5))
+
+
+def test_every_array_of_a_snapshot_but_delay_lines_has_a_row_an_environment(start):
+    for name, values in start(Recipe(), ["lift"] * 5).snapshot().items():
+        if not name.endswith(("line/values", "newest", "targets/values", "robot/values", "object/values")):
+            assert len(values) == 5, name
+
+
+def test_reseeded_simulation_draws_what_one_made_with_that_seed_draws(start, carrying):
+    simulation, other = start(Recipe(), ["lift"] * 2, seed=1), start(Recipe(), ["lift"] * 2, seed=7)
+    simulation.reseed(random.environment_key(7, np.arange(2)))
+    simulation.reset(np.arange(2), np.tile(carrying, (2, 1)))
+    assert all(np.array_equal(simulation.drawn[name], other.drawn[name]) for name in other.drawn)
 
 
 def test_snapshot_of_other_environments_is_refused(start):
