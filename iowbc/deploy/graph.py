@@ -95,8 +95,6 @@ class ControllerGraph(nn.Module):
     """One control step of the support branch; inputs and outputs as `input_ports` and `output_ports` list them."""
 
     scale: Tensor
-    lower: Tensor
-    upper: Tensor
     joint_order: Tensor
 
     def __init__(
@@ -119,8 +117,6 @@ class ControllerGraph(nn.Module):
         self.reference = ReferenceModule(rg, robot.default_position[robot.support], len(robot.interaction))
         self.gait = GaitModule(gait, len(robot.support))
         self.register_buffer("scale", _tensor(action_scale))
-        self.register_buffer("lower", _tensor(robot.lower[robot.support]))
-        self.register_buffer("upper", _tensor(robot.upper[robot.support]))
         order = np.argsort(np.concatenate([robot.support, robot.interaction]))
         self.register_buffer("joint_order", torch.from_numpy(order))
         self.eval().requires_grad_(False)
@@ -206,7 +202,7 @@ class ControllerGraph(nn.Module):
         shifted = torch.cat([history[:, 1:], frame], dim=1)
         history_next = torch.where(restart[:, :, None] > 0.5, frame.expand(-1, self.history, -1), shifted)
         action = torch.clamp(self.student(history_next), -self.bound, self.bound)
-        target = torch.clamp(support_reference + self.scale * action, self.lower, self.upper)
+        target = support_reference + self.scale * action
         return target, action, support_reference, history_next
 
 

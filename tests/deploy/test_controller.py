@@ -1,0 +1,160 @@
+"""The exported controller: what it refuses, what it keeps, and that it needs no torch."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iowbc.deploy.contract import CONTRACT, GRAPH, ContractBroken, read_contract
+from iowbc.deploy.controller import Controller, Measured
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+
+NOMINAL = np.array([0, 0, 0, 0.72, 0, 0, 0, 0, 0, 0, 0.0])
+
+
+def measured(robot: Robot, rows: int = 1, noise: float = 0.0) -> Measured:
+    random = np.random.default_rng(0)
+    return Measured(
+        projected_gravity=np.tile([0.0, 0.0, -1.0], (rows, 1)),
+        base_angular_velocity=noise * random.normal(size=(rows, 3)),
+        joint_position=robot.default_position + noise * random.normal(size=(rows, 29)),
+        joint_velocity=noise * random.normal(size=(rows, 29)),
+        object_position=np.tile([0.3, 0.0, 0.1], (rows, 1)),
+        object_quaternion=np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)),
+        object_linear_velocity=np.zeros((rows, 3)),
+        object_angular_velocity=np.zeros((rows, 3)),
+    )
+
+
+def test_a_step_gives_targets_for_every_joint_with_gains(exported: Path, robot: Robot) -> None:
+    targets = Controller.load(exported).step(measured(robot), NOMINAL)
+    assert targets.position.shape == (1, 29)
+    assert np.isfinite(targets.position).all()
+    assert np.array_equal(targets.kp, robot.kp)
+    support = targets.support_reference + robot.action_scale * targets.action
+    assert targets.position[:, robot.support] == pytest.approx(support, abs=1e-6)
+
+
+def test_robots_side_by_side_do_not_touch_one_another(exported: Path, robot: Robot) -> None:
+    both, alone = Controller.load(exported, robots=2), Controller.load(exported)
+    commands = np.stack([NOMINAL, NOMINAL])
+    commands[1, 0] = 0.4
+    for _ in range(10):
+        pair = both.step(measured(robot, 2), commands)
+        one = alone.step(measured(robot), NOMINAL)
+    assert pair.position[0] == pytest.approx(one.position[0], abs=1e-6)
+    assert np.abs(pair.position[1] - pair.position[0]).max() > 0.01
+
+
+def test_reset_starts_over(exported: Path, robot: Robot) -> None:
+    controller = Controller.load(exported)
+    walk = NOMINAL + np.eye(11)[0] * 0.3
+    first = [controller.step(measured(robot, noise=0.1), walk).position for _ in range(10)]
+    controller.reset()
+    again = [controller.step(measured(robot, noise=0.1), walk).position for _ in range(10)]
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first[0], first[-1]), "the gait clock runs"
+
+
+def test_a_scene_has_its_own_grasp(exported: Path, robot: Robot) -> None:
+    controller = Controller.load(exported)
+    arms = {}
+    for scene in ("lift", "push"):
+        controller.reset(scene=scene)
+        arms[scene] = controller.step(measured(robot), NOMINAL).position[0, robot.interaction]
+    assert np.abs(arms["lift"] - arms["push"]).max() > 0.05
+    with pytest.raises(ValueError, match="known: free, lift"):
+        controller.reset(scene="sofa")
+
+
+def test_a_sudden_command_is_approached_at_the_rates_of_training(exported: Path, robot: Robot, recipe: Recipe) -> None:
+    controller = Controller.load(exported)
+    controller.step(measured(robot), NOMINAL)
+    controller.step(measured(robot), NOMINAL + np.eye(11)[0])
+    assert controller.inputs["command"][0, 0] == pytest.approx(recipe.task.commands.rates.velocity / 50)
+    controller.step(measured(robot), NOMINAL + np.eye(11)[0], limit_rates=False)
+    assert controller.inputs["command"][0, 0] == 1.0
+
+
+def test_commands_are_clamped_to_the_feasible_map(exported: Path, robot: Robot) -> None:
+    controller = Controller.load(exported)
+    controller.step(measured(robot), NOMINAL + np.eye(11)[3])
+    assert controller.inputs["command"][0, 3] == pytest.approx(0.78)
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [(np.full(11, np.nan), "not finite"), (np.zeros(10), "expected shape"), (np.zeros((3, 11)), "expected shape")],
+)
+def test_unusable_commands_are_refused(command: np.ndarray, message: str, exported: Path, robot: Robot) -> None:
+    with pytest.raises(ValueError, match=f"command: {message}"):
+        Controller.load(exported).step(measured(robot), command)
+
+
+def test_missing_or_broken_measurements_are_refused(exported: Path, robot: Robot) -> None:
+    blind = Measured(**{**vars(measured(robot)), "object_position": None})
+    with pytest.raises(ValueError, match="object_position: this policy needs it"):
+        Controller.load(exported).step(blind, NOMINAL)
+    broken = Measured(**{**vars(measured(robot)), "joint_velocity": np.full((1, 29), np.nan)})
+    with pytest.raises(ValueError, match="joint_velocity: not finite"):
+        Controller.load(exported).step(broken, NOMINAL)
+
+
+def test_a_changed_graph_is_noticed(exported: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "changed"
+    shutil.copytree(exported, folder)
+    with (folder / GRAPH).open("ab") as graph:
+        graph.write(b"x")
+    with pytest.raises(ContractBroken, match="SHA-256"):
+        Controller.load(folder)
+
+
+@pytest.mark.parametrize("name", [GRAPH, CONTRACT])
+def test_an_incomplete_folder_is_named(name: str, exported: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "incomplete"
+    shutil.copytree(exported, folder)
+    (folder / name).unlink()
+    with pytest.raises(ContractBroken, match=f"{name} missing"):
+        Controller.load(folder)
+
+
+def test_a_contract_of_another_format_is_refused(exported: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "later"
+    shutil.copytree(exported, folder)
+    contract = json.loads((folder / CONTRACT).read_text())
+    (folder / CONTRACT).write_text(json.dumps(contract | {"format": 2}))
+    with pytest.raises(ContractBroken, match="not a contract of format 1"):
+        read_contract(folder)
+
+
+def test_the_contract_says_what_every_number_is(exported: Path) -> None:
+    contract = read_contract(exported)
+    assert len(contract.joints) == len(contract.kp) == 29
+    assert [contract.joints[index] for index in contract.support][:3] == [
+        "left_hip_pitch_joint",
+        "left_hip_roll_joint",
+        "left_hip_yaw_joint",
+    ]
+    assert all(port.unit and port.frame and port.meaning for port in (*contract.inputs, *contract.outputs))
+    assert contract.control_frequency == 50
+    assert contract.physics_frequency == pytest.approx(200)
+    assert {"torch", "onnxruntime", "iowbc"} <= set(contract.versions)
+    assert sum(part.size for part in contract.observation) == contract.outputs[-1].shape[1]
+
+
+def test_the_controller_runs_without_torch_and_mujoco(exported: Path) -> None:
+    program = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from iowbc.deploy.controller import Controller\n"
+        f"Controller.load(Path({str(exported)!r}))\n"
+        "heavy = {'torch', 'mujoco', 'pinocchio', 'mlflow', 'pandas', 'stable_baselines3'} & set(sys.modules)\n"
+        "sys.exit(f'imported {heavy}' if heavy else 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
