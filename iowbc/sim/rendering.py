@@ -20,8 +20,8 @@ SMALLEST_FORCE = 5.0
 """Weaker forces are not drawn [N]."""
 PARTNER, PUSH, GRIP, GROUND = (0.1, 0.6, 0.25, 1), (0.85, 0.1, 0.1, 1), (0.95, 0.55, 0.1, 1), (0.2, 0.4, 0.85, 1)
 """Colours of forces: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet."""
-BESIDE_LEG = 0.09
-"""Forces of the ground are drawn this far outside the soles, where the legs do not hide them [m]."""
+BESIDE = 0.09
+"""Forces on hands and feet are drawn this far outside of them, where the limbs do not hide them [m]."""
 MARGIN = 200
 """Room for arrows among the things to draw."""
 
@@ -85,17 +85,17 @@ class SceneRenderer:
 
     def _draw_forces(self) -> None:
         state, env = self._simulation.state, self._env
+        outward = BESIDE * state.base_rotation[env, :, 1] * np.array([[1.0], [-1.0]])
         if state.has_object[env]:
             self._arrow(self._simulation.partner_handle(env), state.partner_force[env], PARTNER)
             impulse = state.external_force[env, :3] - state.partner_force[env]
             self._arrow(state.object_position[env], impulse, PUSH)
             hands = self._simulation.hand_position(env)
             for hand in range(2):
-                self._arrow(hands[hand], state.grip_force[env, hand], GRIP)
+                self._arrow(hands[hand] + outward[hand], state.grip_force[env, hand], GRIP)
         self._arrow(state.base_position[env], state.push_force[env], PUSH)
-        outward = BESIDE_LEG * state.base_rotation[env, :, 1]
-        for foot, side in enumerate((1.0, -1.0)):
-            self._arrow(state.foot_position[env, foot] + side * outward, state.foot_force[env, foot], GROUND)
+        for foot in range(2):
+            self._arrow(state.foot_position[env, foot] + outward[foot], state.foot_force[env, foot], GROUND)
 
     def _arrow(self, start: Array, force: Array, colour: tuple[float, ...]) -> None:
         if np.linalg.norm(force) < SMALLEST_FORCE or self._scene.ngeom >= self._scene.maxgeom:

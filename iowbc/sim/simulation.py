@@ -108,11 +108,6 @@ class Simulation:
         """Everything that is random in the current episodes, by name, (n,) or (n, k)."""
         return self._draws.values
 
-    def reseed(self, key: NDArray[np.uint64]) -> None:
-        """Makes all that is random start anew from other keys, (n,), as `random.environment_key` makes them."""
-        self._key[:] = key
-        self.episode[:] = 0
-
     def hold(self, fixed: Mapping[str, Array]) -> None:
         """Holds quantities at values (n,) from the next reset on; NaN draws. Keeps what is held and not named here."""
         unknown = [name for name in fixed if name not in self._draws.names]
