@@ -9,7 +9,7 @@ from iowbc.evaluation.metrics import ERRORS, error_norm
 from iowbc.evaluation.paper import VARIANTS
 from iowbc.evaluation.statistics import mean_half_width, wilson_interval
 
-COSTS = ("E_v_raw", "saturation", "saturation_peak", "slips", "partner_force_peak", "grip_force_peak", "energy")
+COSTS = ("E_v_raw", "saturation", "saturation_peak", "slip_share", "partner_force_peak", "grip_force_peak", "energy")
 """Other columns averaged over the surviving trials."""
 GROUP = ["variant", "suite", "case", "mass"]
 

@@ -36,7 +36,7 @@ class Trace:
     saturation: Array
     """Share of the joints at their torque limit, shape (T,)."""
     slipped: Array
-    """1 in the control periods in which a hand lost its grip, shape (T,)."""
+    """1 while a hand does not hold the object, or in a push does not touch it, shape (T,)."""
     partner_force: Array
     """Partner's force on the object, shape (T, 3) [N]."""
     grip_force: Array
@@ -85,7 +85,7 @@ def trial_metrics(trace: Trace, gait_steps: int) -> dict[str, float]:
         "E_v_raw": velocity_error(trace.system_velocity, trace.commanded_velocity, 1),
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
-        "slips": float(np.sum(trace.slipped > 0)),
+        "slip_share": float(np.mean(trace.slipped > 0)),
         "partner_force_peak": float(np.max(np.linalg.norm(trace.partner_force, axis=1))),
         "grip_force_peak": float(np.max(np.linalg.norm(trace.grip_force.reshape(steps, 2, 3), axis=2))),
         "energy": float(np.sum(trace.power) * trace.dt),

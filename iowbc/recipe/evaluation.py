@@ -90,7 +90,7 @@ class Success(Section):
     """When a trial counts as survived: no fall and nothing dropped, by `task.termination`, for the whole trial."""
 
     slip_fails: bool = False
-    """Also count a trial as failed in which a hand lost its grip, even though the object was not dropped."""
+    """Also count a trial as failed in which a hand ever lost the object, even though the other kept it."""
     capacity_rate: float = Field(default=0.8, gt=0, le=1)
     """Success rate that a mass, and every lighter one, must reach to count as carried (load capacity)."""
 

@@ -1,0 +1,83 @@
+"""The exported controller in the simulation, step by step beside the student in the process."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from iowbc.deploy.controller import Controller
+from iowbc.deploy.golden import largest_difference, stacked
+from iowbc.deploy.graph import ControllerGraph
+from iowbc.deploy.onnx_graph import run_torch
+from iowbc.evaluation.exported import ExportedPolicy
+from iowbc.evaluation.rollout import play_in
+from iowbc.evaluation.trials import command_script, trials_at
+from iowbc.learning.acting import StudentPolicy
+from iowbc.recipe.evaluation import Segment
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+from iowbc.task.vector_env import VectorEnv
+
+TOLERANCE = 1e-5
+SEQUENCE = (
+    Segment(duration=0.4, ramp=0.0),
+    Segment(duration=0.8, velocity=(0.4, 0.0, 0.2), height=0.7, pitch=0.2, wrists=(0.02, 0, 0.03, 0.02, 0, 0.03)),
+    Segment(duration=0.6),
+)
+
+
+class Both:
+    """The exported controller drives; the student says what it would have done."""
+
+    def __init__(self, exported: ExportedPolicy, student: StudentPolicy) -> None:
+        self.exported, self.student = exported, student
+        self.differences: list[float] = []
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        self.exported.reset(which)
+        self.student.reset(which)
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        action = self.exported.act(observation, privileged)
+        self.differences.append(float(np.abs(action - self.student.act(observation, privileged)).max()))
+        return action
+
+
+@pytest.fixture(scope="module")
+def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, exported: Path) -> Both:
+    script = command_script(SEQUENCE, recipe.task.commands)
+    episodes = tuple(
+        trials_at("test", scene, mass, script, count=1, seed=3, fixed={})[0].episode
+        for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
+    )
+    environment = VectorEnv(recipe, robot.folder, rg=rg, num_envs=3, workers=0, seed=0, episodes=episodes)
+    controller = Controller.load(exported, robots=3)
+    both = Both(ExportedPolicy(controller, environment, golden_steps=30), StudentPolicy(graph.student, graph.history))
+    try:
+        play_in(environment, recipe, both)
+    finally:
+        environment.close()
+    return both
+
+
+def test_the_exported_controller_acts_as_the_student_does(driven: Both) -> None:
+    assert len(driven.differences) > 50
+    assert max(driven.differences) < TOLERANCE
+
+
+def test_its_targets_are_those_of_the_training_environment(driven: Both) -> None:
+    assert driven.exported.largest_difference < TOLERANCE
+
+
+def test_the_robots_walked(driven: Both) -> None:
+    fed = driven.exported.controller.inputs
+    assert fed["gait"].shape == (3, 2)
+    assert np.abs(driven.exported.controller.outputs["action"]).max() > 0.01
+
+
+def test_golden_vectors_are_what_torch_computes(driven: Both, graph: ControllerGraph) -> None:
+    inputs, outputs = stacked(driven.exported.inputs), stacked(driven.exported.outputs)
+    assert len(inputs["command"]) == 30
+    assert inputs["restart"][:, 0].tolist() == [1.0] + [0.0] * 29
+    assert max(largest_difference(run_torch(graph, inputs), outputs).values()) < TOLERANCE
