@@ -9,9 +9,17 @@ from iowbc.recipe.commands import CommandRates
 
 Array = NDArray[np.floating[Any]]
 
-COMMAND = ("v_x", "v_y", "yaw_rate", "height", "pitch", *(f"{side}_{axis}" for side in ("left", "right") for axis in "xyz"))
+COMMAND = (
+    "v_x",
+    "v_y",
+    "yaw_rate",
+    "height",
+    "pitch",
+    *(f"{side}_{axis}" for side in ("left", "right") for axis in "xyz"),
+)
 """Names of the command's entries: m/s, m/s, rad/s, m, rad, and six wrist offsets in m; heading frame."""
 VELOCITY = slice(0, 3)
+YAW_RATE = 2
 HEIGHT = 3
 PITCH = 4
 OFFSET = slice(5, 11)

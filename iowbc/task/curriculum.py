@@ -49,4 +49,5 @@ def next_level(curriculum: Curriculum, level: Array, survived: Mask, progress: A
     success = survived & (tracking >= curriculum.tracking)
     failure = ~survived & (progress < curriculum.early)
     moved = level + curriculum.rise * success - curriculum.fall * failure
-    return np.clip(moved, 0.0, curriculum.limit)
+    clipped: Array = np.clip(moved, 0.0, curriculum.limit)
+    return clipped

@@ -60,7 +60,7 @@ def expected_stance(phase: Array, stepping: Mask, stance: float) -> Mask:
 
 
 def swing_prior(phase: Array, stepping: Mask, gait: GaitPrior) -> Array:
-    """What the gait prior adds to θ_S_ref, (n, 15) [rad]: amplitude · sin(π·swing progress); zero while the clock rests."""
+    """What the gait prior adds to θ_S_ref, (n, 15) [rad]: amplitude · sin(π·progress); zero while the clock rests."""
     added = np.zeros((len(phase), 15))
     if not gait.enabled:
         return added

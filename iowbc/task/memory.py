@@ -50,7 +50,7 @@ class Memory:
     heading_reference: Array
     """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
     object_place: Array
-    """Object from the middle of the wrist targets at the start of the episode, heading frame, (n, 3) [m]."""
+    """A held object from the middle of the wrist targets at the start of the episode, heading frame, (n, 3) [m]."""
     tracking: Array
     """Sum of the tracking score over the episode, (n,)."""
     total: Array

@@ -1,7 +1,7 @@
 """How the robot and the object move, seen from the heading frame: what reward, terminations and signals look at."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ class Motion:
     """Turning of the base about the vertical, (n,) [rad/s]."""
     pelvis_height: Array
     """(n,) [m]."""
+    height: Array
+    """What the command's H speaks of: the pelvis, or the robot's centre of mass by recipe, (n,) [m]."""
     pelvis_tilt: Array
     """Angle of the pelvis from upright, (n,) [rad]."""
     torso_pitch: Array
@@ -41,8 +43,8 @@ class Motion:
     """Object from the base, heading frame, (n, 3) [m]; zero without an object."""
 
 
-def motion(state: SimulationState) -> Motion:
-    """The motion in a simulation state."""
+def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") -> Motion:
+    """The motion in a simulation state; `height`: what H speaks of."""
     quaternion = state.base_quaternion
     frame = rotations.heading(quaternion)
     up = 1.0 - 2.0 * (quaternion[:, 1] ** 2 + quaternion[:, 2] ** 2)
@@ -55,6 +57,7 @@ def motion(state: SimulationState) -> Motion:
         base_velocity=to_heading(frame, state.base_linear_velocity),
         yaw_rate=rotations.rotate(quaternion, state.base_angular_velocity)[:, 2],
         pelvis_height=state.base_position[:, 2],
+        height=state.base_position[:, 2] if height == "pelvis" else state.com_position[:, 2],
         pelvis_tilt=np.arccos(np.clip(up, -1.0, 1.0)),
         torso_pitch=rotations.lean_of(state.torso_quaternion),
         torso_roll=rotations.roll_of(state.torso_quaternion),

@@ -1,6 +1,6 @@
 """The observation s_t (eq. 5) and the privileged observation s_priv, as one row of named parts an environment."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -72,6 +72,10 @@ class ObservationLayout:
         ends = np.cumsum([size for _, size in self.parts]).tolist()
         return {name: slice(end - size, end) for (name, size), end in zip(self.parts, ends, strict=True)}
 
+    def describe(self) -> list[dict[str, Any]]:
+        """Names and sizes of the parts, in order, for JSON."""
+        return [{"name": name, "size": size} for name, size in self.parts]
+
     def gather(self, values: Mapping[str, Array], out: Observation | None = None) -> Observation:
         """One row an environment from named arrays, each (n, size); shape (n, self.size), float32."""
         if out is None:
@@ -117,6 +121,10 @@ class FullLayout:
     def names(self) -> tuple[str, ...]:
         """Names of all parts, in order."""
         return self.state.names + self.extra.names
+
+    def describe(self) -> dict[str, list[dict[str, Any]]]:
+        """Both parts, for JSON."""
+        return {"observation": self.state.describe(), "privileged": self.extra.describe()}
 
     @cached_property
     def slices(self) -> dict[str, slice]:
@@ -195,9 +203,3 @@ def observe(layout: ObservationLayout, sensed: Sensed, out: Observation | None =
 def to_heading(heading: Array, vectors: Array) -> Array:
     """World vectors in the heading frame; heading quaternion (n, 4), vectors (n, 3) or (n, k, 3)."""
     return rotations.rotate_inverse(heading if vectors.ndim == 2 else heading[:, None], vectors)
-
-
-def flat(values: Sequence[Array] | Array) -> Array:
-    """Rows of an array of any shape (n, ...) laid flat, (n, k)."""
-    array = np.asarray(values)
-    return array.reshape(len(array), -1)

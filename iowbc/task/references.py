@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.recipe.references import References
-from iowbc.reference.feasibility import FeasibleMap
-from iowbc.reference.network import ReferenceNetwork
 from iowbc.robot.arms import ArmKinematics
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import VECTOR_SIGN
@@ -29,14 +27,19 @@ def both_wrists(left: tuple[float, float, float]) -> Array:
 
 
 class ReferenceLayer:
-    """Arm and support references of n environments. Holds constants only; the references themselves are the caller's."""
+    """Arm and support references of n environments. Holds constants only; the references are the caller's."""
 
     def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
         """`rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture, and commands are
         not clamped to a feasible map."""
         self.arms = ArmKinematics(robot)
-        self.network = ReferenceNetwork.load(rg) if rg is not None and references.use_rg else None
-        self.feasible = FeasibleMap.load(rg / "feasible.npz") if rg is not None else None
+        self.network, self.feasible = None, None
+        if rg is not None:
+            from iowbc.reference.feasibility import FeasibleMap
+            from iowbc.reference.network import ReferenceNetwork
+
+            self.network = ReferenceNetwork.load(rg) if references.use_rg else None
+            self.feasible = FeasibleMap.load(rg / "feasible.npz")
         self.settling = references.arms.settling
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
@@ -53,7 +56,7 @@ class ReferenceLayer:
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
         """References at the start of an episode, settled in the commanded posture.
 
-        command (n, 11), grasp (n, 2, 3) base grasp wrist positions in the heading frame [m]; arms (n, 14), support (n, 15).
+        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, 14), support (n, 15).
         """
         arms = np.tile(self.default_arms, (len(command), 1))
         support = self.support(arms, command)
@@ -80,11 +83,9 @@ class ReferenceLayer:
         pitch: Array = command[:, PITCH] - support[:, WAIST.stop - 1]
         return pitch
 
-    def pelvis_height(self, command: Array) -> Array:
-        """Pelvis height of the reference posture, (n,) [m]."""
-        if self.network is None:
-            return np.full(len(command), self.default_height)
-        return command[:, HEIGHT].copy()
+    def start_pitch(self, support: Array, command: Array) -> Array:
+        """Pelvis pitch in which an episode begins, (n,) [rad]: the default posture has its feet flat at zero."""
+        return np.zeros(len(command)) if self.network is None else self.pelvis_pitch(support, command)
 
     def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:
         """x_wrist = x_task_base + Δp (eq. 2), turned from the heading frame into the torso frame; (n, 2, 3) [m].

@@ -12,11 +12,13 @@ from iowbc.task.curriculum import Difficulty
 
 Array = NDArray[np.floating[Any]]
 
+
 def nominal_command(commands: Commands) -> Array:
     """Standing still in the nominal posture, (11,)."""
     command = np.zeros(len(COMMAND))
     command[HEIGHT], command[PITCH] = commands.nominal_height, commands.nominal_pitch
     return command
+
 
 def draw_goals(commands: Commands, key: random.Keys, difficulty: Difficulty) -> Array:
     """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty."""
@@ -25,11 +27,13 @@ def draw_goals(commands: Commands, key: random.Keys, difficulty: Difficulty) -> 
     goals[:, 3:] = _posture(commands, key, difficulty.posture)
     return goals
 
+
 def draw_holding_time(commands: Commands, key: random.Keys) -> Array:
     """Time until the next goal, t ~ U(resampling), (n,) [s]."""
     low, high = commands.resampling
     held: Array = low + (high - low) * random.uniform(key, "command/time", 1)[:, 0]
     return held
+
 
 def _velocities(commands: Commands, key: random.Keys, difficulty: Difficulty) -> Array:
     """v_x, v_y, ω ~ U(range)·scale; a share stands, a share walks straight, short velocities are lengthened."""
@@ -43,6 +47,7 @@ def _velocities(commands: Commands, key: random.Keys, difficulty: Difficulty) ->
     walking_share = (1.0 - commands.standing_share) * np.minimum(difficulty.velocity, 1.0)
     moving: Array = velocity * (u[:, 4] < walking_share)[:, None]
     return moving
+
 
 def _posture(commands: Commands, key: random.Keys, scale: Array) -> Array:
     """H, α ~ U(range) and Δp = shared + single offsets, drawn in towards the nominal posture by `scale`; (n, 8)."""
@@ -58,6 +63,7 @@ def _posture(commands: Commands, key: random.Keys, scale: Array) -> Array:
     away[:, :2] += nominal
     return away
 
+
 def interpolate(times: Array, values: Array, now: Array) -> Array:
     """Scripted commands at a time: knots (n, k) [s] and (n, k, 11), now (n,) [s]; held after the last knot. (n, 11)."""
     rows = np.arange(len(now))
@@ -67,5 +73,3 @@ def interpolate(times: Array, values: Array, now: Array) -> Array:
     part = np.clip((now - start) / span, 0.0, 1.0)[:, None]
     between: Array = values[rows, after - 1] * (1.0 - part) + values[rows, after] * part
     return between
-
-__all__ = ["OFFSET", "draw_goals", "draw_holding_time", "interpolate", "nominal_command"]

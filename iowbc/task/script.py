@@ -71,5 +71,8 @@ class CommandScript:
     def from_json(cls, segments: Sequence[Mapping[str, Any]]) -> "CommandScript":
         """Inverse of `as_json`."""
         return cls(
-            tuple(CommandSegment(float(s["duration"]), tuple(map(float, s["command"])), float(s["ramp"])) for s in segments)
+            tuple(
+                CommandSegment(float(s["duration"]), tuple(map(float, s["command"])), float(s["ramp"]))
+                for s in segments
+            )
         )

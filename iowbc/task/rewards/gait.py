@@ -18,7 +18,7 @@ def contact_timing(contact: Mask, expected: Mask) -> Array:
 
 
 def swing_height(sole_height: Array, progress: Array, swinging: Mask, clearance: float, width: float) -> Array:
-    """Σ over swinging feet of exp(−(z − clearance·sin(π s))²/width²), (n,); sole height z (n, 2) [m], swing progress s (n, 2)."""
+    """Σ over swinging feet of exp(−(z − clearance·sin(π s))²/width²), (n,); sole height z [m], progress s, (n, 2)."""
     profile = clearance * np.sin(np.pi * progress)
     score: Array = (np.exp(-np.square((sole_height - profile) / width)) * swinging).sum(axis=1)
     return score

@@ -85,8 +85,18 @@ class Scored:
     tracking: Array
     """Mean of the tracking scores, between 0 and 1, (n,)."""
 
+    def without(self, which: Mask) -> "Scored":
+        """The same with nothing for some environments, (n,): what they did cannot be judged."""
+        if not which.any():
+            return self
+        kept = ~which
+        terms = np.where(kept[:, None], self.terms, 0.0)
+        return Scored(reward=np.where(kept, self.reward, 0.0), terms=terms, tracking=np.where(kept, self.tracking, 0.0))
 
-def score(reward: Reward, support: NDArray[np.intp], state: SimulationState, motion: Motion, step: Step, dt: float) -> Scored:
+
+def score(
+    reward: Reward, support: NDArray[np.intp], state: SimulationState, motion: Motion, step: Step, dt: float
+) -> Scored:
     """Reward of one control step of `dt` [s]; `support`: indices of the support joints."""
     r_sync, r_object, r_smooth, r_gait = reward.sync, reward.object, reward.smooth, reward.gait
     scores = {
@@ -97,7 +107,7 @@ def score(reward: Reward, support: NDArray[np.intp], state: SimulationState, mot
             step.filtered_velocity, step.command[:, :2], r_sync.system_velocity.width
         ),
         "yaw_rate": sync.yaw_rate(step.filtered_yaw_rate, step.command[:, 2], r_sync.yaw_rate.width),
-        "height": sync.height(motion.pelvis_height, step.command[:, HEIGHT], r_sync.height.width),
+        "height": sync.height(motion.height, step.command[:, HEIGHT], r_sync.height.width),
         "torso_pitch": sync.torso_pitch(motion.torso_pitch, step.command[:, PITCH], r_sync.torso_pitch.width),
     }
     swing = r_gait.swing_height

@@ -1,0 +1,72 @@
+"""Where commands come from: drawn goals in training, scripts in trials; rate-limited, clamped to what is feasible."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.commands import Commands
+from iowbc.sim import random
+from iowbc.task.command import COMMAND, VELOCITY, approach, rate_limits
+from iowbc.task.curriculum import Difficulty
+from iowbc.task.memory import Memory
+from iowbc.task.references import ReferenceLayer
+from iowbc.task.sampling import draw_goals, draw_holding_time, interpolate
+from iowbc.task.script import CommandScript
+
+Array = NDArray[np.floating[Any]]
+Indices = NDArray[np.intp]
+
+
+class Commander:
+    """Sets goal and command of n environments, in their memory."""
+
+    def __init__(
+        self, commands: Commands, references: ReferenceLayer, scripts: Sequence[CommandScript | None], period: float
+    ) -> None:
+        self._commands, self._references, self._period = commands, references, period
+        self._largest_step = rate_limits(commands.rates) * period
+        self.scripted = np.array([script is not None for script in scripts])
+        self._times, self._values = _knots(scripts)
+
+    def start(self, which: Indices, memory: Memory, key: random.Keys, difficulty: Difficulty) -> None:
+        """First goals of new episodes; `key`, `difficulty` (k,). A drawn episode starts in its posture, standing."""
+        memory.draws[which] = 0
+        self._draw(which, memory, key, difficulty)
+        command = memory.goal[which]
+        command[:, VELOCITY] = 0.0
+        scripted = self.scripted[which]
+        if scripted.any():
+            memory.goal[which[scripted]] = self._scripted(memory)[which[scripted]]
+            command[scripted] = memory.goal[which[scripted]]
+        memory.command[which] = self._references.clamp(command)
+
+    def advance(self, memory: Memory, key: random.Keys, difficulty: Difficulty) -> None:
+        """Goals and commands of the next control step; `key` of the episodes, (n,)."""
+        due = np.flatnonzero((memory.steps >= memory.goal_until) & ~self.scripted)
+        if len(due):
+            chosen = Difficulty(**{name: values[due] for name, values in vars(difficulty).items()})
+            self._draw(due, memory, key[due], chosen)
+        if self.scripted.any():
+            memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
+        memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
+
+    def _draw(self, which: Indices, memory: Memory, key: random.Keys, difficulty: Difficulty) -> None:
+        drawn = random.absorb(key, memory.draws[which])
+        memory.goal[which] = draw_goals(self._commands, drawn, difficulty)
+        held = draw_holding_time(self._commands, drawn)
+        memory.goal_until[which] = memory.steps[which] + np.ceil(held / self._period).astype(np.int64)
+        memory.draws[which] += 1
+
+    def _scripted(self, memory: Memory) -> Array:
+        return interpolate(self._times, self._values, memory.steps * self._period)
+
+
+def _knots(scripts: Sequence[CommandScript | None]) -> tuple[Array, Array]:
+    """Knots of all scripts, padded with their last one: times (n, k) [s] and commands (n, k, 11)."""
+    knots = [script.knots() if script is not None else (np.zeros(2), np.zeros((2, len(COMMAND)))) for script in scripts]
+    longest = max(len(times) for times, _ in knots)
+    times = np.stack([np.pad(t, (0, longest - len(t)), mode="edge") for t, _ in knots])
+    values = np.stack([np.pad(v, ((0, longest - len(v)), (0, 0)), mode="edge") for _, v in knots])
+    return times, values
