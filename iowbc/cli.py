@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from iowbc.pipeline.layout import Runs
+    from iowbc.pipeline.store import Store
 
 app = typer.Typer(
     help="Train, test and export a whole-body controller of a humanoid robot that carries and pushes heavy objects.",
@@ -16,6 +19,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"max_content_width": 120},
 )
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe, a YAML file.", metavar="RECIPE")]
@@ -32,6 +36,10 @@ Force = Annotated[list[str] | None, typer.Option(help="Make this stage anew; rep
 Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
 OnCodeChange = Annotated[
     Literal["report", "rerun"], typer.Option(help="What to do about a cached stage whose code has changed since.")
+]
+
+Named = Annotated[
+    str, typer.Argument(help="Recipe (name or file), RECIPE/STAGE, or first characters of a key.", metavar="WHAT")
 ]
 
 
@@ -73,8 +81,6 @@ def _run_or_plan(
     runs: Path | None,
     only_plan: bool,
 ) -> None:
-    from rich.console import Console
-
     from iowbc.pipeline import session
     from iowbc.pipeline.planning import Options
     from iowbc.stages import registry
@@ -82,7 +88,151 @@ def _run_or_plan(
     options = Options(until, frozenset(force or ()), on_code_change, workers)
     request = session.Request(recipe, tuple(overrides or ()), _runs(runs), options)
     act = session.plan if only_plan else session.run
-    raise typer.Exit(act(request, registry.STAGES, Console()))
+    raise typer.Exit(act(request, registry.STAGES, _console()))
+
+
+@app.command()
+def status(runs: RunsFolder = None) -> None:
+    """Show what runs, what was left unfinished, and what each recipe has."""
+    from iowbc.pipeline.listing import print_status
+
+    print_status(_store(runs), _console())
+
+
+@app.command("ls")
+def list_(
+    stage: Annotated[str | None, typer.Argument(help="Only artifacts of this stage.")] = None,
+    runs: RunsFolder = None,
+) -> None:
+    """List the stored artifacts."""
+    from iowbc.pipeline.listing import list_artifacts
+
+    list_artifacts(_store(runs), _console(), stage)
+
+
+@app.command()
+def show(what: Named, runs: RunsFolder = None) -> None:
+    """Show an artifact in detail, or the stages and metrics of a recipe."""
+    from iowbc.pipeline.listing import show as print_artifact
+
+    print_artifact(_store(runs), _console(), what)
+
+
+@app.command()
+def diff(first: Named, second: Named, runs: RunsFolder = None) -> None:
+    """Show how two recipes or artifacts differ: recipe, keys, versions, code, metrics."""
+    from iowbc.pipeline.differences import diff as print_differences
+
+    print_differences(_store(runs), _console(), first, second)
+
+
+@app.command()
+def compare(
+    recipes: Annotated[list[str], typer.Argument(help="Recipes that have run, two or more.", metavar="RECIPE...")],
+    output: Annotated[Path | None, typer.Option(help="Folder to write to; runs/compare.")] = None,
+    runs: RunsFolder = None,
+) -> None:
+    """Write tables and figures over several runs."""
+    from iowbc.pipeline.comparing import compare as write_comparison
+
+    store = _store(runs)
+    write_comparison(store, _console(), recipes, output or store.runs.root / "compare")
+
+
+@app.command()
+def gc(
+    unused: Annotated[bool, typer.Option("--unused", help="Artifacts that no recipe used last.")] = False,
+    recipe: Annotated[
+        list[str] | None, typer.Option(help="This recipe's record, and artifacts that only it used last.")
+    ] = None,
+    work: Annotated[bool, typer.Option("--work", help="Checkpoints of stages that did not finish.")] = False,
+    damaged: Annotated[bool, typer.Option("--damaged", help="Artifacts that were set aside as damaged.")] = False,
+    older_than: Annotated[float, typer.Option(help="Only what is older than this.", min=0.0, metavar="DAYS")] = 0.0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list what would be removed.")] = False,
+    runs: RunsFolder = None,
+) -> None:
+    """Remove artifacts and checkpoints; refuses without a scope."""
+    from iowbc.pipeline.collecting import Scope, collect
+
+    scope = Scope(unused, tuple(recipe or ()), work, damaged, older_than)
+    collect(_store(runs), _console(), scope, dry_run)
+
+
+@app.command()
+def play(
+    what: Annotated[str, typer.Argument(help="Recipe, RECIPE/STAGE, key, or the folder of an export.", metavar="WHAT")],
+    stage: Annotated[str | None, typer.Option(help="export, distill or teacher; the last one there is.")] = None,
+    scene: Annotated[str, typer.Option(help="Scene of the recipe.")] = "lift",
+    mass: Annotated[float, typer.Option(help="Mass of the object [kg]; 0 for none.", min=0.0)] = 4.0,
+    partner_share: Annotated[
+        float, typer.Option(help="Part of the weight that a partner bears.", min=0.0, max=1.0)
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses, pushes and noise.")] = False,
+    video: Annotated[Path | None, typer.Option(help="Make a film instead of opening a window.", metavar="MP4")] = None,
+    runs: RunsFolder = None,
+) -> None:
+    """Watch a trained policy in the viewer, or make a film of it."""
+    from iowbc.pipeline.playable import play_word
+
+    raise typer.Exit(
+        play_word(
+            _store(runs),
+            _console(),
+            what,
+            stage,
+            video=video,
+            scene=scene,
+            mass=mass,
+            partner_share=partner_share,
+            seed=seed,
+            disturbances=disturbances,
+        )
+    )
+
+
+@app.command()
+def ui(
+    port: Annotated[int, typer.Option(help="Port on this machine.", min=1, max=65535)] = 5000, runs: RunsFolder = None
+) -> None:
+    """Open MLflow's web interface on the runs, for this machine alone."""
+    from iowbc.pipeline.interface import serve
+
+    raise typer.Exit(serve(_runs(runs), _console(), port))
+
+
+@app.command()
+def schema(output: Annotated[Path | None, typer.Option(help="File to write to, instead of printing.")] = None) -> None:
+    """Write the JSON Schema of recipes, for editors."""
+    import json
+
+    from iowbc.recipe.schema import recipe_schema
+
+    text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None:
+        typer.echo(text, nl=False)
+    else:
+        output.write_text(text, encoding="utf-8")
+
+
+@app.command()
+def doctor(runs: RunsFolder = None) -> None:
+    """Check versions, binaries, rendering, cores, memory and disk."""
+    from iowbc.pipeline.doctor import examine
+
+    raise typer.Exit(examine(_runs(runs), _console()))
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    return Console()
+
+
+def _store(folder: Path | None) -> "Store":
+    from iowbc.pipeline.store import Store
+
+    return Store(_runs(folder))
 
 
 def _runs(folder: Path | None) -> "Runs":

@@ -107,7 +107,9 @@ class Planner:
             "robot": self.robot_digest,
         }
         if unknown:
-            reasons = [*self._differences(ingredients, former), *(f"{name} is made anew" for name in unknown)]
+            reasons = self._differences(ingredients, former)
+            if former is not None:
+                reasons += [f"{name} is made anew" for name in unknown]
             return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
         key = data_digest(ingredients)
         damage = ""

@@ -58,9 +58,22 @@ def main(root: Path) -> int:
 
 @contextlib.contextmanager
 def sole_sender(runs: Runs) -> Iterator[None]:
-    """Wait until no other process sends the journals of this folder, or sets up its database."""
+    """Wait until no other process sends the journals of this folder."""
+    with _locked(runs, "sender.lock"):
+        yield
+
+
+@contextlib.contextmanager
+def set_up(runs: Runs) -> Iterator[None]:
+    """Wait until no other process sets up the database or an experiment: MLflow's own set-up is not safe for two."""
+    with _locked(runs, "setup.lock"):
+        yield
+
+
+@contextlib.contextmanager
+def _locked(runs: Runs, name: str) -> Iterator[None]:
     runs.tracking.mkdir(parents=True, exist_ok=True)
-    with (runs.tracking / "sender.lock").open("a") as lock:
+    with (runs.tracking / name).open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
@@ -87,7 +100,8 @@ class _Delivery:
         self.offset, self.ids = sent(path)
         first = header(path)
         self.client = client(str(first["uri"]))
-        self.experiment = experiment(self.client, str(first["experiment"]), runs)
+        with set_up(runs):
+            self.experiment = experiment(self.client, str(first["experiment"]), runs)
 
     def send(self) -> None:
         """Send event by event; neighbouring metrics of a run go in one call."""

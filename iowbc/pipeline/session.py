@@ -104,7 +104,8 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console) -> in
             closing = "\n".join(filter(None, (str(error), f"interrupted; to go on: {_rest(request, runner)}")))
         finally:
             if tracker is not None:
-                delivered = tracker.close(status, wait=bool(runner.made) and not stop())
+                wait = bool(runner.made) and not stop()
+                delivered = tracker.close(status, wait) or not wait
     if code == DONE:
         print_results(artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):

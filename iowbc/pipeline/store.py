@@ -72,6 +72,11 @@ class Artifact:
         return read_json(self.folder / INGREDIENTS) or {}
 
     @property
+    def size(self) -> int:
+        """Bytes of the stage's files."""
+        return sum(record.size for record in self.manifest.files.values())
+
+    @property
     def metrics(self) -> dict[str, float]:
         """The metrics of the stage's `summary.json`."""
         summary = read_json(self.folder / "summary.json")

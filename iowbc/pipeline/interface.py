@@ -1,0 +1,30 @@
+"""`iowbc ui`: MLflow's web interface on the runs of this folder, for this machine alone."""
+
+import os
+import subprocess
+import sys
+
+from rich.console import Console
+
+from iowbc.pipeline.layout import Runs
+from iowbc.pipeline.sender import client, set_up
+
+HOST = "127.0.0.1"
+
+
+def serve(runs: Runs, console: Console, port: int) -> int:
+    """Serve until interrupted; returns the server's exit code."""
+    runs.root.mkdir(parents=True, exist_ok=True)
+    uri = f"sqlite:///{runs.database.absolute()}"
+    with set_up(runs):
+        client(uri).search_experiments(max_results=1)
+    console.print(f"MLflow on http://{HOST}:{port} in about a quarter of a minute; Ctrl-C ends it", highlight=False)
+    command = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(port), "--workers", "1"]
+    command += ["--backend-store-uri", uri, "--default-artifact-root", runs.tracked_files.absolute().as_uri()]
+    environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
+    with subprocess.Popen(command, env=environment) as server:
+        try:
+            return server.wait()
+        except KeyboardInterrupt:
+            server.wait()
+            return 0

@@ -1,0 +1,77 @@
+"""What `iowbc play` plays: a recipe's policy, one artifact, or an exported folder."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+from rich.console import Console
+
+from iowbc.pipeline.naming import named
+from iowbc.pipeline.store import RECIPE, Artifact, Store
+from iowbc.recipe.problems import UsageError
+
+if TYPE_CHECKING:
+    from iowbc.evaluation.playing import Source
+
+POLICIES = ("export", "distill", "teacher")
+"""Stages that leave a policy, the one to prefer first."""
+CONTRACT = "contract.json"
+"""Every exported folder has one."""
+
+
+def play_word(
+    store: Store, console: Console, word: str, stage: str | None, *, video: Path | None, **settings: Any
+) -> int:
+    """Play what a word names; `settings` are those of `iowbc.evaluation.playing.play`. Returns the exit code."""
+    from iowbc.deploy.contract import ContractBroken
+    from iowbc.evaluation.playing import NoDisplay, play
+    from iowbc.evaluation.rollout import Stopped
+    from iowbc.sim.headless import NoRenderer
+
+    try:
+        result = play(playable(store, word, stage), video=video, **settings)
+    except (NoDisplay, NoRenderer, ContractBroken) as error:
+        raise UsageError(str(error)) from error
+    except Stopped as stopped:
+        console.print(str(stopped), markup=False, highlight=False)
+        return 0
+    made = f"; {video} has {result['frames']} pictures" if video else ""
+    text = f"{result['end']} after {result['seconds']:.1f} of {result['duration']:.1f} s{made}"
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    return 0
+
+
+def playable(store: Store, word: str, stage: str | None) -> "Source":
+    """The policy that a word and `--stage` name. Raises `UsageError`."""
+    from iowbc.evaluation.playing import exported_source
+
+    if (Path(word) / CONTRACT).is_file():
+        return exported_source(Path(word))
+    found = named(store, word)
+    ready = [name for name in POLICIES if name in found.artifacts]
+    if not ready or (stage is not None and stage not in ready):
+        raise UsageError(
+            f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
+            f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found.artifacts) or 'none'}"
+        )
+    return _source(store, found.artifacts[stage or ready[0]])
+
+
+def _source(store: Store, artifact: Artifact) -> "Source":
+    """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
+    from iowbc.evaluation.playing import Source, exported_source
+    from iowbc.recipe.recipe import Recipe
+    from iowbc.robot.description import robot_folder
+
+    if artifact.manifest.stage == "export":
+        return exported_source(artifact.folder)
+    recipe = Recipe.model_validate(yaml.safe_load((artifact.folder / RECIPE).read_text(encoding="utf-8")))
+    digest = artifact.ingredients.get("inputs", {}).get("rg-fit")
+    generator = next((found for found in store.artifacts("rg-fit") if found.manifest.digest == digest), None)
+    if digest is not None and generator is None:
+        raise UsageError(
+            f"the reference generator (content {digest[:12]}) that {artifact.manifest.stage} "
+            f"{artifact.manifest.key[:12]} was trained on is no longer stored; run its recipe again"
+        )
+    folder = robot_folder(recipe.robot)
+    return Source(recipe, folder, generator.folder if generator is not None else None, artifact.folder)
