@@ -79,6 +79,10 @@ class Scenes(Section):
     """No object."""
     lift: Scene = Scene(kind="lift", object=Object(shape="box", size=(0.30, 0.25, 0.30), mass=7.0))
     """A cardboard box, 7 kg (paper IV-A)."""
+    squeeze: Scene = Scene(
+        kind="lift", object=Object(shape="box", size=(0.30, 0.25, 0.30), mass=7.0), grasp=Grasp(kind="contact")
+    )
+    """The same box, held between the palms by friction alone; its width is fitted to the distance of the hands."""
     tyre: Scene = Scene(kind="lift", object=Object(shape="tyre", size=(0.18, 0.56, 0.56), mass=18.0))
     """A rubber tyre, 18 kg (paper IV-A)."""
     push: Scene = Scene(

@@ -143,9 +143,8 @@ def test_hands_slip_at_the_slip_force_and_not_below(start, calm, hold_base, monk
 
 def test_squeezed_box_is_held_up_to_what_friction_bears(start, calm, hold_base):
     hold_base()
-    recipe = changed(calm, "scenes.lift.grasp.kind", "contact")
     masses = np.array([2.0, 7.0, 16.0])
-    simulation = start(recipe, ["lift"] * 3, object_mass=masses, surface_friction=1.0)
+    simulation = start(calm, ["squeeze"] * 3, object_mass=masses, surface_friction=1.0)
     run(simulation, 60)
     height = simulation.state.object_position[:, 2].copy()
     run(simulation, 100)
@@ -209,7 +208,7 @@ def test_state_after_a_step_is_that_of_the_new_position_and_velocity(start):
 
 def test_forces_on_feet_and_hands_are_the_contact_forces(start, calm, hold_base):
     hold_base(vertical_free=True)
-    simulation = start(changed(calm, "scenes.lift.grasp.kind", "contact"), ["lift"], object_mass=3.0)
+    simulation = start(calm, ["squeeze"], object_mass=3.0)
     run(simulation, 80)
     model, data = simulation.physics_model(0)
     mujoco.mj_forward(model, data)

@@ -151,7 +151,7 @@ def test_mujoco_writes_no_log_file(start, tmp_path, monkeypatch):
 
 
 def test_unknown_scene_names_the_known_ones(robot):
-    with pytest.raises(KeyError, match="no scene 'climb'; there are: free, lift, tyre, push"):
+    with pytest.raises(KeyError, match="no scene 'climb'; there are: free, lift, squeeze, tyre, push"):
         Simulation(robot, Recipe(), envs=np.arange(1), seed=0, scenes=["climb"])
 
 
