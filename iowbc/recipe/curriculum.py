@@ -11,7 +11,7 @@ class Phase(Section):
     """How hard the world is at the end of a phase; between two phases the values are interpolated."""
 
     velocity: float = Field(ge=0.0)
-    """Factor on the range of velocity and yaw rate commands; 0 stands still, above 1 asks for more than the recipe's range."""
+    """Factor on the range of velocity and yaw rate commands; 0 stands still, above 1 goes beyond the recipe's range."""
     posture: float = Field(ge=0.0, le=1.0)
     """Part of the range of height, pitch and wrist offsets that is used, around the nominal posture."""
     load: float = Field(ge=0.0)

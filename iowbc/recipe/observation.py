@@ -7,4 +7,4 @@ class Observation(Section):
     """What the policy sees beside the privileged quantities."""
 
     observe_object: bool = True
-    """Whether s_t contains the object's pose and rates in the base frame (eq. 5); without, it is proprioception alone."""
+    """Whether s_t contains the object's pose and rates in the base frame (eq. 5); otherwise proprioception alone."""

@@ -10,12 +10,14 @@ Vector = tuple[float, float, float]
 
 
 class Grasps(Section):
-    """Base grasp of each scene: position of the left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
+    """Base grasp of each scene: left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
 
     free: Vector = (0.26, 0.16, 0.10)
     """Forearms before the body, as when carrying."""
     lift: Vector = (0.26, 0.16, 0.10)
     """Beside the object. Near the body, where shoulder and waist pitch hold most."""
+    squeeze: Vector = (0.26, 0.16, 0.10)
+    """As in `lift`."""
     tyre: Vector = (0.30, 0.27, 0.06)
     """At the widest place of the tyre."""
     push: Vector = (0.30, 0.16, 0.20)
@@ -66,5 +68,7 @@ class References(Section):
     def _wrists_apart(self) -> Self:
         for name, grasp in self.grasps:
             if grasp[1] <= 0.0:
-                raise ValueError(f"grasps.{name}: the left wrist's y is {grasp[1]}, it must be positive (left of the body)")
+                raise ValueError(
+                    f"grasps.{name}: the left wrist's y is {grasp[1]}, it must be positive (left of the body)"
+                )
         return self

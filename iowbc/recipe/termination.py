@@ -11,7 +11,7 @@ class Termination(Section):
     pelvis_height: float = Field(default=0.3, ge=0.0)
     """Pelvis below this is a fall [m]."""
     pelvis_tilt: float = Field(default=1.3, gt=0.0)
-    """Pelvis turned further than this from upright is a fall [rad]; wide, because deep torso pitch tilts the pelvis too."""
+    """Pelvis further than this from upright is a fall [rad]; wide, because deep torso pitch tilts the pelvis too."""
     torso_roll: float = Field(default=0.8, gt=0.0)
     """Torso rolled further than this is a fall [rad]."""
     torso_pitch_error: float = Field(default=0.9, gt=0.0)
