@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from iowbc.evaluation.metrics import trial_metrics
 from iowbc.evaluation.rollout import Acting, Played, play_episodes
@@ -71,7 +72,8 @@ class Protocol:
                 interrupted=self.interrupted,
                 progress=lambda seconds: self.progress(self.done, self.total, f"{name}, {seconds:.0f} s"),
             )
-            table = pd.DataFrame([trial_row(self.recipe, t, p) for t, p in zip(trials, played, strict=True)])
+            rows = [trial_row(self.recipe, t, p) for t, p in zip(trials, played, strict=True)]
+            table = pd.DataFrame(rows).assign(batch_size=len(rows), batch_row=range(len(rows)))
             unfinished = path.with_suffix(".part")
             table.to_parquet(unfinished, index=False)
             unfinished.rename(path)
@@ -126,6 +128,28 @@ def ending(played: Played) -> str:
 def replayed(row: "pd.Series[Any]") -> Episode:
     """The episode of a row of the long table, to be played again."""
     return Episode.from_json(json.loads(row["episode"]))
+
+
+class InBatch:
+    """A policy for one environment that computes in the shape of the batch in which a trial was played, at its place.
+
+    Matrix products round differently for other shapes; with this, a trial that is played again is the same bit for bit.
+    """
+
+    def __init__(self, policy: Acting, row: "pd.Series[Any]") -> None:
+        """`row`: the trial's row of the long table."""
+        self.policy, self.size, self.place = policy, int(row["batch_size"]), int(row["batch_row"])
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        self.policy.reset(np.full(self.size, which[0]))
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        rows = (
+            np.zeros((self.size, observation.shape[1]), np.float32),
+            np.zeros((self.size, privileged.shape[1]), np.float32),
+        )
+        rows[0][self.place], rows[1][self.place] = observation[0], privileged[0]
+        return self.policy.act(*rows)[self.place : self.place + 1]
 
 
 def _plain(values: np.ndarray[Any, np.dtype[np.float64]]) -> float | list[float]:

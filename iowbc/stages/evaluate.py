@@ -31,7 +31,7 @@ def run(job: Job) -> None:
     from iowbc.learning.acting import load_policy
     from iowbc.sim.headless import NoRenderer
 
-    torch.set_num_threads(max(job.workers, 1))  # policy and workers take turns on the same cores
+    torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe, rg = job.recipe, job.inputs.get("rg-fit")
     policy = load_policy(job.inputs[acting_stage(recipe)])
     protocol = Protocol(

@@ -1,0 +1,212 @@
+"""The stage `eval` from a policy on disk to its tables, figures and film."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from iowbc.evaluation.aggregate import COSTS
+from iowbc.evaluation.metrics import ERRORS
+from iowbc.evaluation.protocol import InBatch, Protocol, replayed
+from iowbc.evaluation.rollout import play_episodes
+from iowbc.learning.acting import load_policy
+from iowbc.learning.networks import StudentNetwork, TeacherNetwork
+from iowbc.learning.storage import save_network
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import robot_folder
+from iowbc.stages import evaluate
+from iowbc.stages.contract import Interrupted, Job
+from iowbc.task.batch import full_layout
+
+QUESTION = {
+    "name": "test",
+    "task": {"references": {"use_rg": False}},
+    "eval": {
+        "trials": 2,
+        "label": "w/o RG",
+        "sequence": [{"duration": 0.3, "ramp": 0.0}, {"duration": 0.1, "velocity": [0.3, 0, 0], "ramp": 0.1}],
+        "lifting": {"masses": [0, 4]},
+        "pushing": {"scene": "push", "masses": [20], "rolling_resistance": 0.05},
+        "heavy": [{"name": "18 kg tyre", "scene": "tyre", "mass": 18.0}],
+        "video": {"count": 1, "width": 96, "height": 64, "fps": 10, "duration": 1.0},
+    },
+}
+
+
+class Quiet:
+    """A report that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.values: dict[str, float] = {}
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        self.values |= values
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        assert 0 <= done <= total
+
+    def say(self, text: str) -> None:
+        self.lines.append(text)
+
+
+@pytest.fixture(scope="session")
+def recipe() -> Recipe:
+    return Recipe.model_validate(QUESTION)
+
+
+@pytest.fixture(scope="session")
+def student(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An untrained student: enough to fall over with."""
+    folder = tmp_path_factory.mktemp("student")
+    torch.manual_seed(0)
+    architecture = {
+        "observation": full_layout(recipe).state.size,
+        "history": 25,
+        "actions": 15,
+        "frame_features": 4,
+        "latent": 4,
+        "hidden": [8],
+        "activation": "elu",
+        "clip": 10.0,
+    }
+    save_network(StudentNetwork(**architecture), architecture, folder, "student", {})
+    return folder
+
+
+def job(recipe: Recipe, student: Path, folder: Path) -> Job:
+    for name in ("out", "work"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    return Job(
+        recipe=recipe,
+        key="k",
+        robot=robot_folder("g1"),
+        inputs={"distill": student, "teacher": student},
+        out=folder / "out",
+        work=folder / "work",
+        workers=1,
+        report=Quiet(),
+        interrupted=lambda: False,
+    )
+
+
+@pytest.fixture(scope="session")
+def done(recipe: Recipe, student: Path, tmp_path_factory: pytest.TempPathFactory) -> Job:
+    finished = job(recipe, student, tmp_path_factory.mktemp("eval"))
+    evaluate.run(finished)
+    return finished
+
+
+def test_every_trial_is_in_the_table_with_all_that_was_drawn(done: Job) -> None:
+    trials = pd.read_parquet(done.out / "trials.parquet")
+    assert list(zip(trials["suite"], trials["mass"], strict=True)) == [
+        *[("lifting", 0.0)] * 2,
+        *[("lifting", 4.0)] * 2,
+        *[("pushing", 20.0)] * 2,
+        *[("heavy", 18.0)] * 2,
+    ]
+    assert set(trials["variant"]) == {"w/o RG"}
+    assert trials[list(ERRORS)].notna().all().all()
+    assert trials[list(COSTS)].notna().all().all()
+    held = trials[trials["mass"] > 0]
+    assert np.array_equal(held["drawn_object_mass"], held["mass"])
+    assert set(trials["drawn_push_scale"]) == {0.0}
+    assert len(trials["drawn_kp_scale"].iloc[0]) == 29
+    pushed = trials[trials["suite"] == "pushing"]
+    assert set(pushed["drawn_object_ground_friction"]) == {0.05}
+
+
+def test_trials_of_one_number_meet_the_same_world_at_every_mass(done: Job) -> None:
+    trials = pd.read_parquet(done.out / "trials.parquet")
+    friction = trials.pivot_table(index="trial", columns=["suite", "mass"], values="drawn_ground_friction")
+    assert (friction.nunique(axis=1) == 1).all()
+    assert friction.iloc[0, 0] != friction.iloc[1, 0]
+
+
+def test_tables_figures_film_and_summary_are_left(done: Job) -> None:
+    names = {str(path.relative_to(done.out)) for path in done.out.rglob("*.*")}
+    assert {"tables/lifting.md", "tables/pushing.tex", "tables/heavy.csv", "figures/comparison.png"} <= names
+    assert "w/o RG" in (done.out / "tables" / "lifting.md").read_text()
+    summary = json.loads((done.out / "summary.json").read_text())["metrics"]
+    assert summary["trials"] == 8
+    assert 0 <= summary["lifting/4kg/success"] <= 1
+    assert any("survived" in line for line in done.report.lines)  # type: ignore[attr-defined]
+
+
+def test_the_film_shows_the_trial(done: Job) -> None:
+    (path,) = (done.out / "videos").iterdir()
+    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert 1 <= count <= 5
+    assert seconds == pytest.approx(count / 10, abs=0.11)
+    reader = imageio_ffmpeg.read_frames(str(path), pix_fmt="rgb24")
+    assert next(reader)["size"] == (96, 64)
+    picture = np.frombuffer(next(reader), np.uint8)
+    reader.close()
+    assert picture.std() > 10, "not a blank picture"
+
+
+def test_a_row_is_played_again_bit_for_bit(done: Job, recipe: Recipe, student: Path) -> None:
+    row = pd.read_parquet(done.out / "trials.parquet").iloc[2]
+    policy = InBatch(load_policy(student), row)
+    (again,) = play_episodes(recipe, done.robot, None, [replayed(row)], policy, workers=0)
+    assert again.seconds == row["seconds"]
+    assert again.trace.base_position.shape[0] * again.trace.dt == pytest.approx(row["seconds"])
+    assert float(np.sum(again.trace.power) * again.trace.dt) == row["energy"]
+
+
+def test_the_number_of_workers_changes_nothing(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
+    policy = load_policy(student)
+    protocol = Protocol(recipe, done.robot, None, policy, work=tmp_path, workers=0)
+    pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
+
+
+def test_finished_batches_are_not_played_again(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
+    stopping = job(recipe, student, tmp_path)
+    (stopping.work / "trials-lifting.parquet").write_bytes((done.work / "trials-lifting.parquet").read_bytes())
+    asked: list[bool] = []
+    stopping = replace(stopping, interrupted=lambda: bool(asked.append(True)) or len(asked) > 1)
+    with pytest.raises(Interrupted, match="finished batches are kept"):
+        evaluate.run(stopping)
+    assert {path.name for path in stopping.work.iterdir()} <= {"trials-lifting.parquet", "trials-pushing.parquet"}
+    assert not (stopping.out / "trials.parquet").exists()
+
+
+def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None:
+    question = {
+        "name": "test",
+        "task": {"references": {"use_rg": False}},
+        "eval": {
+            "policy": "teacher",
+            "trials": 1,
+            "sequence": [{"duration": 0.1, "ramp": 0.0}],
+            "lifting": {"masses": [2]},
+            "video": {"count": 0},
+        },
+    }
+    recipe = Recipe.model_validate(question)
+    assert evaluate.STAGE.reads(recipe) == ("teacher",)
+    architecture = {"inputs": full_layout(recipe).size, "actions": 15, "hidden": [8], "activation": "elu", "clip": 10.0}
+    save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
+    finished = job(recipe, tmp_path, tmp_path / "job")
+    evaluate.run(finished)
+    assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"]
+
+
+def test_a_sweep_goes_on_while_something_survives(recipe: Recipe, student: Path, tmp_path: Path) -> None:
+    asked = {
+        **QUESTION["eval"],  # type: ignore[dict-item]
+        "lifting": {"masses": [1], "beyond": {"step": 1, "limit": 3}},
+        "pushing": None,
+        "heavy": [],
+        "trials": 1,
+        "sequence": [{"duration": 0.04, "ramp": 0.0}],
+    }
+    longer = Recipe.model_validate({**QUESTION, "eval": asked})
+    protocol = Protocol(longer, robot_folder("g1"), None, load_policy(student), work=tmp_path, workers=0)
+    assert protocol.run()["mass"].tolist() == [1.0, 2.0, 3.0], "nobody falls in two control steps"
