@@ -29,11 +29,11 @@ class Interval(Section):
 class WristRegion(Section):
     """Where the wrists are put: a box for the left wrist; the right one is mirrored and moved by the asymmetry."""
 
-    x: Interval = Interval(low=0.10, high=0.48)
+    x: Interval = Interval(low=0.14, high=0.46)
     """Forward of the frame's origin [m]."""
-    y: Interval = Interval(low=0.04, high=0.34)
+    y: Interval = Interval(low=0.06, high=0.34)
     """To the left of the sagittal plane [m]; for the right wrist to the right."""
-    z: Interval = Interval(low=-0.15, high=0.45)
+    z: Interval = Interval(low=-0.15, high=0.40)
     """Above the frame's origin [m]."""
     asymmetry: NonNegative = 0.10
     """Largest shift of each coordinate between the left and the mirrored right wrist [m]."""
@@ -44,14 +44,14 @@ class WristRegion(Section):
 class Sampling(Section):
     """Which arm postures and base commands are labelled: a scrambled Sobol sequence with added boundary and nominal points."""
 
-    samples: int = Field(default=38000, ge=16, le=2_000_000)
-    """Points tried; about nine in ten get a label (the rest are out of the robot's reach)."""
+    samples: int = Field(default=60000, ge=16, le=2_000_000)
+    """Points tried; about six in ten get a label (three have arms in collision, one is out of the robot's reach)."""
     height: Interval = Interval(low=0.5, high=0.8)
     """Commanded height [m]."""
     pitch: Interval = Interval(low=-0.5, high=1.5)
     """Commanded torso pitch [rad], positive leaning forward."""
     roll: Interval | None = None
-    """Commanded torso roll [rad]; without it the torso does not roll and the network has no such input. The paper's range is ±0.7."""
+    """Commanded torso roll [rad], ±0.7 in the paper; without it the torso stays level and the network has no such input."""
     yaw: Interval | None = None
     """Commanded torso yaw against the feet [rad]; as for `roll`."""
     payload: Interval | None = None
@@ -220,6 +220,8 @@ class Fit(Section):
     """Widths of the hidden layers (paper's order of size), ELU."""
     held_out: Annotated[float, Field(gt=0, lt=1)] = 0.1
     """Share of the samples kept for the gates; a sample and its mirror image are on the same side."""
+    validation: Annotated[float, Field(gt=0, lt=1)] = 0.05
+    """Share kept for early stopping, apart from the gates'."""
     mirror: bool = True
     """Train on the left-right mirror image of each sample as well."""
     epochs: int = Field(default=150, ge=1)

@@ -1,110 +1,83 @@
-"""The feasible map: which pelvis heights the robot reaches at which torso pitch, and how commands are brought into it."""
+"""The region of (height, pitch) that the robot can hold, to which commands are clamped."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-FILE = "feasible.npz"
-
-
-class EmptyRegion(ValueError):
-    """No command of the map has a label."""
-
 
 @dataclass(frozen=True)
 class FeasibleMap:
-    """For each pitch of a grid an interval of heights; between the grid's pitches the bounds are interpolated."""
+    """For each torso pitch the heights between which every command has a support posture."""
 
     pitch: Array
-    """Pitches that have a feasible height, ascending, shape (columns,) [rad]."""
-    lowest: Array
-    highest: Array
-    """Bounds of the height at each of those pitches, shape (columns,) [m]."""
-    grid_height: Array
-    """All heights that were tried, shape (heights,) [m]."""
-    grid_pitch: Array
-    """All pitches that were tried, shape (pitches,) [rad]."""
-    kept: Array
-    """Whether a command is feasible, shape (heights, pitches)."""
-
-    @classmethod
-    def from_grid(cls, height: Array, pitch: Array, kept: Array) -> Self:
-        """The largest region of one height interval a pitch, over neighbouring pitches, inside `kept` (heights, pitches).
-
-        Raises EmptyRegion where nothing is kept.
-        """
-        columns = [_longest_run(column) for column in kept.T]
-        start, stop = _longest_run(np.array([last > first for first, last in columns]))
-        if stop == start:
-            raise EmptyRegion(
-                f"no command has a label: heights {height[0]:.3f} to {height[-1]:.3f} m, torso pitches {pitch[0]:.3f} "
-                f"to {pitch[-1]:.3f} rad"
-            )
-        chosen = columns[start:stop]
-        return cls(
-            pitch=pitch[start:stop],
-            lowest=np.array([height[first] for first, _ in chosen]),
-            highest=np.array([height[last - 1] for _, last in chosen]),
-            grid_height=height,
-            grid_pitch=pitch,
-            kept=kept,
-        )
+    """Pitches, rising, shape (p,) [rad]."""
+    low: Array
+    high: Array
+    """Least and greatest height at each pitch, shape (p,) [m]."""
 
     def clamp(self, height: Array, pitch: Array) -> tuple[Array, Array]:
-        """Heights [m] and pitches [rad], any equal shapes, brought into the map: first the pitch, then the height."""
-        pitch = np.clip(pitch, self.pitch[0], self.pitch[-1])
-        lowest, highest = np.interp(pitch, self.pitch, self.lowest), np.interp(pitch, self.pitch, self.highest)
-        return np.clip(height, lowest, highest), pitch
+        """The command brought into the region: first the pitch, then the height at that pitch; shapes (n,) [m], [rad]."""
+        kept = np.clip(pitch, self.pitch[0], self.pitch[-1])
+        low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
+        return np.clip(height, low, high), kept
 
-    def contains(self, height: Array, pitch: Array) -> Array:
-        """Which commands the map leaves as they are."""
-        kept_height, kept_pitch = self.clamp(height, pitch)
-        inside: Array = (kept_height == height) & (kept_pitch == pitch)
+    def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
+        """Whether commands are inside, shape (n,)."""
+        clamped_height, clamped_pitch = self.clamp(height, pitch)
+        inside: NDArray[np.bool_] = (clamped_height == height) & (clamped_pitch == pitch)
         return inside
 
     def save(self, path: Path) -> None:
-        """Writes the map as an npz."""
-        with path.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                pitch=self.pitch,
-                lowest=self.lowest,
-                highest=self.highest,
-                grid_height=self.grid_height,
-                grid_pitch=self.grid_pitch,
-                kept=self.kept,
-            )
+        """Writes plain arrays."""
+        np.savez(path, allow_pickle=False, pitch=self.pitch, low=self.low, high=self.high)
 
     @classmethod
-    def load(cls, path: Path) -> Self:
-        """Reads what `save` wrote. Raises FileNotFoundError, or ValueError where the file is damaged."""
-        if not path.is_file():
-            raise FileNotFoundError(f"{path}: no feasible map; run `iowbc run RECIPE --until rg-fit`")
-        names = ("pitch", "lowest", "highest", "grid_height", "grid_pitch", "kept")
+    def load(cls, path: Path) -> "FeasibleMap":
+        """Reads the map. Raises FileNotFoundError, or ValueError where it is damaged."""
         try:
-            with np.load(path, allow_pickle=False) as arrays:
-                loaded = cls(**{name: arrays[name] for name in names})
-        except Exception as error:
-            raise ValueError(f"{path}: not a feasible map ({error}); run `rg-dataset` again") from error
-        bounds = np.stack([loaded.pitch, loaded.lowest, loaded.highest])
-        if not np.isfinite(bounds).all() or bounds.shape[1] == 0 or (loaded.lowest > loaded.highest).any():
-            raise ValueError(f"{path}: the bounds of the feasible map are empty or not finite; run `rg-dataset` again")
-        return loaded
+            with np.load(path, allow_pickle=False) as stored:
+                arrays = [np.asarray(stored[name], dtype=np.float64) for name in ("pitch", "low", "high")]
+        except FileNotFoundError as error:
+            raise FileNotFoundError(f"{path}: no feasible map; run `iowbc run RECIPE --until rg-fit`") from error
+        except (ValueError, KeyError, EOFError, BadZipFile) as error:
+            raise ValueError(f"{path}: not a feasible map ({error}); make it anew with `--force rg-dataset`") from error
+        found = cls(*arrays)
+        shapes = {values.shape for values in arrays}
+        if len(shapes) != 1 or not all(np.isfinite(values).all() for values in arrays) or not len(found.pitch):
+            raise ValueError(f"{path}: not a feasible map; make it anew with `--force rg-dataset`")
+        if (np.diff(found.pitch) <= 0).any() or (found.low > found.high).any():
+            raise ValueError(f"{path}: pitches must rise and low not pass high; make it anew with `--force rg-dataset`")
+        return found
 
 
-def _longest_run(values: Array) -> tuple[int, int]:
-    """First and past-the-end index of the longest run of true values; (0, 0) where there is none."""
-    best, start = (0, 0), None
-    for index, value in enumerate([*values, False]):
-        if value and start is None:
-            start = index
-        elif not value and start is not None:
-            if index - start > best[1] - best[0]:
-                best = (start, index)
-            start = None
-    return best
+def build_map(pitches: Array, heights: Array, feasible: NDArray[np.bool_]) -> FeasibleMap:
+    """The map of a grid of decisions, shape (pitches, heights): the longest run of heights at each pitch, and the longest run of pitches.
+
+    Raises ValueError when no cell is feasible.
+    """
+    runs = [_longest_run(row) for row in feasible]
+    rows = _longest_run(np.array([run is not None for run in runs]))
+    if rows is None:
+        raise ValueError(
+            f"the feasible set is empty: none of {feasible.size} commands with heights {heights[0]:.2f} to {heights[-1]:.2f} m and "
+            f"pitches {pitches[0]:.2f} to {pitches[-1]:.2f} rad has a label; widen rg.sampling.height and rg.sampling.pitch"
+        )
+    chosen = [(pitches[i], heights[run[0]], heights[run[1]]) for i in range(rows[0], rows[1] + 1) if (run := runs[i])]
+    pitch, low, high = np.array(chosen).T
+    return FeasibleMap(pitch, low, high)
+
+
+def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:
+    """First and last place of the longest run of True."""
+    edges = np.diff(np.concatenate([[0], row.astype(np.int8), [0]]))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    if not len(starts):
+        return None
+    best = int(np.argmax(ends - starts))
+    return int(starts[best]), int(ends[best]) - 1

@@ -27,8 +27,9 @@ def build_model(robot: Robot) -> Any:
         )
     model.armature = np.concatenate([np.zeros(6), robot.armature])
     model.rotorInertia = np.zeros(model.nv)
-    model.effortLimit = np.concatenate([np.full(6, np.inf), robot.effort])
-    model.velocityLimit = np.concatenate([np.full(6, np.inf), robot.velocity_limit])
+    effort, velocity = (np.concatenate([np.full(6, np.inf), limit]) for limit in (robot.effort, robot.velocity_limit))
+    model.lowerEffortLimit, model.upperEffortLimit = -effort, effort
+    model.lowerVelocityLimit, model.upperVelocityLimit = -velocity, velocity
     model.lowerPositionLimit = np.concatenate([np.full(3, -BASE_RANGE), np.full(4, -1.01), robot.lower])
     model.upperPositionLimit = np.concatenate([np.full(3, BASE_RANGE), np.full(4, 1.01), robot.upper])
     return model

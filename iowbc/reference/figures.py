@@ -1,0 +1,158 @@
+"""Figures of the dataset and of the fitted network."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from iowbc.recipe.reference import FitGates
+from iowbc.reference.crosscheck import Check
+from iowbc.reference.dataset import Dataset
+from iowbc.reference.feasible_region import Region
+from iowbc.reference.sampling import SamplePlan
+from iowbc.reference.smoothness import Jumps
+from iowbc.reference.task_error import TaskErrors
+
+Array = NDArray[Any]
+
+DOTS = 140
+"""Resolution of the pictures [1/inch]."""
+INK, SOFT, WARM = "#1f3b57", "#8fb1cc", "#d1603d"
+BINS = 60
+
+
+def dataset_figures(
+    folder: Path,
+    plan: SamplePlan,
+    dataset: Dataset,
+    region: Region,
+    rejected: Mapping[str, int],
+    check: Check | None,
+) -> None:
+    """Feasible map, reasons of rejection, what the labels need, and the comparison with optimal control."""
+    _feasible_map(folder / "feasible_map.png", plan, region)
+    _rejections(folder / "rejections.png", len(dataset), rejected)
+    _physics(folder / "labels.png", plan, dataset)
+    if check is not None:
+        figure, (axes,) = _figure(1, 1, 5.0, 3.4)
+        _histogram(axes, check.difference, plan.recipe.crosscheck.p90_limit, "largest joint difference [rad]")
+        axes.set_title(f"static labels against optimal control, {check.count} samples")
+        _write(figure, folder / "crosscheck.png")
+
+
+def error_figures(
+    folder: Path,
+    labels: Array,
+    predicted: Array,
+    errors: TaskErrors,
+    jumps: Jumps,
+    gates: FitGates,
+    joints: Sequence[str],
+) -> None:
+    """Histograms of the held-out errors with their gates, and the error of each joint."""
+    figure, axes = _figure(2, 3, 11.0, 6.0)
+    per_sample = np.sqrt(((predicted - labels) ** 2).mean(axis=1))
+    _histogram(axes[0], per_sample, gates.joint_rmse, "joint RMSE of a sample [rad]")
+    _histogram(axes[1], 1e3 * np.abs(errors.height), _scaled(gates.height_p95, 1e3), "height error [mm]")
+    _histogram(axes[2], np.abs(errors.pitch), gates.pitch_p95, "torso pitch error [rad]")
+    _histogram(axes[3], 1e3 * errors.foot, _scaled(gates.foot_p95, 1e3), "foot mismatch [mm]")
+    _histogram(axes[4], 1e2 * errors.margin, _scaled(gates.margin_p1, 1e2), "support margin [cm]", top=100.0)
+    _histogram(axes[5], jumps.largest, gates.jump, "largest jump on a line [rad]", top=100.0)
+    figure.suptitle(f"Held-out errors of the reference generator, {len(labels)} samples (dashed: gate)")
+    _write(figure, folder / "errors.png")
+
+    figure, (axis,) = _figure(1, 1, 7.0, 4.2)
+    rmse = np.sqrt(((predicted - labels) ** 2).mean(axis=0))
+    axis.barh(np.arange(len(joints)), rmse, color=SOFT, edgecolor=INK)
+    axis.set_yticks(np.arange(len(joints)), [name.removesuffix("_joint").replace("_", " ") for name in joints])
+    axis.invert_yaxis()
+    axis.set_xlabel("held-out RMSE [rad]")
+    _write(figure, folder / "joints.png")
+
+
+def learning_figure(folder: Path, training: Sequence[float], validation: Sequence[float]) -> None:
+    """Loss by epoch."""
+    figure, (axes,) = _figure(1, 1, 5.0, 3.4)
+    epochs = np.arange(1, len(training) + 1)
+    axes.semilogy(epochs, training, color=SOFT, label="training")
+    axes.semilogy(epochs, validation, color=INK, label="validation")
+    axes.set_xlabel("epoch")
+    axes.set_ylabel("loss [rad²]")
+    axes.legend(frameon=False)
+    _write(figure, folder / "learning.png")
+
+
+def _feasible_map(path: Path, plan: SamplePlan, region: Region) -> None:
+    figure, (left, right) = _figure(1, 2, 10.0, 4.2)
+    extent = (plan.pitches[0], plan.pitches[-1], plan.heights[0], plan.heights[-1])
+    left.pcolormesh(plan.pitches, plan.heights, region.nominal.T, cmap="Blues", vmin=-0.6, vmax=1.6, shading="nearest")
+    left.set_title("has a label with the arms in the default posture")
+    share = np.ma.masked_less(region.share.T, 0.0)
+    shown = right.pcolormesh(plan.pitches, plan.heights, share, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
+    right.set_title("share of other arm postures that have a label")
+    figure.colorbar(shown, ax=right)
+    outline = region.map
+    for axes in (left, right):
+        axes.plot(outline.pitch, outline.low, color=WARM, linewidth=2, label="feasible map")
+        axes.plot(outline.pitch, outline.high, color=WARM, linewidth=2)
+        axes.plot(outline.pitch[[0, 0]], [outline.low[0], outline.high[0]], color=WARM, linewidth=2)
+        axes.plot(outline.pitch[[-1, -1]], [outline.low[-1], outline.high[-1]], color=WARM, linewidth=2)
+        axes.set_xlim(extent[0], extent[1])
+        axes.set_ylim(extent[2], extent[3])
+        axes.set_xlabel("torso pitch [rad]")
+        axes.set_ylabel(f"{plan.recipe.height} height [m]")
+    left.legend(loc="lower left")
+    _write(figure, path)
+
+
+def _rejections(path: Path, kept: int, rejected: Mapping[str, int]) -> None:
+    figure, (axes,) = _figure(1, 1, 6.0, 0.8 + 0.4 * (len(rejected) + 1))
+    names, counts = ["kept", *rejected], [kept, *rejected.values()]
+    bars = axes.barh(np.arange(len(names)), counts, color=[INK, *[SOFT] * len(rejected)])
+    axes.bar_label(bars, padding=3)
+    axes.set_yticks(np.arange(len(names)), names)
+    axes.set_xlim(0, 1.15 * max(counts))
+    axes.invert_yaxis()
+    axes.set_xlabel("samples")
+    _write(figure, path)
+
+
+def _physics(path: Path, plan: SamplePlan, dataset: Dataset) -> None:
+    figure, (left, middle, right) = _figure(1, 3, 11.0, 3.4)
+    effort = plan.robot.effort[plan.robot.support]
+    _histogram(left, np.abs(dataset.torque / effort).max(axis=1), None, "largest torque over its limit", top=100.0)
+    _histogram(middle, 1e2 * dataset.margin, plan.recipe.gates.support_margin * 1e2, "support margin [cm]", top=100.0)
+    _histogram(
+        right, 1e3 * (dataset.reached - dataset.command[:, 0]), None, "height error of the labels [mm]", top=100.0
+    )
+    _write(figure, path)
+
+
+def _histogram(axes: Any, values: Array, limit: float | None, label: str, top: float = 99.8) -> None:
+    """Counts up to a percentile, with the gate as a dashed line."""
+    low, high = float(values.min()), float(np.percentile(values, top))
+    high = max(high, limit or high)
+    axes.hist(values, bins=np.linspace(low, high + 1e-9, BINS), color=SOFT, edgecolor=INK, linewidth=0.3)
+    if limit is not None:
+        axes.axvline(limit, color=WARM, linestyle="--")
+    axes.set_xlabel(label)
+    axes.set_ylabel("samples")
+
+
+def _scaled(limit: float | None, factor: float) -> float | None:
+    return None if limit is None else factor * limit
+
+
+def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Any]]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = np.atleast_1d(np.asarray(figure.subplots(rows, columns)))
+    return figure, list(axes.ravel())
+
+
+def _write(figure: Figure, path: Path) -> None:
+    figure.savefig(path, dpi=DOTS)

@@ -1,0 +1,90 @@
+"""A picture of rendered postures over height and torso pitch: what the robot can hold."""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from iowbc.recipe.reference import ReferenceGenerator
+from iowbc.reference.gates import Judge
+from iowbc.reference.labelling import make_method
+from iowbc.reference.sample import Posture, Rejected, Sample
+from iowbc.reference.sampling import SamplePlan
+from iowbc.reference.support_model import SupportModel
+from iowbc.robot.description import Robot
+
+Array = NDArray[Any]
+
+HEIGHTS, PITCHES = 4, 7
+"""Postures down and across."""
+SIZE = 260
+"""Edge of a rendered posture [pixel]."""
+AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 2.3, (0.1, 0.0, 0.55)
+"""Camera [degree, degree, m, m]."""
+EMPTY = 235
+"""Grey of a command without a label."""
+
+
+def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan) -> str | None:
+    """Labels a small grid with the default arms by the static method and draws it; where nothing can draw, says why."""
+    support = SupportModel(robot, recipe.problem)
+    method, judge = make_method("static", support, recipe), Judge(support, recipe.gates, recipe.height)
+    heights = np.linspace(plan.heights[-1], plan.heights[0], HEIGHTS)
+    pitches = np.linspace(plan.pitches[0], plan.pitches[-1], PITCHES)
+    try:
+        model, renderer = _scene(robot)
+    except Exception as error:
+        return f"{type(error).__name__}: {error}; set MUJOCO_GL to osmesa or egl"
+    try:
+        figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(HEIGHTS, PITCHES)
+        for row, height in enumerate(heights):
+            for column, pitch in enumerate(pitches):
+                sample = Sample(plan.rest, np.array([height, pitch, 0.0, 0.0]), np.zeros(2))
+                axis = axes[row, column]
+                axis.axis("off")
+                axis.set_title(f"{height:.2f} m, {pitch:+.2f} rad", fontsize=8)
+                try:
+                    posture = method.solve(sample)
+                    judge.label(sample, posture)
+                    axis.imshow(_picture(robot, model, renderer, sample, posture))
+                except Rejected as reason:
+                    axis.imshow(np.full((SIZE, SIZE, 3), EMPTY, dtype=np.uint8))
+                    axis.text(0.5, 0.5, str(reason), ha="center", va="center", transform=axis.transAxes, fontsize=8)
+        figure.savefig(path, dpi=110)
+    finally:
+        renderer.close()
+    return None
+
+
+def _scene(robot: Robot) -> tuple[Any, Any]:
+    """The robot on a plain floor, and a renderer for it."""
+    spec = mujoco.MjSpec.from_file(str(robot.mjcf))
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = SIZE, SIZE
+    spec.visual.headlight.ambient, spec.visual.headlight.diffuse = (0.45, 0.45, 0.45), (0.5, 0.5, 0.5)
+    floor = spec.worldbody.add_geom()
+    floor.type, floor.size, floor.rgba = mujoco.mjtGeom.mjGEOM_PLANE, (3.0, 3.0, 0.1), (0.93, 0.94, 0.96, 1.0)
+    light = spec.worldbody.add_light()
+    light.pos, light.dir = (1.0, -1.0, 3.0), (-0.3, 0.3, -1.0)
+    model = spec.compile()
+    return model, mujoco.Renderer(model, SIZE, SIZE)
+
+
+def _picture(robot: Robot, model: Any, renderer: Any, sample: Sample, posture: Posture) -> Array:
+    data = mujoco.MjData(model)
+    data.qpos[:3] = posture.configuration[:3]
+    data.qpos[3:7] = np.roll(posture.configuration[3:7], 1)
+    data.qpos[7 + robot.support] = posture.support
+    data.qpos[7 + robot.interaction] = sample.arm
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation, camera.distance = AZIMUTH, ELEVATION, DISTANCE
+    camera.lookat[:] = LOOK_AT
+    renderer.update_scene(data, camera)
+    picture: Array = renderer.render().copy()
+    return picture

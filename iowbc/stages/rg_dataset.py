@@ -1,0 +1,129 @@
+"""Stage rg-dataset: labels arm postures and base commands with support postures, and checks them in two ways."""
+
+import json
+import time
+
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+
+CHUNK = {"static": 256, "ocp": 8}
+"""Samples in a shard: one to three seconds of work, which is what an interruption or a crash costs."""
+
+
+def run(job: Job) -> None:
+    """Leaves `dataset.npz`, `feasible.npz`, `summary.json` and figures."""
+    from iowbc.reference.crosscheck import compare, pick
+    from iowbc.reference.dataset import assemble, reasons
+    from iowbc.reference.feasible_region import measure_region
+    from iowbc.reference.figures import dataset_figures
+    from iowbc.reference.labelling import LabelTask
+    from iowbc.reference.labelling_pool import Stopped, label_all
+    from iowbc.reference.mirror_check import mirror_error
+    from iowbc.reference.posture_strip import draw_strip
+    from iowbc.reference.sampling import SamplePlan, check_ranges
+    from iowbc.robot.description import load_robot
+
+    recipe, seed = job.recipe.rg, job.recipe.seed
+    robot = load_robot(job.robot)
+    try:
+        check_ranges(robot, recipe)
+    except ValueError as error:
+        raise StageFailed(str(error)) from error
+    plan = SamplePlan(robot, recipe, seed)
+    began = time.monotonic()
+
+    def progress(done: int, total: int) -> None:
+        job.report.progress(done, total, f"{recipe.method} labels")
+
+    try:
+        result = label_all(
+            LabelTask(job.robot, recipe, seed, recipe.method),
+            range(plan.count),
+            folder=job.work / "shards",
+            key=job.key,
+            chunk_size=CHUNK[recipe.method],
+            workers=job.workers,
+            interrupted=job.interrupted,
+            progress=progress,
+        )
+        seconds = time.monotonic() - began
+        try:
+            dataset = assemble(plan, result)
+            region = measure_region(plan, dataset)
+        except ValueError as error:
+            raise StageFailed(str(error)) from error
+        chosen = pick(dataset, plan, recipe) if recipe.method == "static" else []
+        check = None
+        if chosen:
+            job.report.say(f"checks {len(chosen)} labels against the optimal control problem")
+            again = label_all(
+                LabelTask(job.robot, recipe, seed, "ocp"),
+                chosen,
+                folder=job.work / "crosscheck",
+                key=job.key,
+                chunk_size=CHUNK["ocp"],
+                workers=job.workers,
+                interrupted=job.interrupted,
+                progress=lambda done, total: job.report.progress(done, total, "optimal control"),
+            )
+            check = compare(dataset, again)
+    except Stopped as stop:
+        raise Interrupted("finished shards are kept") from stop
+
+    metrics = {
+        "samples": float(plan.count),
+        "kept": float(len(dataset)),
+        "kept_share": len(dataset) / plan.count,
+        "labels_per_second": len(dataset) / max(seconds, 1e-9),
+        "margin_p1": float(_percentile(dataset.margin, 1)),
+        "torque_ratio_p99": float(_percentile(abs(dataset.torque / robot.effort[robot.support]).max(axis=1), 99)),
+    }
+    if (symmetric := mirror_error(robot, plan, dataset)) is not None:
+        metrics |= {"mirror_pairs": float(len(symmetric)), "mirror_p99": float(_percentile(symmetric, 99))}
+    if check is not None:
+        metrics |= check.metrics
+    dataset.save(job.out / "dataset.npz")
+    region.map.save(job.out / "feasible.npz")
+    summary = {
+        "metrics": metrics,
+        "rejected": reasons(result),
+        "worst_crosscheck": [] if check is None else check.worst,
+    }
+    (job.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    job.report.metrics(metrics, 0)
+    figures = job.out / "figures"
+    figures.mkdir(exist_ok=True)
+    dataset_figures(figures, plan, dataset, region, summary["rejected"], check)
+    if (trouble := draw_strip(figures / "postures.png", robot, recipe, plan)) is not None:
+        job.report.say(f"no picture of postures: {trouble}")
+    if check is not None and check.metrics["crosscheck_p90"] > recipe.crosscheck.p90_limit:
+        raise StageFailed(
+            f"static labels differ from optimal control by {check.metrics['crosscheck_p90']:.4f} rad (p90 of {check.count} samples, the "
+            f"limit is {recipe.crosscheck.p90_limit} rad). Worst: {'; '.join(check.worst)}. Check rg.problem's weights, or label "
+            "with `rg.method: ocp`"
+        )
+
+
+def _percentile(values: object, percent: float) -> float:
+    import numpy as np
+
+    return float(np.percentile(np.asarray(values), percent))
+
+
+STAGE = Stage(
+    name="rg-dataset",
+    version=1,
+    slice=(
+        "seed",
+        "rg.method",
+        "rg.height",
+        "rg.sampling",
+        "rg.problem",
+        "rg.ocp",
+        "rg.gates",
+        "rg.crosscheck",
+        "rg.feasible",
+    ),
+    reads=lambda recipe: (),
+    run=run,
+    packages=("reference", "robot"),
+)

@@ -1,0 +1,96 @@
+"""Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples through forward kinematics."""
+
+import json
+import shutil
+from typing import Any
+
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+
+WORST_SHOWN = 5
+
+
+def run(job: Job) -> None:
+    """Leaves `rg.safetensors`, `rg.json`, `feasible.npz`, `report.json` and figures."""
+    import numpy as np
+
+    from iowbc.reference.dataset import Dataset
+    from iowbc.reference.feasibility import FeasibleMap
+    from iowbc.reference.figures import error_figures, learning_figure
+    from iowbc.reference.fit_gates import judge_fit
+    from iowbc.reference.fit_preparation import prepare
+    from iowbc.reference.fitting import FitStopped, fit
+    from iowbc.reference.network import ReferenceNetwork
+    from iowbc.reference.network_inputs import base_columns, input_names
+    from iowbc.reference.smoothness import measure_jumps
+    from iowbc.robot.description import load_robot
+
+    rg, source = job.recipe.rg, job.inputs["rg-dataset"]
+    robot = load_robot(job.robot)
+    dataset = Dataset.load(source / "dataset.npz")
+    feasible = FeasibleMap.load(source / "feasible.npz")
+    prepared = prepare(dataset, robot, rg, job.recipe.seed, job.interrupted)
+    if prepared is None:
+        raise Interrupted
+    job.report.say(f"{len(prepared.train.inputs)} training samples, {len(prepared.held_out)} held out")
+
+    def epoch_done(epoch: int, training: float, validation: float) -> None:
+        job.report.metrics({"loss": training, "validation_loss": validation}, epoch)
+        job.report.progress(epoch, rg.fit.epochs, f"validation loss {validation:.2e}")
+
+    try:
+        fitted = fit(prepared.train, prepared.validation, rg.fit, job.recipe.seed, epoch_done, job.interrupted)
+    except FitStopped as stop:
+        raise Interrupted from stop
+    support = robot.support
+    network = ReferenceNetwork(
+        inputs=input_names(robot, rg),
+        outputs=tuple(robot.joints[index] for index in support),
+        layers=fitted.layers,
+        input_mean=fitted.input_mean,
+        input_std=fitted.input_std,
+        output_mean=fitted.output_mean,
+        output_std=fitted.output_std,
+        lower=robot.lower[support].astype(np.float32),
+        upper=robot.upper[support].astype(np.float32),
+    )
+    network.save(job.out)
+    network = ReferenceNetwork.load(job.out)
+    shutil.copyfile(source / "feasible.npz", job.out / "feasible.npz")
+
+    held = prepared.held_out
+    base = base_columns(rg, dataset.command[held], dataset.payload[held])
+    predicted = network(dataset.arm[held], base)
+    errors = prepared.kinematics.errors([prepared.samples[i] for i in held], predicted.astype(np.float64))
+    jumps = measure_jumps(network, rg, feasible, dataset.arm[held], job.recipe.seed)
+    verdict = judge_fit(rg.fit.gates, dataset, held, predicted, errors, jumps)
+    report: dict[str, Any] = {
+        "metrics": verdict.metrics,
+        "gates": verdict.gates,
+        "worst": verdict.worst,
+        "samples": {"training": len(prepared.train.inputs), "held_out": len(held), "best_epoch": fitted.epochs},
+    }
+    text = json.dumps(report, indent=2) + "\n"
+    (job.out / "report.json").write_text(text, encoding="utf-8")
+    (job.out / "summary.json").write_text(text, encoding="utf-8")
+    job.report.metrics(verdict.metrics, fitted.epochs)
+    figures = job.out / "figures"
+    figures.mkdir(exist_ok=True)
+    error_figures(figures, dataset.support[held], predicted, errors, jumps, rg.fit.gates, network.outputs)
+    learning_figure(figures, fitted.training_loss, fitted.validation_loss)
+    if verdict.failures:
+        raise StageFailed(
+            "the reference generator misses its gates on held-out samples: "
+            + "; ".join(verdict.failures)
+            + f". Worst samples: {'; '.join(verdict.worst[:WORST_SHOWN])}. Use more samples (rg.sampling.samples) or epochs "
+            "(rg.fit.epochs), or loosen rg.fit.gates openly"
+        )
+
+
+STAGE = Stage(
+    name="rg-fit",
+    version=1,
+    slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem"),
+    reads=lambda recipe: ("rg-dataset",),
+    run=run,
+    packages=("reference", "robot"),
+)
