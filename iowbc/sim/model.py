@@ -13,6 +13,9 @@ GROUND_BIT = 1
 ARENA = 2 << 20
 """Memory for contacts and constraints of one simulation [bytes]; twenty contacts take a tenth of it."""
 
+NO_ISLANDS = mujoco.mjtDisableBit.mjDSBL_ISLAND.value
+"""Robot and object are one constrained system, and looking for separate ones takes 5 % of a step."""
+
 INTEGRATORS = {"implicit": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "explicit": mujoco.mjtIntegrator.mjINT_EULER}
 """MuJoCo's implicit integrator takes the motors' velocity feedback into its step; under Euler it is a force of the
 state before the step, as that of a controller on the robot is."""
@@ -27,6 +30,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
     option.timestep = physics.timestep
     option.integrator = INTEGRATORS[physics.pd]
     option.solver, option.cone = SOLVERS[physics.solver], CONES[physics.cone]
+    option.disableflags |= NO_ISLANDS
     option.iterations, option.ls_iterations = physics.iterations, physics.line_search_iterations
     if scene.kind == "lift" and scene.grasp.kind == "contact":
         option.cone, option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, scene.grasp.settling
