@@ -1,0 +1,161 @@
+"""The stage `export` from a student on disk to the accepted controller, and its gates."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iowbc.deploy import golden
+from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
+from iowbc.deploy.controller import open_session
+from iowbc.deploy.graph import ControllerGraph
+from iowbc.evaluation.playing import NoDisplay, exported_source, play, require_display
+from iowbc.evaluation.rollout import Stopped
+from iowbc.learning.storage import save_network
+from iowbc.recipe.evaluation import Segment, Video
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+from iowbc.stages import export
+from iowbc.stages.contract import Interrupted, Job, StageFailed
+
+STAND = [{"duration": 0.3, "ramp": 0.0}]
+
+
+class Quiet:
+    """A report that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        assert all(isinstance(value, float) for value in values.values())
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        pass
+
+    def say(self, text: str) -> None:
+        self.lines.append(text)
+
+
+@pytest.fixture(scope="session")
+def student(graph: ControllerGraph, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("distilled") / ("d" * 8)
+    folder.mkdir()
+    architecture = {
+        "observation": graph.layout.size,
+        "history": graph.history,
+        "actions": 15,
+        "frame_features": 8,
+        "latent": 8,
+        "hidden": [16],
+        "activation": "elu",
+        "clip": 10.0,
+    }
+    save_network(graph.student, architecture, folder, "student", {})
+    return folder
+
+
+def job(folder: Path, robot: Robot, rg: Path, student: Path, *, stop: bool = False, **settings: Any) -> Job:
+    for name in ("out", "work"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    return Job(
+        recipe=Recipe.model_validate({"name": "test", "export": {"golden_steps": 10, "timing_steps": 20, **settings}}),
+        key="e" * 8,
+        robot=robot.folder,
+        inputs={"rg-fit": rg, "distill": student},
+        out=folder / "out",
+        work=folder / "work",
+        workers=2,
+        report=Quiet(),
+        interrupted=lambda: stop,
+    )
+
+
+@pytest.fixture(scope="session")
+def done(robot: Robot, rg: Path, student: Path, tmp_path_factory: pytest.TempPathFactory) -> Job:
+    acceptance = {"trials": 2, "minimum": 0, "sequence": STAND}
+    finished = job(tmp_path_factory.mktemp("export"), robot, rg, student, acceptance=acceptance)
+    export.run(finished)
+    return finished
+
+
+def test_the_folder_holds_all_that_a_robot_needs(done: Job, rg: Path) -> None:
+    names = {path.name for path in done.out.iterdir()}
+    assert {GRAPH, CONTRACT, GOLDEN, "recipe.json", "robot", "rg", "summary.json"} <= names
+    contract = read_contract(done.out)
+    assert contract.sources == {"rg-fit": rg.name, "distill": "d" * 8, "export": "e" * 8}
+
+
+def test_parity_size_and_time_are_in_the_summary(done: Job) -> None:
+    metrics = json.loads((done.out / "summary.json").read_text())["metrics"]
+    assert 0 <= metrics["parity"] < 1e-5
+    assert metrics["target_difference"] < 1e-5
+    assert metrics["graph_kB"] > 10
+    assert 0 < metrics["inference_ms"] < 20
+    assert metrics["acceptance_trials"] == 2
+    said = " ".join(done.report.lines)  # type: ignore[attr-defined]
+    assert f"in {metrics['acceptance_survived']:.0f} of 2 trials" in said
+    assert "kept a 4 kg object (lift) for 0.3 s" in said
+
+
+def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
+    inputs, outputs = golden.read_golden(done.out / GOLDEN)
+    assert len(inputs["command"]) == 10
+    found = golden.run_session(open_session(done.out / GRAPH), inputs)
+    assert max(golden.largest_difference(outputs, found).values()) < 1e-5
+
+
+def test_too_few_survivors_fail_the_stage(robot: Robot, rg: Path, student: Path, tmp_path: Path) -> None:
+    long = {"trials": 1, "minimum": 1, "mass": 40.0, "sequence": [{"duration": 4.0, "ramp": 0.0}]}
+    with pytest.raises(StageFailed, match=r"in 0 of 1 trials.*train longer"):
+        export.run(job(tmp_path, robot, rg, student, acceptance=long))
+
+
+def test_a_graph_that_differs_from_torch_fails_the_stage(robot: Robot, rg: Path, student: Path, tmp_path: Path) -> None:
+    with pytest.raises(StageFailed, match=r"parity: output \w+ differs"):
+        export.run(job(tmp_path, robot, rg, student, parity_tolerance=1e-30, acceptance=None))
+
+
+def test_a_privileged_policy_is_not_exported(robot: Robot, rg: Path, tmp_path: Path) -> None:
+    (tmp_path / "teacher").mkdir()
+    with pytest.raises(StageFailed, match="holds no student"):
+        export.run(job(tmp_path, robot, rg, tmp_path / "teacher"))
+
+
+def test_an_interruption_ends_the_stage(robot: Robot, rg: Path, student: Path, tmp_path: Path) -> None:
+    with pytest.raises(Interrupted, match="export"):
+        export.run(job(tmp_path, robot, rg, student, stop=True))
+
+
+def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
+    film = tmp_path / "out.mp4"
+    result = play(
+        exported_source(done.out),
+        mass=2.0,
+        sequence=[Segment(duration=0.3, ramp=0.0)],
+        video=film,
+        video_settings=Video(width=96, height=64, fps=10),
+    )
+    assert result["end"] in ("finished", "fell", "dropped")
+    assert result["duration"] == pytest.approx(0.3)
+    assert 1 <= result["frames"] <= 4
+    assert film.stat().st_size > 500
+    assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
+
+
+def test_an_interrupted_film_leaves_no_file(done: Job, tmp_path: Path) -> None:
+    with pytest.raises(Stopped):
+        play(exported_source(done.out), video=tmp_path / "out.mp4", interrupted=lambda: True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_display_the_viewer_says_what_to_do(done: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    with pytest.raises(NoDisplay, match="--video"):
+        require_display()
+    with pytest.raises(NoDisplay):
+        play(exported_source(done.out))
