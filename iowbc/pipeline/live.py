@@ -69,7 +69,7 @@ class LiveDisplay:
 
     def _table(self) -> Table:
         table = Table(box=None, padding=(0, 1), expand=False)
-        for name in ("stage", "state", "", "rate", "left", "curve", "note"):
+        for name in ("stage", "state", "", "rate", "time", "curve", "note"):
             table.add_column(name, no_wrap=True, overflow="ellipsis")
         for view in self._views:
             table.add_row(*self._row(view))
@@ -81,7 +81,8 @@ class LiveDisplay:
             return Text(view.name), state, "", "", duration(view.seconds), self._curve(view), Text(view.note)
         bar = ProgressBar(total=1.0, completed=view.share, width=20, pulse=not view.total)
         rate = f"{view.rate:.4g}/s" if view.rate is not None else ""
-        return Text(view.name), state, bar, rate, duration(view.left), self._curve(view), Text(view.note)
+        left = f"{duration(view.left)} left" if view.left is not None else ""
+        return Text(view.name), state, bar, rate, left, self._curve(view), Text(view.note)
 
     def _curve(self, view: StageView) -> Text:
         if not view.curve:

@@ -118,7 +118,7 @@ class Runner:
             warning = f"; code changed since it began: {', '.join(changed)}" if changed else ""
             self.display.say(f"{stage.name}: goes on from attempt {workspace.attempts - 1}{warning}")
         if self.tracker is not None:
-            self.tracker.stage(stage.name, key, resumed)
+            self.tracker.stage(stage.name, key, (step.ingredients or {}).get("recipe", {}), resumed)
         workers = self.options.workers or self.loaded.recipe.execution.workers or available_cores()
         job = Job(
             recipe=self.loaded.recipe,

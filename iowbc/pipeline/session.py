@@ -98,10 +98,10 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console) -> in
             artifacts = runner.run()
             status, code = "FINISHED", DONE
         except PipelineFailed as error:
-            closing = f"{error}\nfinished stages are kept; after a remedy: {_rest(request, runner)}"
+            closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, runner)}"
         except (Interrupted, KeyboardInterrupt) as error:
             status, code = "KILLED", INTERRUPTED
-            closing = "\n".join(filter(None, (str(error), f"interrupted; to go on: {_rest(request, runner)}")))
+            closing = "\n".join(filter(None, (str(error), f"interrupted; to go on:\n{_rest(request, runner)}")))
         finally:
             if tracker is not None:
                 wait = bool(runner.made) and not stop()

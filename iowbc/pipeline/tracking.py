@@ -78,13 +78,13 @@ class Tracker:
             return None
         return None
 
-    def stage(self, name: str, key: str, resumed: bool) -> None:
-        """A stage begins to run, or goes on."""
+    def stage(self, name: str, key: str, slices: Mapping[str, Any], resumed: bool) -> None:
+        """A stage begins to run, or goes on; `slices` is its part of the recipe."""
         tags = {**_process_tags(), "iowbc.stage": name, "iowbc.key": key, "iowbc.cached": "false"}
         if resumed and name in statuses(self._journal.path):
             self._journal.write("reopen", id=name, tags={**tags, "iowbc.resumed": "true"})
         else:
-            self._journal.write("run", id=name, parent=PARENT, name=name, tags=tags, params={})
+            self._journal.write("run", id=name, parent=PARENT, name=name, tags=tags, params=parameters(slices))
         self.send()
 
     def metrics(self, name: str, values: Mapping[str, float], step: int) -> None:
@@ -108,6 +108,7 @@ class Tracker:
         self._journal.write("tags", id=name, tags={"iowbc.artifact": str(artifact.folder)})
         if artifact.metrics:
             self.metrics(name, {f"summary/{key}": value for key, value in artifact.metrics.items()}, 0)
+            self.metrics(PARENT, {f"{name}/{key}": value for key, value in artifact.metrics.items()}, 0)
         files = [INGREDIENTS, RECIPE] if cached else [INGREDIENTS, RECIPE, *SHOWN_FOLDERS]
         present = [str((artifact.folder / file).absolute()) for file in files if (artifact.folder / file).exists()]
         self._journal.write("files", id=name, paths=present)

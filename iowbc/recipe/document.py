@@ -35,7 +35,8 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 (PyYAML's own attribute)
 
 
-_NULL, _BOOL, _INT, _FLOAT, _STR = (f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str"))
+PLAIN_TAGS = [f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")]
+_NULL, _BOOL, _INT, _FLOAT = PLAIN_TAGS[:4]
 _Loader.add_implicit_resolver(_NULL, re.compile(r"^(?:~|null|Null|NULL|)$"), ["~", "n", "N", ""])
 _Loader.add_implicit_resolver(_BOOL, re.compile(r"^(?:true|True|TRUE|false|False|FALSE)$"), list("tTfF"))
 _Loader.add_implicit_resolver(_INT, re.compile(r"^(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)$"), list("-+0123456789"))
@@ -90,6 +91,9 @@ class _Builder:
         self.nodes += 1
         if depth > MAXIMUM_DEPTH or self.nodes > MAXIMUM_NODES:
             raise RecipeError([Problem(place, "an alias (*name) that contains itself, or far too many values")])
+        if node.tag not in PLAIN_TAGS:
+            self._complain(node, f"tag {node.tag!r} is not allowed in a recipe")
+            return Located(None, place)
         if isinstance(node, yaml.MappingNode):
             return Located(self._mapping(node, depth), place)
         if isinstance(node, yaml.SequenceNode):
@@ -124,8 +128,6 @@ class _Builder:
         except ValueError:
             self._complain(node, f"{text!r} is not a {node.tag.split(':')[-1]}")
             return None
-        if node.tag != _STR:
-            self._complain(node, f"tag {node.tag!r} is not allowed in a recipe")
         return text
 
     def _complain(self, node: yaml.Node, text: str) -> None:

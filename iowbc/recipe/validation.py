@@ -37,7 +37,15 @@ def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
         texts.setdefault((place, head), [])
         if text not in texts[place, head]:
             texts[place, head].append(text)
-    return [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
+    problems = [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
+    return sorted(problems, key=lambda problem: _position(problem.place))
+
+
+def _position(place: str) -> tuple[str, int, int]:
+    """File, line and column of a place, to sort by."""
+    rest, _, column = place.rpartition(":")
+    file, _, line = rest.rpartition(":")
+    return (file, int(line), int(column)) if line.isdecimal() and column.isdecimal() else (place, 0, 0)
 
 
 def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:

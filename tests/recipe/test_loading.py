@@ -1,0 +1,151 @@
+"""Recipes inherit, are overridden, and say what is wrong with them and where."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from iowbc.recipe.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.problems import RecipeError
+
+RECIPES = Path(__file__).parents[2] / "recipes"
+
+
+def write(folder: Path, text: str, name: str = "mine.yaml") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def problems(folder: Path, text: str, *overrides: str) -> list[str]:
+    with pytest.raises(RecipeError) as caught:
+        load_recipe(write(folder, text), overrides)
+    return [str(problem).removeprefix(f"{folder}/") for problem in caught.value.problems]
+
+
+def loaded(folder: Path, text: str, *overrides: str) -> LoadedRecipe:
+    return load_recipe(write(folder, text), overrides)
+
+
+@pytest.mark.parametrize("path", sorted(RECIPES.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_shipped_recipe_is_valid(path: Path) -> None:
+    assert load_recipe(path).recipe.name
+
+
+def test_an_empty_recipe_is_all_defaults_under_its_files_name(tmp_path: Path) -> None:
+    recipe = loaded(tmp_path, "").recipe
+    assert recipe.name == "mine"
+    assert recipe.stages[0] == "rg-dataset"
+
+
+def test_a_misspelt_key_names_place_value_valid_keys_and_the_nearest(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "seed: 1\nteacher:\n  leaning_rate: 0.1\n")
+    assert text.startswith("mine.yaml:3:3: key 'teacher.leaning_rate' = 0.1: is not a key of 'teacher'; valid: ")
+    assert text.endswith("did you mean 'learning_rate'?")
+
+
+def test_a_key_in_the_wrong_section_names_the_right_one(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "gae_lambda: 0.9\n")
+    assert text.endswith("did you mean 'teacher.gae_lambda'?")
+
+
+def test_all_problems_are_listed_with_their_lines(tmp_path: Path) -> None:
+    texts = problems(tmp_path, "seed: -1\nteacher:\n  gamma: high\n  steps: 1.5\nrobots: g1\n")
+    assert [text.split(": ")[0] for text in texts] == [
+        "mine.yaml:1:1",
+        "mine.yaml:3:3",
+        "mine.yaml:4:3",
+        "mine.yaml:5:1",
+    ]
+    assert "key 'teacher.gamma' = 'high': should be a valid number" in texts[1]
+
+
+def test_a_wrong_choice_names_the_valid_ones_and_the_nearest(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "stages: [rg-dataset, teachr]\n")
+    assert text.startswith("mine.yaml:1:22: key 'stages.1' = 'teachr'")
+    assert text.endswith("did you mean 'teacher'?")
+
+
+def test_true_is_not_a_number(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "seed: 1\nteacher:\n  clip: true\n")
+    assert text == "mine.yaml:3:3: key 'teacher.clip' = True: should be a number, not true or false"
+
+
+def test_infinity_is_refused(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "teacher:\n  learning_rate: .inf\n")
+    assert "finite" in text
+
+
+def test_stages_run_in_the_pipelines_order(tmp_path: Path) -> None:
+    assert loaded(tmp_path, "stages: [teacher, rg-fit, rg-dataset]\n").recipe.stages == (
+        "rg-dataset",
+        "rg-fit",
+        "teacher",
+    )
+
+
+def test_a_recipe_changes_what_it_extends_key_by_key(tmp_path: Path) -> None:
+    write(tmp_path, "name: base\nseed: 4\nteacher:\n  gamma: 0.9\n  steps: 4096\n", "base.yaml")
+    found = loaded(tmp_path, "extends: base.yaml\nteacher:\n  steps: 8192\n")
+    assert (found.recipe.seed, found.recipe.teacher.gamma, found.recipe.teacher.steps) == (4, 0.9, 8192)
+    assert found.recipe.name == "mine"
+    assert found.place("teacher.steps") == f"{tmp_path}/mine.yaml:3:3"
+    assert found.place("teacher.gamma") == f"{tmp_path}/base.yaml:4:3"
+    assert found.place("teacher.clip") == "default"
+
+
+def test_an_error_in_an_inherited_file_names_that_file(tmp_path: Path) -> None:
+    write(tmp_path, "seed: none\n", "base.yaml")
+    (text,) = problems(tmp_path, "extends: base.yaml\n")
+    assert text.startswith("base.yaml:1:1: key 'seed' = 'none'")
+
+
+def test_recipes_that_extend_each_other_in_a_circle_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, "extends: mine.yaml\n", "other.yaml")
+    (text,) = problems(tmp_path, "extends: other.yaml\n")
+    assert "in a circle" in text
+
+
+def test_a_missing_file_lists_the_recipes_beside_it(tmp_path: Path) -> None:
+    write(tmp_path, "", "full.yaml")
+    with pytest.raises(RecipeError, match=r"no such file; recipes in .*: full.yaml; did you mean 'full.yaml'\?"):
+        load_recipe(tmp_path / "ful.yaml")
+
+
+def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -> None:
+    found = loaded(tmp_path, "teacher:\n  steps: 4096\n", "teacher.steps=1e4", "seed=7")
+    assert (found.recipe.teacher.steps, found.recipe.seed) == (10000, 7)
+    assert found.place("teacher.steps") == "--set teacher.steps=1e4"
+
+
+def test_an_override_reaches_into_a_list_that_is_a_default(tmp_path: Path) -> None:
+    before = loaded(tmp_path, "").recipe.eval.sequence
+    after = loaded(tmp_path, "", "eval.sequence.1.duration=1.25").recipe.eval.sequence
+    assert after[1].duration == 1.25
+    assert after[:1] + after[2:] == before[:1] + before[2:]
+
+
+def test_a_wrong_override_is_told_like_a_wrong_line(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "", "teacher.step=5")
+    assert text.startswith("--set teacher.step=5: key 'teacher.step' = 5: is not a key of 'teacher'")
+    (text,) = problems(tmp_path, "", "teacher.steps")
+    assert "should read a.b.c=value" in text
+    (text,) = problems(tmp_path, "stages: [teacher]\n", "stages.3=eval")
+    assert text == "--set stages.3=eval: '3' is not an index of 'stages'; valid: 0 to 0"
+
+
+def test_a_recipe_is_validated_fast_and_without_heavy_imports(tmp_path: Path) -> None:
+    script = (
+        "import sys; from iowbc.recipe.loading import load_recipe; load_recipe(sys.argv[1]);"
+        "print([m for m in ('torch', 'mujoco', 'mlflow', 'numpy', 'pandas', 'pinocchio') if m in sys.modules])"
+    )
+    path = write(tmp_path, "teacher:\n  steps: 4096\n")
+    seconds = []
+    for _ in range(3):
+        began = time.monotonic()
+        done = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True)
+        seconds.append(time.monotonic() - began)
+        assert done.stdout.strip() == "[]"
+    assert sorted(seconds)[1] < 0.5
