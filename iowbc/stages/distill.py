@@ -30,7 +30,7 @@ def run(job: Job) -> None:
     from iowbc.task.mirror import action_mirror, observation_mirror
     from iowbc.task.vector_env import VectorEnv
 
-    torch.set_num_threads(max(job.workers, 1))  # learner and workers take turns on the same cores
+    torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
     torch.manual_seed(job.recipe.seed)
     recipe, settings = job.recipe, job.recipe.distill
     teacher_net, about = load_teacher(job.inputs["teacher"])
