@@ -1,0 +1,77 @@
+"""The same seed gives the same course, for any split over workers, and from any saved state."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from task_worlds import rollout, same
+
+from iowbc.task.vector_env import VectorEnv
+
+Make = Callable[..., VectorEnv]
+
+
+def test_a_rollout_does_not_depend_on_the_number_of_workers(make: Make) -> None:
+    courses = []
+    for workers in (0, 1, 2, 3):
+        env = make(num_envs=7, workers=workers)
+        start = env.reset()
+        courses.append(rollout(env, 60) | {"start": start} | env.drawn())
+    assert courses[0]["done"].any()
+    for course in courses[1:]:
+        assert same(courses[0], course)
+
+
+def test_an_environment_does_not_depend_on_its_company(make: Make) -> None:
+    changes = {"task.scenes.free": 0.0}
+    few, many = make(num_envs=2, changes=changes), make(num_envs=9, changes=changes)
+    assert np.array_equal(few.reset(), many.reset()[:2])
+    assert np.array_equal(rollout(few, 40)["observation"], rollout(many, 40)["observation"][:, :2])
+
+
+def test_another_seed_gives_another_course(make: Make) -> None:
+    assert not np.array_equal(make(seed=1).reset(), make(seed=2).reset())
+
+
+def test_a_restored_environment_takes_bit_for_bit_the_same_course(make: Make) -> None:
+    env = make(num_envs=6, workers=2)
+    env.reset()
+    rollout(env, 37)
+    state = env.state()
+    onward, figures = rollout(env, 60, start=37), env.statistics()
+    env.restore(state)
+    assert same(onward, rollout(env, 60, start=37))
+    assert env.statistics() == figures
+
+
+@pytest.mark.parametrize("workers", [0, 3])
+def test_a_state_can_be_restored_into_another_number_of_workers(make: Make, workers: int) -> None:
+    shares = {f"task.scenes.{name}": 0.25 for name in ("free", "lift", "tyre", "push")}
+    source = make(num_envs=8, workers=2, changes=shares)
+    source.reset()
+    rollout(source, 23)
+    state = source.state()
+    onward = rollout(source, 40, start=23)
+    target = make(num_envs=8, workers=workers, seed=99, changes=shares)
+    target.reset()
+    rollout(target, 5)
+    target.restore(state)
+    assert same(onward, rollout(target, 40, start=23))
+
+
+def test_a_state_keeps_the_seeds_that_an_environment_was_given(make: Make) -> None:
+    source, target = make(seed=1), make(seed=2)
+    source.seed(5)
+    source.reset()
+    target.restore(source.state())
+    target.seed(77)
+    target.restore(source.state())
+    assert np.array_equal(source.reset(), target.reset())
+
+
+def test_a_state_of_other_environments_is_refused(make: Make) -> None:
+    few, many = make(num_envs=2), make(num_envs=4)
+    few.reset()
+    many.reset()
+    with pytest.raises(ValueError, match="expected 4"):
+        many.restore(few.state())
