@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from iowbc.recipe.partner import Partner as Recipe
 from iowbc.recipe.scene import Scene
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.randomization import GRAVITY
+from iowbc.sim.draws import GRAVITY
 from iowbc.sim.state import SimulationState
 
 Array = NDArray[Any]

@@ -14,7 +14,7 @@ from iowbc.sim import partner, random, sensing
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.disturbance import Blows
 from iowbc.sim.divergence import Divergence
-from iowbc.sim.randomization import GRAVITY, Draws
+from iowbc.sim.draws import GRAVITY, Draws
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.world import World
 

@@ -15,7 +15,7 @@ from iowbc.robot.description import Robot
 from iowbc.sim.layout import BASE_ANGULAR, BASE_LINEAR, Layout
 from iowbc.sim.look import look_model
 from iowbc.sim.model import compile_scene
-from iowbc.sim.randomization import ModelFields
+from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.state import SimulationState
 

@@ -129,10 +129,10 @@ def test_diverged_environment_lives_on_after_a_reset(start, carrying):
 
 
 def test_divergence_is_kept_and_diverges_again_when_replayed(start, robot, tmp_path):
-    recipe = changed(Recipe(), "physics.fastest", 12.0)  # so that a plain step of the joints counts
+    recipe = changed(Recipe(), "physics.fastest", 8.0)  # so that a plain step of the joints counts
     simulation = start(recipe, ["push", "lift"])
     wander(simulation, 4)
-    simulation.target[1, :] += 1.5
+    simulation.target[1] += 2.5
     simulation.step()
     assert simulation.state.diverged[1]
     kept = simulation.divergences[-1]
