@@ -23,7 +23,6 @@ from iowbc.task.privileged import privileged
 from iowbc.task.recorder import Ending, count_endings, count_step, write_signals
 from iowbc.task.references import ReferenceLayer, both_wrists
 from iowbc.task.rewards.total import Scored, Step, score
-from iowbc.task.scenes import scene_of
 from iowbc.task.shared import Buffers
 from iowbc.task.snapshots import by_scene, by_world
 from iowbc.task.termination import dropped, fallen
@@ -54,9 +53,10 @@ class Batch:
         episodes: Sequence[Episode] | None = None,
         divergences: Path | None = None,
     ) -> None:
-        """`environments`: global indices, (n,); `scenes`: their scenes, by name. `episodes`: one an environment, or none to draw them as in training.
+        """`environments`: global indices, (n,); `scenes`: their scenes, by name.
 
-        `divergences`: folder in which diverged simulations are kept for replay.
+        `episodes`: one an environment, or none to draw them as in training. `divergences`: folder in which diverged
+        simulations are kept for replay.
         """
         task = recipe.task
         self.recipe, self.robot, self.buffers, self.layout = recipe, load_robot(robot), buffers, full_layout(recipe)

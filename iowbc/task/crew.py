@@ -179,7 +179,7 @@ class Workers:
 
 
 def _start(memory: int) -> Member:
-    """A new worker process; SIGINT and SIGTERM are blocked from its first moment, for the parent decides when to end."""
+    """A new worker process; SIGINT and SIGTERM are blocked from its first moment, for the parent decides the end."""
     ours, theirs = socket.socketpair()
     log = os.memfd_create("iowbc-worker-log", os.MFD_CLOEXEC)
     bound = threading.current_thread() is threading.main_thread()

@@ -16,6 +16,7 @@ from iowbc.task.crew import Alone
 from iowbc.task.setup import Setup
 
 Observation = NDArray[np.float32]
+RENDER_MODE = "rgb_array"
 RATE = 50
 """Frames a second of a film in which every step is a frame; the recipe's own rate goes before it."""
 
@@ -23,7 +24,7 @@ RATE = 50
 class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc]
     """One robot. Observations are [s_t | s_priv], actions the residual a; difficulty as at `curriculum.fixed_level`."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": RATE}  # noqa: RUF012 - gymnasium's own attribute
+    metadata = {"render_modes": [RENDER_MODE], "render_fps": RATE}  # noqa: RUF012 - gymnasium's own attribute
 
     def __init__(
         self,
@@ -35,8 +36,8 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
     ) -> None:
         """`scene`: free, lift, tyre or push. `recipe`: defaults without one. `robot`: folder of its description, else
         the recipe's. `rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture."""
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode is None or one of {self.metadata['render_modes']}, got {render_mode!r}")
+        if render_mode not in (None, RENDER_MODE):
+            raise ValueError(f"render_mode is None or {RENDER_MODE!r}, got {render_mode!r}")
         recipe = recipe or Recipe(name=scene)
         task = recipe.task
         shares = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
@@ -73,8 +74,8 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
         reward = float(self._buffers["reward"][0])
         return self._buffers[kind][0].copy(), reward, self._begun and not truncated, truncated, {}
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """A picture (height, width, 3), in the mode `rgb_array`; after an episode's end it shows the next one's start."""
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (height, width, 3), or None without a render mode; after an end it shows the next start."""
         if self.render_mode is None:
             return None
         if self._renderer is None:

@@ -1,8 +1,8 @@
 """What a process needs to know to build its part of the environments."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Self
 
@@ -97,8 +97,7 @@ class Setup:
 
 def shares(count: int, parts: int) -> list[tuple[int, int]]:
     """First and last environment (excluded) of each of `parts` nearly equal groups."""
-    edges: Sequence[int] = [round(part * count / parts) for part in range(parts + 1)]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(round(part * count / parts) for part in range(parts + 1)))
 
 
 def _text(path: Path | None) -> str | None:

@@ -43,9 +43,9 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         divergences: Path | None = None,
         patience: float = PATIENCE,
     ) -> None:
-        """`robot`: folder of its description. `rg`: folder of the fitted reference generator; without one θ_S_ref is the
-        default posture. `workers`: processes; 0 steps the environments in this one. `episodes`: one an environment,
-        played anew after every reset. `divergences`: folder for simulations that diverged.
+        """`robot`: folder of its description. `rg`: folder of the fitted reference generator; without one θ_S_ref is
+        the default posture. `workers`: processes; 0 steps the environments in this one. `episodes`: one an
+        environment, played anew after every reset. `divergences`: folder for simulations that diverged.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
         raises.

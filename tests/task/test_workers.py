@@ -17,7 +17,7 @@ import psutil
 import pytest
 from task_worlds import actions
 
-from iowbc.task.crew import Workers, WorkerFailed
+from iowbc.task.crew import WorkerFailed, Workers
 from iowbc.task.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
