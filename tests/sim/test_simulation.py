@@ -130,7 +130,7 @@ def test_diverged_environment_lives_on_after_a_reset(start, carrying):
 
 def test_divergence_is_kept_and_diverges_again_when_replayed(start, robot, tmp_path):
     recipe = changed(Recipe(), "physics.fastest", 8.0)  # so that a plain step of the joints counts
-    simulation = start(recipe, ["push", "lift"])
+    simulation = start(recipe, ["push", "lift"], action_latency=0.0)
     wander(simulation, 4)
     simulation.target[1] += 2.5
     simulation.step()
