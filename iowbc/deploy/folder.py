@@ -8,6 +8,7 @@ from pathlib import Path
 from iowbc.deploy import contract
 from iowbc.deploy.graph import ControllerGraph, Port
 from iowbc.deploy.onnx_graph import write_onnx
+from iowbc.recipe.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.command import COMMAND
 
@@ -29,7 +30,7 @@ def write_folder(
         (out / contract.GENERATOR).mkdir()
         for name in contract.GENERATOR_FILES:
             shutil.copy(rg / name, out / contract.GENERATOR / name)
-    (out / contract.RECIPE).write_text(recipe.model_dump_json(indent=1) + "\n")
+    (out / contract.RECIPE).write_text(world_of(recipe).model_dump_json(indent=1) + "\n")
     statement = contract.Contract(
         recipe=recipe.name,
         robot=robot.name,
@@ -61,6 +62,20 @@ def write_folder(
     )
     contract.write_contract(statement, out)
     return statement
+
+
+def world_of(recipe: Recipe) -> Recipe:
+    """The recipe reduced to what the export depends on; all else at its default, but for the commands to play."""
+    asked = recipe.export.acceptance
+    return Recipe(
+        name=recipe.name,
+        seed=recipe.seed,
+        robot=recipe.robot,
+        simulation=recipe.simulation,
+        task=recipe.task,
+        eval=Evaluation() if asked is None else Evaluation(sequence=asked.sequence),
+        export=recipe.export,
+    )
 
 
 def _entry(port: Port) -> contract.PortEntry:

@@ -17,9 +17,14 @@ NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
-    """The trials to film, with names: the first trial of up to `count` masses, spread over all of them."""
+    """The trials to film, with names: the first trial of up to `count` masses, spread over those with an object.
+
+    Without any object, over what there is. A single film is of the middle mass.
+    """
     first = trials[trials["trial"] == 0]
-    places = np.linspace(0, len(first) - 1, min(count, len(first))).round().astype(int)
+    first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
+    ends = (0, len(first) - 1) if count > 1 else ((len(first) - 1) // 2,) * 2
+    places = np.linspace(*ends, min(count, len(first))).round().astype(int)
     rows = [first.iloc[place] for place in dict.fromkeys(places.tolist())]
     return [(f"{row['case']}_{row['mass']:g}kg".translate(NOT_WORD), row) for row in rows]
 

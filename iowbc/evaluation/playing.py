@@ -65,7 +65,7 @@ def play(
     """Play one episode; in the viewer, or with `video` into that mp4 file (no display needed).
 
     mass: of the object [kg]; 0 plays without one. partner_share: None draws it. sequence: the commands, by default
-    those of the recipe's `eval.sequence`. video_settings: by default `eval.video`, without its limit of length.
+    those of the recipe's `eval.sequence`, for an exported folder those of its acceptance. video_settings: by default `eval.video`, without its limit of length.
     Returns how it ended: `end` ("finished", "fell", ...), `seconds`, `duration`, and with a film its `frames`.
     Raises NoDisplay, Stopped when interrupted or when the viewer was closed, ContractBroken for a damaged export.
     """

@@ -53,7 +53,7 @@ def run(job: Job) -> None:
             job.report.progress(len(trials), len(trials), f"film {name}")
             film_row(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
     except NoRenderer as reason:
-        job.report.say(f"eval: no films: {reason}")
+        job.report.say(f"no films: {reason}")
     except Stopped as stopped:
         raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
     metrics = headline(summary)
@@ -61,7 +61,7 @@ def run(job: Job) -> None:
     (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
     for suite, rows in summary.groupby("suite", sort=False):
         counts = ", ".join(f"{row['mass']:g} kg {row['survived']}/{row['trials']}" for _, row in rows.iterrows())
-        job.report.say(f"eval: {suite}: survived {counts}")
+        job.report.say(f"{suite}: survived {counts}")
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:

@@ -81,7 +81,7 @@ def run(job: Job) -> None:
     summary = {"metrics": metrics, "parity_by_output": differences, "seconds": [trial.seconds for trial in played]}
     (job.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
     job.report.say(
-        f"export: torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(policy.inputs)} steps; "
+        f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(policy.inputs)} steps; "
         f"an inference takes {metrics['inference_ms']:.3f} ms"
     )
     worst = max(differences, key=lambda name: differences[name])
@@ -97,7 +97,7 @@ def run(job: Job) -> None:
             f"the exported controller kept a {asked.mass:g} kg object ({asked.scene}) for {seconds_asked:g} s "
             f"in {survived} of {len(played)} trials"
         )
-        job.report.say(f"export: {result}")
+        job.report.say(result)
         if survived < asked.minimum:
             raise StageFailed(
                 f"acceptance: {result}, export.acceptance.minimum is {asked.minimum}; "

@@ -88,6 +88,13 @@ def test_the_folder_holds_all_that_a_robot_needs(done: Job, rg: Path) -> None:
     assert contract.sources == {"rg-fit": rg.name, "distill": "d" * 8, "export": "e" * 8}
 
 
+def test_the_folder_depends_on_nothing_outside_of_the_stages_key(done: Job) -> None:
+    world = exported_source(done.out).recipe
+    assert world.task == done.recipe.task
+    assert world.teacher == Recipe(name="default").teacher
+    assert [segment.duration for segment in world.eval.sequence] == [0.3], "played as it was accepted"
+
+
 def test_parity_size_and_time_are_in_the_summary(done: Job) -> None:
     metrics = json.loads((done.out / "summary.json").read_text())["metrics"]
     assert 0 <= metrics["parity"] < 1e-5
