@@ -19,6 +19,8 @@ from iowbc.evaluation.rollout import Acting, Played, Stopped, play_in
 from iowbc.evaluation.trials import UNDISTURBED, command_script, trials_at
 from iowbc.learning.acting import load_policy
 from iowbc.recipe.evaluation import Segment, Video
+from iowbc.recipe.holding import SCENES
+from iowbc.recipe.problems import UsageError
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.episode import Episode
 from iowbc.task.vector_env import VectorEnv
@@ -65,11 +67,17 @@ def play(
     """Play one episode; in the viewer, or with `video` into that mp4 file (no display needed).
 
     mass: of the object [kg]; 0 plays without one. partner_share: None draws it. sequence: the commands, by default
-    those of the recipe's `eval.sequence`, for an exported folder those of its acceptance. video_settings: by default `eval.video`, without its limit of length.
+    those of the recipe's `eval.sequence`, for an exported folder those of its acceptance. video_settings: by default
+    `eval.video`, without its limit of length.
     Returns how it ended: `end` ("finished", "fell", ...), `seconds`, `duration`, and with a film its `frames`.
-    Raises NoDisplay, Stopped when interrupted or when the viewer was closed, ContractBroken for a damaged export.
+    Raises UsageError for an unknown scene or a film that is no mp4, NoDisplay, ContractBroken for a damaged export,
+    Stopped when interrupted or when the viewer was closed.
     """
     recipe = source.recipe
+    if scene not in SCENES:
+        raise UsageError(f"no scene {scene!r}; valid: {', '.join(SCENES)}")
+    if video is not None and video.suffix != ".mp4":
+        raise UsageError(f"{video}: a film is an mp4 file; give a name that ends in .mp4")
     script = command_script(sequence or recipe.eval.sequence, recipe.task.commands)
     fixed = {} if disturbances else dict(UNDISTURBED)
     if partner_share is not None:

@@ -36,6 +36,7 @@ class Film:
 
     def __init__(self, path: Path, fps: int) -> None:
         self.path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
         self._unfinished = path.with_suffix(".part.mp4")
         self._writer = imageio.v2.get_writer(
             self._unfinished, format="FFMPEG", fps=fps, codec="libx264", quality=QUALITY, pixelformat="yuv420p"

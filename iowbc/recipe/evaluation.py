@@ -4,6 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from iowbc.recipe.holding import Held, SceneName
 from iowbc.recipe.section import Section
 
 
@@ -42,7 +43,7 @@ class Beyond(Section):
 class Sweep(Section):
     """Trials over a range of object masses in one scene."""
 
-    scene: str = "lift"
+    scene: SceneName = "lift"
     """Scene of `simulation.scenes` in which the object is met; a mass of 0 is played in the scene without an object."""
     masses: tuple[float, ...] = Field(default=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
     """Object masses [kg], ascending."""
@@ -53,7 +54,7 @@ class Sweep(Section):
     partner_share: float | None = Field(default=0.0, ge=-1, le=1)
     """Part of the weight, or in pushing of the rolling resistance, that the partner bears; negative resists, 0 leaves
     all of it to the robot, empty draws it as in training."""
-    fixed: dict[str, float] = Field(default_factory=dict)
+    fixed: Held = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
     """Command sequence of this sweep; empty takes `eval.sequence`."""
@@ -72,7 +73,7 @@ class HeavyCase(Section):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]*$")
     """Name of the case in tables and figures."""
-    scene: str
+    scene: SceneName
     """Scene of `simulation.scenes`."""
     mass: float = Field(gt=0)
     """Object mass [kg]."""
@@ -80,7 +81,7 @@ class HeavyCase(Section):
     """Rolling resistance μ of the crate's wheels; empty draws it as in training."""
     partner_share: float | None = Field(default=0.5, ge=-1, le=1)
     """As in a sweep; half of the load by default, for these are carried by two."""
-    fixed: dict[str, float] = Field(default_factory=dict)
+    fixed: Held = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
     """Command sequence of this case; empty takes `eval.sequence`."""

@@ -5,13 +5,14 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation import Segment
+from iowbc.recipe.holding import SceneName
 from iowbc.recipe.section import Section
 
 
 class Acceptance(Section):
     """A short trial of the exported controller in the simulation; a gate of the stage."""
 
-    scene: str = "lift"
+    scene: SceneName = "lift"
     """Scene of `simulation.scenes`."""
     mass: float = Field(default=4.0, ge=0)
     """Object mass [kg]; 0 is played in the scene without an object."""

@@ -15,6 +15,7 @@ from iowbc.evaluation.playing import NoDisplay, exported_source, play, require_d
 from iowbc.evaluation.rollout import Stopped
 from iowbc.learning.storage import save_network
 from iowbc.recipe.evaluation import Segment, Video
+from iowbc.recipe.problems import UsageError
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.stages import export
@@ -150,6 +151,13 @@ def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
     assert 1 <= result["frames"] <= 4
     assert film.stat().st_size > 500
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
+
+
+def test_what_cannot_be_played_is_refused_with_what_can(done: Job, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="valid: free, lift"):
+        play(exported_source(done.out), scene="sofa", video=tmp_path / "out.mp4")
+    with pytest.raises(UsageError, match="mp4"):
+        play(exported_source(done.out), video=tmp_path / "out.gif")
 
 
 def test_an_interrupted_film_leaves_no_file(done: Job, tmp_path: Path) -> None:

@@ -1,10 +1,16 @@
 """What the evaluation and export sections of a recipe accept."""
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from iowbc.recipe.evaluation import Evaluation, HeavyCase, Segment, Sweep
 from iowbc.recipe.export import Acceptance
+from iowbc.recipe.holding import HOLDABLE, SCENES
+from iowbc.recipe.references import Grasps
+from iowbc.recipe.simulation import Simulation as SimulationRecipe
+from iowbc.robot.description import load_robot, robot_folder
+from iowbc.sim.simulation import Simulation
 
 
 def test_the_quickstart_question_can_be_asked() -> None:
@@ -32,6 +38,24 @@ def test_an_evaluation_of_nothing_is_refused() -> None:
 def test_a_ramp_longer_than_its_segment_is_refused() -> None:
     with pytest.raises(ValidationError, match="longer than the segment"):
         Segment(duration=1.0, ramp=2.0)
+
+
+def test_unknown_scenes_and_quantities_are_named_with_what_is_valid() -> None:
+    with pytest.raises(ValidationError, match="no scene 'lft'; valid: free, lift"):
+        Sweep(scene="lft")
+    with pytest.raises(ValidationError, match=r"no randomised quantity friction; valid: .*ground_friction"):
+        Sweep(fixed={"friction": 1.0})
+
+
+def test_what_may_be_held_is_what_the_simulation_draws() -> None:
+    robot = load_robot(robot_folder("g1"))
+    simulation = Simulation(robot, SimulationRecipe(), envs=np.arange(1), seed=0, scenes=["lift"])
+    follows_from_others = {"slip_force"}
+    assert set(HOLDABLE) == set(simulation.drawn) - follows_from_others
+
+
+def test_every_scene_has_a_base_grasp() -> None:
+    assert set(SCENES) == set(Grasps.model_fields)
 
 
 def test_a_minimum_above_the_trials_is_refused() -> None:
