@@ -12,7 +12,7 @@ Array = NDArray[Any]
 
 
 def posture_weights(robot: Robot, problem: Problem) -> Array:
-    """½ w (θ - θ_default)² per support joint, shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
+    """Weight w of ½ w (θ - θ_default)², shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
     waist = {body.hinge.name for body in robot.tree.chain(robot.torso, robot.base) if body.hinge is not None}
     hinges = robot.tree.hinges()
     weights = []

@@ -49,8 +49,8 @@ def compare(dataset: Dataset, again: Shard) -> Check | None:
         "crosscheck_max": float(difference.max()),
     }
     worst = [
-        f"number {again.kept[i]} (height {dataset.command[rows[i], 0]:.3f} m, pitch {dataset.command[rows[i], 1]:+.3f} rad): "
-        f"{difference[i]:.4f} rad"
+        f"number {again.kept[i]} (height {dataset.command[rows[i], 0]:.3f} m, "
+        f"pitch {dataset.command[rows[i], 1]:+.3f} rad): {difference[i]:.4f} rad"
         for i in np.argsort(-difference)[:WORST]
     ]
     return Check(difference, len(difference), metrics, worst)

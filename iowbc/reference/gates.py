@@ -46,7 +46,7 @@ class Judge:
             self.forces.append(pinocchio.Force.Zero())
 
     def arms(self, sample: Sample) -> None:
-        """Rejects arms that collide with each other or the trunk, before anything is solved: the legs stand straight."""
+        """Rejects arms that collide with each other or the trunk, before anything is solved; legs at their default."""
         support = self.support
         q = support.whole(support.start(), sample.arm)
         pinocchio.forwardKinematics(support.full, support.full_data, q)

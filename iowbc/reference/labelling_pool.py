@@ -1,4 +1,4 @@
-"""Labels samples in worker processes: in shards on disk, and a native crash of a solver costs one sample, not the stage."""
+"""Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample."""
 
 import ctypes
 import multiprocessing
@@ -6,7 +6,7 @@ import os
 import signal
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -71,8 +71,8 @@ def label_all(
 ) -> Shard:
     """Labels the samples with these numbers. The result does not depend on the number of workers.
 
-    Shards in `folder` that belong to `key` are reused, others made anew. Raises `Stopped` when `interrupted()` turns true, RuntimeError when
-    a worker fails in Python or cannot start.
+    Shards in `folder` that belong to `key` are reused, others made anew. Raises `Stopped` when `interrupted()` turns
+    true, RuntimeError when a worker fails in Python or cannot start.
     """
     folder.mkdir(parents=True, exist_ok=True)
     chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
@@ -141,12 +141,9 @@ def _assign(worker: _Worker, book: _Book, chunks: Sequence[Sequence[int]], paths
     if worker.chunk is not None or not book.waiting:
         return
     worker.chunk = book.waiting.pop(0)
-    try:
-        worker.connection.send(
-            (worker.chunk, chunks[worker.chunk], book.crashed.get(worker.chunk, []), paths[worker.chunk])
-        )
-    except (BrokenPipeError, ConnectionResetError):
-        pass  # the worker is dead; its closed pipe is news that _receive reads
+    job = (worker.chunk, chunks[worker.chunk], book.crashed.get(worker.chunk, []), paths[worker.chunk])
+    with suppress(BrokenPipeError, ConnectionResetError):  # of a dead worker _receive hears
+        worker.connection.send(job)
 
 
 def _with_news(team: Sequence[_Worker]) -> list[_Worker]:

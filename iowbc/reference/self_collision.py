@@ -41,7 +41,10 @@ class SelfCollision:
 
 
 def segment_distance(start_a: Array, end_a: Array, start_b: Array, end_b: Array) -> Array:
-    """Distance between segments, row by row; shapes (n, 3), a segment may be a point (Ericson, Real-Time Collision Detection, 5.1.9)."""
+    """Distance between segments, row by row; shapes (n, 3), a segment may be a point.
+
+    Ericson, Real-Time Collision Detection, 5.1.9.
+    """
     along_a, along_b, between = end_a - start_a, end_b - start_b, start_a - start_b
     a, e = _dot(along_a, along_a), _dot(along_b, along_b)
     b, c, f = _dot(along_a, along_b), _dot(along_a, between), _dot(along_b, between)

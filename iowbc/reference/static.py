@@ -1,7 +1,8 @@
 """The steady state of the optimal control problem (paper eq. 4): the least-torque posture in equilibrium on two soles.
 
-Variables are the base pose, the support joints and the two sole wrenches; Gauss-Newton steps with the feet and the base's equilibrium as
-linearised equalities, eliminated by an orthogonal decomposition, and joint, torque and contact limits as inequalities of a small QP.
+Variables are the base pose, the support joints and the two sole wrenches; Gauss-Newton steps with the feet and the
+base's equilibrium as linearised equalities, eliminated by an orthogonal decomposition, and joint, torque and contact
+limits as inequalities of a small QP.
 """
 
 from typing import Any, Literal
@@ -76,7 +77,7 @@ class StaticMethod:
 
     def _step(self, q: Array, wrench: Array, sample: Sample, torso: Any) -> tuple[Array, Array]:
         """One Gauss-Newton step: tangent (21,) and change of the wrenches (2, 6)."""
-        support, nv, joints = self.support, self.velocities, self.joints
+        support, nv = self.support, self.velocities
         residual, gradient, torque, torque_rows, equality, error = self._linearise(q, wrench, sample, torso)
         orthogonal, triangle = np.linalg.qr(equality.T, mode="complete")
         count = len(error)

@@ -1,4 +1,4 @@
-"""The robot with its arms locked: a pinocchio model of base and support branch that carries the arms' and payloads' inertia."""
+"""The robot with its arms locked: base and support branch that carry the inertia of arms and payloads."""
 
 from typing import Any
 
@@ -71,7 +71,7 @@ class SupportModel:
 
     def start(self) -> Array:
         """The default posture with the soles in their places, shape (22,)."""
-        q = pinocchio.neutral(self.model)
+        q: Array = pinocchio.neutral(self.model)
         q[7:] = self.robot.default_position[self.robot.support]
         pinocchio.framesForwardKinematics(self.model, self.data, q)
         soles = [self.data.oMf[sole].translation for sole in self.soles]

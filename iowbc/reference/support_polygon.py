@@ -14,7 +14,7 @@ Array = NDArray[Any]
 
 
 def support_edges(robot: Robot, problem: Problem) -> tuple[Array, Array]:
-    """Inward normals (edges, 2) and offsets (edges,) [m] of the convex hull of both soles: distance inside = n·p + d."""
+    """Inward normals n (edges, 2) and offsets d (edges,) [m] of both soles' convex hull: distance inside is n·p + d."""
     corners = robot.sole_polygon + mean_stance(problem.stance_width)[:, None, :2]
     equations = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)
     return -equations[:, :2], -equations[:, 2]

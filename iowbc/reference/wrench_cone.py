@@ -1,4 +1,4 @@
-"""Which wrenches a flat sole can carry: friction pyramid, centre of pressure within a rectangle, yaw torsion, least load."""
+"""Which wrenches a flat sole can carry: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -27,8 +27,8 @@ class SoleLimits:
     def rows(self) -> tuple[Array, Array]:
         """A and b of A f ≤ b for a wrench f (force, moment) in the sole's frame, shapes (17, 6) and (17,).
 
-        The friction coefficient is that of the pyramid inside the cone, μ/√2. The yaw rows bound the torsion that four corner forces
-        inside that pyramid can make (Caron, Pham, Nakamura, ICRA 2015).
+        The friction coefficient is that of the pyramid inside the cone, μ/√2. The yaw rows bound the torsion that four
+        corner forces inside that pyramid can make (Caron, Pham, Nakamura, ICRA 2015).
         """
         x, y, mu = self.half_length, self.half_width, self.friction / np.sqrt(2.0)
         pyramid = [[1, 0, -mu, 0, 0, 0], [-1, 0, -mu, 0, 0, 0], [0, 1, -mu, 0, 0, 0], [0, -1, -mu, 0, 0, 0]]

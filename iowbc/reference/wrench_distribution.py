@@ -18,7 +18,7 @@ SOLVED = 1
 
 
 def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:
-    """Wrenches (2, 6) in the soles' frames, in equilibrium with gravity. Raises `Rejected` where the limits leave none."""
+    """Wrenches (2, 6) in the soles' frames, in equilibrium with gravity. Raises `Rejected` where limits leave none."""
     model, data = support.model, support.data
     gravity = pinocchio.computeGeneralizedGravity(model, data, configuration).copy()
     pinocchio.computeJointJacobians(model, data, configuration)
