@@ -65,6 +65,8 @@ def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | 
         },
         **buffer,
     )
+    if isinstance(model.rollout_buffer, MirroredRolloutBuffer):
+        model.rollout_buffer.policy = model.policy
     model.set_logger(Logger(folder=None, output_formats=[]))
     return model
 

@@ -84,7 +84,7 @@ def run(job: Job) -> None:
             environment.restore(checkpoint.under("environment", arrays))
             history.frames[:], starts[:] = arrays["history"], arrays["starts"]
             observation = arrays["observation"]
-            job.report.say(f"distill: resumed from its checkpoint at round {finished} of {rounds}")
+            job.report.say(f"resumed from its checkpoint at round {finished} of {rounds}")
         else:
             observation = environment.reset()
         curves = Curves(job.work / "curves.jsonl", finished * settings.environments * settings.rollout)

@@ -59,7 +59,7 @@ def run(job: Job) -> None:
             environment.restore(checkpoint.under("environment", arrays))
             ppo.restore_ppo(model, env, arrays)
             job.report.say(
-                f"teacher: resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps"
+                f"resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps"
             )
         curves = Curves(job.work / "curves.jsonl", model.num_timesteps)
         clock = _Clock(model.num_timesteps)
