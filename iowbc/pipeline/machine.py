@@ -37,6 +37,7 @@ def boot() -> str:
         return ""
 
 
+@functools.cache
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that shape a result."""
     found = {"python": platform.python_version()}

@@ -102,7 +102,7 @@ class Planner:
         ingredients = {
             "stage": stage.name,
             "version": stage.version,
-            "recipe": {path: _value(self.resolved, path, stage) for path in stage.slice},
+            "recipe": {path: slice_value(self.resolved, path, stage) for path in stage.slice},
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
@@ -218,7 +218,7 @@ def _shown(values: Mapping[str, Any], path: str) -> str:
     return shown(values[path]) if path in values else "(absent)"
 
 
-def _value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:
+def slice_value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:
     """The part of a recipe at a dotted path."""
     if path.split(".")[0] in ("execution", "stages"):
         raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")

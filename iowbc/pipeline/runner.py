@@ -4,8 +4,6 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-import yaml
-
 from iowbc.pipeline.display import Display, StageView
 from iowbc.pipeline.history import remember
 from iowbc.pipeline.locking import key_lock
@@ -15,6 +13,7 @@ from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.store import Artifact, Damaged
 from iowbc.pipeline.tracking import Tracker
 from iowbc.pipeline.workspace import Workspace
+from iowbc.recipe.writing import as_yaml
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
 
 
@@ -169,8 +168,7 @@ class Runner:
             "code": dict(step.code),
             "versions": versions(),
         }
-        resolved = yaml.safe_dump(self.loaded.recipe.model_dump(mode="json"), sort_keys=False)
-        self.store.seal(workspace.out, details, step.ingredients or {}, resolved)
+        self.store.seal(workspace.out, details, step.ingredients or {}, as_yaml(self.loaded.recipe))
         artifact = self.store.publish(workspace.out, step.stage.name, step.key)
         workspace.remove()
         return artifact

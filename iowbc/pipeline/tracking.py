@@ -12,8 +12,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from iowbc.pipeline.fingerprint import data_digest
 from iowbc.pipeline.journal import Journal, header, statuses, unsent
 from iowbc.pipeline.layout import Runs
@@ -21,6 +19,7 @@ from iowbc.pipeline.machine import boot, host
 from iowbc.pipeline.planning import flattened
 from iowbc.pipeline.store import INGREDIENTS, RECIPE, Artifact
 from iowbc.recipe.loading import LoadedRecipe
+from iowbc.recipe.writing import as_yaml
 
 PARENT = "recipe"
 """Identifier of the parent run within a journal; a nested run has its stage's name."""
@@ -58,7 +57,7 @@ class Tracker:
         journal.write(
             "run", id=PARENT, parent=None, name=recipe.name, tags=_process_tags(), params=parameters(resolved)
         )
-        journal.write("text", id=PARENT, file=RECIPE, text=yaml.safe_dump(resolved, sort_keys=False))
+        journal.write("text", id=PARENT, file=RECIPE, text=as_yaml(recipe))
         return journal
 
     def _continued(self, loaded: LoadedRecipe) -> Journal | None:

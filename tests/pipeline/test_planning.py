@@ -1,0 +1,195 @@
+"""A plan says what would run and why, with the recipe's line, the old value and the new one."""
+
+import dataclasses
+from pathlib import Path
+
+import fake_stages
+import pytest
+from conftest import RECIPE, Workplace
+
+from iowbc.pipeline import planning
+from iowbc.pipeline.fingerprint import canonical_json, code_digests, data_digest
+from iowbc.pipeline.planning import duration
+from iowbc.recipe.problems import RecipeError
+
+
+def test_a_first_plan_says_that_nothing_is_stored(workplace: Workplace) -> None:
+    assert {step.reasons for step in workplace.plan().values()} == {("nothing stored yet",)}
+    assert not workplace.store.runs.root.exists()
+
+
+def test_what_has_run_is_cached(workplace: Workplace) -> None:
+    workplace.run()
+    assert workplace.ran() == ["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+    assert all(step.cached for step in workplace.plan().values())
+    workplace.run()
+    assert workplace.ran() == []
+
+
+def test_a_changed_field_is_named_with_its_line_and_both_values(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.recipe.write_text(RECIPE.replace("steps: 4096", "gamma: 0.95\n  steps: 8192"))
+    steps = workplace.plan()
+    assert steps["teacher"].reasons == (
+        f"teacher.gamma ({workplace.recipe}:3:3): 0.99 -> 0.95",
+        f"teacher.steps ({workplace.recipe}:4:3): 4096 -> 8192",
+    )
+    assert steps["distill"].reasons == ("teacher is made anew",)
+    assert steps["rg-fit"].cached
+
+
+def test_an_override_is_named_as_the_place(workplace: Workplace) -> None:
+    workplace.run()
+    assert workplace.plan("eval.trials=9")["eval"].reasons == ("eval.trials (--set eval.trials=9): 5 -> 9",)
+
+
+def test_a_value_that_went_back_to_its_default_says_so(workplace: Workplace) -> None:
+    workplace.run("eval.trials=9")
+    assert workplace.plan()["eval"].reasons == ("eval.trials (default): 9 -> 5",)
+
+
+def test_a_change_of_eval_reruns_eval_alone(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.ran()
+    workplace.run("eval.trials=9")
+    assert workplace.ran() == ["eval"]
+
+
+def test_an_unchanged_result_keeps_what_reads_it(workplace: Workplace) -> None:
+    """The inputs' contents are in the key, not their keys: the fake teacher leaves the same files for any `gamma`."""
+    workplace.run()
+    workplace.ran()
+    workplace.run("teacher.gamma=0.9")
+    assert workplace.ran() == ["teacher"]
+
+
+def test_how_a_machine_runs_a_recipe_is_in_no_key(workplace: Workplace) -> None:
+    workplace.run()
+    steps = workplace.plan("execution.workers=7", "execution.experiment=other", "name=small", "description=new")
+    assert all(step.cached for step in steps.values())
+
+
+def test_going_back_to_an_earlier_recipe_finds_its_artifacts(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.run("seed=4")
+    workplace.ran()
+    workplace.run()
+    assert workplace.ran() == []
+
+
+def test_a_new_version_of_a_stage_reruns_it(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.registry["eval"] = dataclasses.replace(workplace.registry["eval"], version=2)
+    assert workplace.plan()["eval"].reasons == ("stage version 1 -> 2",)
+
+
+def test_changed_robot_files_rerun_everything(workplace: Workplace) -> None:
+    workplace.run()
+    (workplace.robot / "robot.yaml").write_text("name: g1\nkp: 3\n")
+    assert workplace.plan()["rg-dataset"].reasons == ("the robot's files changed",)
+
+
+def test_a_new_recipe_is_compared_with_its_own_kind_and_says_whose(workplace: Workplace) -> None:
+    workplace.run()
+    steps = workplace.plan("name=other", "seed=4")
+    assert steps["teacher"].reasons[:2] == ("seed (--set seed=4): 3 -> 4", "compared with that of recipe small")
+    assert steps["eval"].reasons == ("distill is made anew",)
+
+
+def test_forced_stages_run_although_they_are_stored(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.ran()
+    workplace.run(force=frozenset({"teacher"}))
+    assert workplace.ran() == ["teacher"]
+
+
+def test_until_ends_the_run_early(workplace: Workplace) -> None:
+    workplace.run(until="rg-fit")
+    assert workplace.ran() == ["rg-dataset", "rg-fit"]
+
+
+def test_an_unknown_stage_lists_the_recipes_stages(workplace: Workplace) -> None:
+    with pytest.raises(RecipeError, match=r"--force nothing: .* valid: rg-dataset, rg-fit, teacher"):
+        workplace.plan(force=frozenset({"nothing"}))
+
+
+def test_a_stage_whose_input_the_recipe_leaves_out_is_named_with_its_line(workplace: Workplace) -> None:
+    workplace.registry["teacher"] = dataclasses.replace(workplace.registry["teacher"], reads=lambda _: ("rg-fit",))
+    workplace.recipe.write_text(RECIPE + "stages: [teacher, eval]\n")
+    with pytest.raises(RecipeError, match=r"small\.yaml:5:\d+: key 'stages': teacher reads rg-fit"):
+        workplace.plan()
+
+
+def test_the_expected_time_is_that_of_the_last_run(workplace: Workplace) -> None:
+    made = workplace.run()
+    step = workplace.plan("eval.trials=9")["eval"]
+    assert step.expected == made["eval"].manifest.seconds
+
+
+@pytest.fixture
+def changing_code(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> Workplace:
+    digests = {"task": "old"}
+    monkeypatch.setattr(planning, "stage_code", lambda stage: dict(digests) if stage.name == "eval" else {})
+    workplace.run()
+    workplace.ran()
+    digests["task"] = "new"
+    return workplace
+
+
+def test_changed_code_is_reported_and_reruns_nothing(changing_code: Workplace) -> None:
+    step = changing_code.plan()["eval"]
+    assert step.cached
+    assert step.notes == ("code changed since it was made: task",)
+
+
+def test_changed_code_reruns_the_stage_when_asked(changing_code: Workplace) -> None:
+    changing_code.run(on_code_change="rerun")
+    assert changing_code.ran() == ["eval"]
+    assert changing_code.plan(on_code_change="rerun")["eval"].cached
+
+
+def test_comments_and_docstrings_are_not_code(tmp_path: Path) -> None:
+    def digest(text: str) -> str:
+        part = tmp_path / str(len(list(tmp_path.iterdir()))) / "part"
+        part.mkdir(parents=True)
+        (part / "module.py").write_text(text)
+        return code_digests(part.parent, ["part"])["part"]
+
+    first = digest('"""Doc."""\ndef f(x):\n    """Twice."""\n    return 2 * x\n')
+    assert digest("def f(x):\n    # twice\n    return 2 * x\n") == first
+    assert digest("def f(x):\n    return 3 * x\n") != first
+
+
+def test_a_part_of_the_package_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no subpackage or module 'nothing'"):
+        code_digests(tmp_path, ["nothing"])
+
+
+def test_a_key_does_not_depend_on_the_order_of_what_is_hashed() -> None:
+    assert data_digest({"a": 1, "b": [1.0, None]}) == data_digest({"b": [1.0, None], "a": 1})
+    assert canonical_json({"b": "é", "a": 1e-3}) == '{"a":0.001,"b":"\\u00e9"}'
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        data_digest(float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.42, "0.4 s"), (42, "42 s"), (600, "10 min"), (11_100, "3 h 05 min"), (None, "")]
+)
+def test_a_duration_is_told_for_people(seconds: float | None, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_the_stages_of_the_package_are_light_and_whole() -> None:
+    """Their slices name real parts of a recipe, their code exists, and their order is the pipeline's."""
+    from iowbc.recipe.recipe import PIPELINE, Recipe
+    from iowbc.stages.registry import STAGES
+
+    assert tuple(STAGES) == PIPELINE
+    resolved = Recipe(name="any").model_dump(mode="json")
+    for stage in STAGES.values():
+        assert planning.stage_code(stage)
+        for path in stage.slice:
+            assert planning.slice_value(resolved, path, stage) is not None or "." in path
+        for read in stage.reads(Recipe(name="any")):
+            assert PIPELINE.index(read) < PIPELINE.index(stage.name)
+    assert tuple(fake_stages.STAGES) == PIPELINE

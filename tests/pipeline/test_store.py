@@ -1,0 +1,110 @@
+"""Artifacts are published whole or not at all, and damage is noticed."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import Workplace
+
+from iowbc.pipeline.store import MANIFEST, Damaged, Store
+from iowbc.pipeline.workspace import Workspace
+from iowbc.stages.contract import Interrupted
+
+
+def flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[3] ^= 1
+    path.write_bytes(content)
+
+
+def shorten(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+DAMAGES: dict[str, Callable[[Path], None]] = {
+    "a changed byte": lambda folder: flip(folder / "result.json"),
+    "a short file": lambda folder: shorten(folder / "result.json"),
+    "a missing file": lambda folder: (folder / "result.json").unlink(),
+    "no manifest": lambda folder: (folder / MANIFEST).unlink(),
+    "half a manifest": lambda folder: shorten(folder / MANIFEST),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())
+def test_a_damaged_artifact_is_set_aside_and_made_anew(workplace: Workplace, damage: Callable[[Path], None]) -> None:
+    folder = workplace.run()["teacher"].folder
+    workplace.ran()
+    damage(folder)
+    step = workplace.plan()["teacher"]
+    assert not step.cached
+    assert step.reasons[0].startswith("damaged: ")
+    again = workplace.run()["teacher"]
+    assert workplace.ran() == ["teacher"]
+    assert len(list(workplace.store.runs.damaged.iterdir())) == 1
+    assert any("set aside" in line for line in workplace.display.lines)
+    workplace.store.verify(again)
+    assert all(step.cached for step in workplace.plan().values())
+
+
+def test_a_manifest_that_belongs_elsewhere_is_damage(workplace: Workplace) -> None:
+    made = workplace.run()
+    shutil.copy(made["eval"].folder / MANIFEST, made["teacher"].folder / MANIFEST)
+    with pytest.raises(Damaged, match="belongs to eval"):
+        workplace.store.find("teacher", made["teacher"].manifest.key)
+
+
+def test_every_file_of_a_stage_is_in_the_manifest(workplace: Workplace) -> None:
+    artifact = workplace.run()["teacher"]
+    assert set(artifact.manifest.files) == {"figures/curve.png", "result.json", "summary.json", "tables/counts.md"}
+    assert artifact.metrics == {"count": 3.0}
+    assert artifact.ingredients["recipe"]["teacher"]["steps"] == 4096
+
+
+def test_nothing_is_left_of_a_finished_stages_workspace(workplace: Workplace) -> None:
+    workplace.run()
+    assert list(workplace.store.runs.work.iterdir()) == []
+
+
+def test_output_that_was_not_sealed_is_not_an_artifact(workplace: Workplace) -> None:
+    key = workplace.run(until="rg-dataset")["rg-dataset"].manifest.key
+    folder = workplace.store.folder("rg-dataset", key)
+    workspace = Workspace(workplace.store.runs, "rg-dataset", key)
+    workspace.root.mkdir(parents=True)
+    folder.rename(workspace.out)
+    (workspace.out / MANIFEST).unlink()
+    workplace.ran()
+    workplace.run(until="rg-dataset")
+    assert workplace.ran() == ["rg-dataset"]
+
+
+def test_a_death_between_sealing_and_publishing_loses_nothing(
+    workplace: Workplace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def die(self: Store, out: Path, stage: str, key: str) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "publish", die)
+        with pytest.raises(Interrupted):
+            workplace.run(until="rg-dataset")
+    assert workplace.store.artifacts() == []
+    workplace.ran()
+    workplace.run(until="rg-dataset")
+    assert workplace.ran() == []
+    assert len(workplace.store.artifacts()) == 1
+
+
+def test_a_forced_stage_replaces_its_artifact(workplace: Workplace) -> None:
+    before = workplace.run()["teacher"].manifest
+    after = workplace.run(force=frozenset({"teacher"}))["teacher"].manifest
+    assert after.key == before.key
+    assert after.made > before.made
+
+
+def test_a_manifest_says_how_an_artifact_was_made(workplace: Workplace) -> None:
+    artifact = workplace.run(workers=2)["teacher"]
+    manifest = json.loads((artifact.folder / MANIFEST).read_text())
+    assert (manifest["workers"], manifest["attempts"], manifest["recipe"]) == (2, 1, "small")
+    assert "python" in manifest["versions"]
