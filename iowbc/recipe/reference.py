@@ -42,7 +42,7 @@ class WristRegion(Section):
 
 
 class Sampling(Section):
-    """Which arm postures and base commands are labelled: a scrambled Sobol sequence with added boundary and nominal points."""
+    """Which arm postures and base commands are labelled: a scrambled Sobol sequence with edges and nominal points."""
 
     samples: int = Field(default=60000, ge=16, le=2_000_000)
     """Points tried; about six in ten get a label (three have arms in collision, one is out of the robot's reach)."""
@@ -51,21 +51,21 @@ class Sampling(Section):
     pitch: Interval = Interval(low=-0.5, high=1.5)
     """Commanded torso pitch [rad], positive leaning forward."""
     roll: Interval | None = None
-    """Commanded torso roll [rad], ±0.7 in the paper; without it the torso stays level and the network has no such input."""
+    """Commanded torso roll [rad], ±0.7 in the paper; without it the torso stays level and there is no such input."""
     yaw: Interval | None = None
     """Commanded torso yaw against the feet [rad]; as for `roll`."""
     payload: Interval | None = None
-    """Mass held at each wrist [kg], drawn for each hand; the network then has two more inputs. Without it the hands are empty."""
+    """Mass at each wrist [kg], drawn for each hand, with two more inputs of the network; without it empty hands."""
     heading_share: Share = 0.5
     """Share of the arms put by inverse kinematics at wrist positions in the heading frame, as wrist commands do."""
     torso_share: Share = 0.35
-    """Share put at wrist positions in the torso frame, as when a load leans with the trunk. The rest is uniform in joint space."""
+    """Share put at wrist positions in the torso frame, as when a load leans with the trunk; the rest is uniform."""
     wrists: WristRegion = WristRegion()
     """Where those wrists are."""
-    joint_ranges: dict[str, Interval] = {}
-    """Narrower ranges [rad] for named arm joints in the uniform share, e.g. `left_elbow_joint: {low: 0, high: 1}`."""
+    joint_ranges: dict[str, Interval] = Field(default={})
+    """Narrower ranges [rad] of arm joints in the uniform share, e.g. `left_elbow_joint: {low: 0, high: 1}`."""
     boundary_share: Share = 0.06
-    """Share of the samples moved onto the edge of the command ranges, so that the network does not extrapolate there."""
+    """Share of the samples moved onto the edge of the command ranges, so that nothing is extrapolated there."""
     nominal_share: Share = 0.03
     """Share of the samples with the arms at the default posture."""
     mirrored_share: Share = 0.05
@@ -94,7 +94,7 @@ class Problem(Section):
     lateral_weight: Positive = 5.0
     """Leg joints about other axes (roll, yaw) against the default posture [1/rad²]."""
     waist_weight: Positive = 5.0
-    """Waist joints [1/rad²]. Without it hips and waist share the pitch arbitrarily, and the optimum jumps with the command."""
+    """Waist joints [1/rad²]. Without it hips and waist share the pitch arbitrarily, and the optimum jumps."""
     friction: Positive = 0.6
     """Friction coefficient of the soles that a label may use; the simulation draws 0.5 to 1.2."""
     sole_fraction: Annotated[float, Field(gt=0, le=1)] = 0.9
@@ -126,10 +126,11 @@ class OptimalControl(Section):
     """Most solver iterations."""
     label_at: Annotated[float, Field(gt=0, lt=1)] = 0.7
     """Fraction of the horizon whose node is the label: the terminal node is biased by the terminal cost."""
-    velocity_weight: Positive = 0.1
-    """Joint and base velocities [s²/rad²]."""
-    terminal_factor: Positive = 10.0
-    """Terminal weights over running weights."""
+    velocity_weight: Positive = 0.03
+    """Joint and base velocities [s²/rad²]. Postures that cost nearly the same are left with a time constant of 0.2 s at 0.03, 0.3 s at 0.1."""
+    terminal_factor: Positive = 0.05
+    """Terminal weights over running weights, which count for each second: 0.05 is one more interval. At 10 the missing torques at the end
+    bend the flattest postures by 0.25 rad, and by 0.1 at the label's node."""
     terminal_velocity_weight: Positive = 1e2
     """Velocities at the end of the horizon [s²/rad²]."""
     limit_weight: Positive = 1e3
@@ -137,7 +138,7 @@ class OptimalControl(Section):
     cone_weight: Positive = 10.0
     """Quadratic barrier outside friction and centre of pressure [1/N²]."""
     contact_gains: tuple[NonNegative, NonNegative] = (100.0, 20.0)
-    """Stabilisation of the feet: position [1/s²] and velocity [1/s]. With a zero position gain the feet drift by centimetres."""
+    """Stabilisation of the feet: position [1/s²], velocity [1/s]. Without the first the feet drift by centimetres."""
     settled: Positive = 0.02
     """Largest norm of the velocity at the end of the horizon [rad/s and m/s]."""
 
@@ -176,13 +177,19 @@ class FeasibleRegion(Section):
     """The map of (height, pitch) that have a label, to which commands are clamped."""
 
     heights: int = Field(default=31, ge=3)
-    """Grid points over the height range, labelled with the arms at the default posture."""
+    """Grid points over the height range, labelled with two arm postures."""
     pitches: int = Field(default=41, ge=3)
     """Grid points over the pitch range."""
-    kept_share: Share = 0.8
-    """A cell also needs this share of its samples with other arms kept; it counts where a cell has enough samples."""
-    cell_samples: int = Field(default=20, ge=1)
-    """Samples that a cell needs before their share counts; fewer leave the decision to the default arms."""
+    steepest: Positive = 9.8
+    """Largest move of a joint per metre of height [rad/m]: near straight legs the reference would jump."""
+    bound_slope: Positive = 0.5
+    """Steepest change of the map's bounds with pitch [m/rad]: a clamped height does not leap when the pitch moves."""
+    kept_share: Share = 0.5
+    """A command also needs this share of the samples around it, with any arms, to have a label."""
+    window: tuple[Positive, Positive] = (0.02, 0.1)
+    """Which samples are around a command: within this height [m] and pitch [rad]."""
+    enough: int = Field(default=20, ge=1)
+    """Samples that there must be for their share to count; fewer leave it to the two arm postures of the grid."""
 
 
 class FitGates(Section):
@@ -195,7 +202,7 @@ class FitGates(Section):
     pitch_p95: Positive | None = 0.01
     """95th percentile of the torso pitch error [rad], against the soles."""
     foot_p95: Positive | None = 0.0015
-    """95th percentile of the mismatch of the feet [m]: distance of each sole centre from its place, soles fitted together."""
+    """95th percentile of the distance of each sole centre from its place [m], both soles fitted together."""
     margin_p1: float | None = 0.04
     """1st percentile of the distance of the centre of mass inside the support polygon [m]."""
     jump: Positive | None = 0.05
@@ -226,9 +233,9 @@ class Fit(Section):
     """Train on the left-right mirror image of each sample as well."""
     epochs: int = Field(default=150, ge=1)
     """Most passes over the training samples."""
-    batch: int = Field(default=512, ge=1)
+    batch: int = Field(default=256, ge=1)
     """Samples in a gradient step."""
-    learning_rate: Positive = 3e-3
+    learning_rate: Positive = 5e-3
     """Adam's first step size; it falls to a hundredth along a cosine."""
     patience: int = Field(default=40, ge=1)
     """Epochs without a better validation loss before training ends."""
@@ -246,7 +253,7 @@ class ReferenceGenerator(Section):
     """The reference generator: its dataset and its network."""
 
     method: Literal["static", "ocp"] = "static"
-    """How labels are made: `static` is the steady state of the optimal control problem, `ocp` the problem over a horizon (30 times slower)."""
+    """How labels are made: `ocp` is the optimal control problem, `static` its steady state (100 times faster)."""
     height: Literal["pelvis", "com"] = "pelvis"
     """What the commanded height is: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass as the paper writes."""
     sampling: Sampling = Sampling()

@@ -22,7 +22,7 @@ class FeasibleMap:
     """Least and greatest height at each pitch, shape (p,) [m]."""
 
     def clamp(self, height: Array, pitch: Array) -> tuple[Array, Array]:
-        """The command brought into the region: first the pitch, then the height at that pitch; shapes (n,) [m], [rad]."""
+        """The command brought into the region, first the pitch, then the height at it; shapes (n,) [m], [rad]."""
         kept = np.clip(pitch, self.pitch[0], self.pitch[-1])
         low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
         return np.clip(height, low, high), kept
@@ -56,21 +56,28 @@ class FeasibleMap:
         return found
 
 
-def build_map(pitches: Array, heights: Array, feasible: NDArray[np.bool_]) -> FeasibleMap:
-    """The map of a grid of decisions, shape (pitches, heights): the longest run of heights at each pitch, and the longest run of pitches.
+def build_map(pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope: float) -> FeasibleMap:
+    """The map of a grid of decisions (pitches, heights): the longest run of heights at each pitch, and of pitches.
 
-    Raises ValueError when no cell is feasible.
+    Its bounds change with pitch by at most `slope` [m/rad]. Raises ValueError when no cell is feasible.
     """
     runs = [_longest_run(row) for row in feasible]
     rows = _longest_run(np.array([run is not None for run in runs]))
     if rows is None:
         raise ValueError(
-            f"the feasible set is empty: none of {feasible.size} commands with heights {heights[0]:.2f} to {heights[-1]:.2f} m and "
-            f"pitches {pitches[0]:.2f} to {pitches[-1]:.2f} rad has a label; widen rg.sampling.height and rg.sampling.pitch"
+            f"the feasible set is empty: none of {feasible.size} commands with heights {heights[0]:.2f} to "
+            f"{heights[-1]:.2f} m and pitches {pitches[0]:.2f} to {pitches[-1]:.2f} rad has a gentle label; "
+            "widen rg.sampling.height and rg.sampling.pitch"
         )
     chosen = [(pitches[i], heights[run[0]], heights[run[1]]) for i in range(rows[0], rows[1] + 1) if (run := runs[i])]
     pitch, low, high = np.array(chosen).T
-    return FeasibleMap(pitch, low, high)
+    reach = slope * np.abs(pitch[:, None] - pitch)
+    low, high = (low - reach).max(axis=1), (high + reach).min(axis=1)
+    span = _longest_run(low <= high)
+    if span is None:
+        raise ValueError(f"the feasible set is empty under rg.feasible.bound_slope {slope} m/rad; raise it")
+    chosen_rows = slice(span[0], span[1] + 1)
+    return FeasibleMap(pitch[chosen_rows], low[chosen_rows], high[chosen_rows])
 
 
 def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:

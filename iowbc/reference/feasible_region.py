@@ -1,4 +1,4 @@
-"""Measures which (height, pitch) can be held: the grid labelled with the default arms, and the share kept with other arms."""
+"""Measures which (height, pitch) can be held: with two arm postures on a grid, and as a share of all arms around it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -21,34 +21,40 @@ class Region:
     """The map and what it was made from, on the grid (pitches, heights)."""
 
     map: FeasibleMap
-    nominal: NDArray[np.bool_]
-    """Whether the default arms have a label."""
+    held: NDArray[np.bool_]
+    """Whether one of the grid's two arm postures has a label."""
+    gentle: NDArray[np.bool_]
+    """Whether it has one that moves no more than allowed from the height below."""
     share: Array
-    """Share of samples with other arms that were kept; -1 where there were too few."""
+    """Share of the samples around a command that have a label; -1 where there were too few."""
 
 
 def measure_region(plan: SamplePlan, dataset: Dataset) -> Region:
     """The feasible map. Raises ValueError when it is empty."""
     recipe = plan.recipe.feasible
-    shape = (len(plan.pitches), len(plan.heights))
-    nominal = np.zeros(shape, dtype=bool)
-    grid = dataset.index[dataset.index >= plan.drawn] - plan.drawn
-    nominal.ravel()[grid] = True
+    posture = np.zeros((*plan.grid_shape, dataset.support.shape[1]))
+    labelled = np.zeros(plan.grid_shape, dtype=bool)
+    on_grid = dataset.index >= plan.drawn
+    cells = dataset.index[on_grid] - plan.drawn
+    posture.reshape(-1, posture.shape[-1])[cells] = dataset.support[on_grid]
+    labelled.ravel()[cells] = True
+    climb = np.abs(np.diff(posture, axis=2)).max(axis=-1)
+    steep = np.zeros_like(labelled)
+    steep[..., 1:] = labelled[..., 1:] & labelled[..., :-1] & (climb > recipe.steepest * np.diff(plan.heights))
     told = dataset.rejected_reason != ARMS_COLLIDE
-    kept = _count(plan, dataset.command[dataset.index < plan.drawn])
-    tried = kept + _count(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])
-    enough = tried >= recipe.cell_samples
+    kept = _around(plan, dataset.command[~on_grid])
+    tried = kept + _around(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])
+    enough = tried >= recipe.enough
     share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
-    feasible = nominal & (~enough | (share >= recipe.kept_share))
-    return Region(build_map(plan.pitches, plan.heights, feasible), nominal, share)
+    held: NDArray[np.bool_] = np.any(labelled, axis=0, keepdims=False)
+    gentle: NDArray[np.bool_] = np.any(labelled & ~steep, axis=0, keepdims=False)
+    feasible = gentle & (~enough | (share >= recipe.kept_share))
+    return Region(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope), held, gentle, share)
 
 
-def _count(plan: SamplePlan, command: Array) -> Array:
-    """Commands in the cell around each grid point, shape (pitches, heights)."""
-    counts, _, _ = np.histogram2d(command[:, 1], command[:, 0], bins=[_edges(plan.pitches), _edges(plan.heights)])
-    return counts
-
-
-def _edges(centres: Array) -> Array:
-    half = 0.5 * (centres[1] - centres[0]) if len(centres) > 1 else 0.5
-    return np.append(centres - half, centres[-1] + half)
+def _around(plan: SamplePlan, command: Array) -> Array:
+    """Number of commands (n, 4) within the window of each grid point, shape (pitches, heights)."""
+    height, pitch = plan.recipe.feasible.window
+    near_pitch = np.abs(command[:, 1] - plan.pitches[:, None]) <= pitch
+    near_height = np.abs(command[:, 0] - plan.heights[:, None]) <= height
+    return near_pitch.astype(np.float64) @ near_height.T.astype(np.float64)

@@ -89,11 +89,12 @@ def learning_figure(folder: Path, training: Sequence[float], validation: Sequenc
 def _feasible_map(path: Path, plan: SamplePlan, region: Region) -> None:
     figure, (left, right) = _figure(1, 2, 10.0, 4.2)
     extent = (plan.pitches[0], plan.pitches[-1], plan.heights[0], plan.heights[-1])
-    left.pcolormesh(plan.pitches, plan.heights, region.nominal.T, cmap="Blues", vmin=-0.6, vmax=1.6, shading="nearest")
-    left.set_title("has a label with the arms in the default posture")
+    level = region.held.T.astype(float) + region.gentle.T
+    left.pcolormesh(plan.pitches, plan.heights, level, cmap="Blues", vmin=-0.6, vmax=3.0, shading="nearest")
+    left.set_title("dark: a label; pale blue: one, but too steep")
     share = np.ma.masked_less(region.share.T, 0.0)
     shown = right.pcolormesh(plan.pitches, plan.heights, share, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
-    right.set_title("share of other arm postures that have a label")
+    right.set_title("share of all arm postures that have a label")
     figure.colorbar(shown, ax=right)
     outline = region.map
     for axes in (left, right):

@@ -61,7 +61,8 @@ def judge_fit(
             failures.append(f"{name} is {metrics[name]:.4g}, the limit {limit:.4g}")
     order = np.argsort(-per_sample)[:WORST]
     worst = [
-        f"number {dataset.index[held[i]]} (height {dataset.command[held[i], 0]:.3f} m, pitch {dataset.command[held[i], 1]:+.3f} rad): "
+        f"number {dataset.index[held[i]]} "
+        f"(height {dataset.command[held[i], 0]:.3f} m, pitch {dataset.command[held[i], 1]:+.3f} rad): "
         f"joints {per_sample[i]:.4f} rad, height {1e3 * errors.height[i]:+.1f} mm, pitch {errors.pitch[i]:+.4f} rad, "
         f"feet {1e3 * errors.foot[i]:.1f} mm"
         for i in order

@@ -74,13 +74,14 @@ def prepare(
 def split_by_group(
     group: Array, validation: float, held_out: float, seed: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Rows for training, early stopping and the gates; rows of one group stay together. Each part has at least one row."""
+    """Rows for training, early stopping and the gates; rows of one group stay together, no part is empty."""
     groups = np.random.default_rng(seed).permutation(np.unique(group))
     count = len(groups)
     held, checked = max(int(held_out * count), 1), max(int(validation * count), 1)
     if held + checked >= count:
         raise ValueError(
-            f"{count} independent samples are too few to split (held out {held}, validation {checked}); raise rg.sampling.samples"
+            f"{count} independent samples are too few to split (held out {held}, validation {checked}); "
+            "raise rg.sampling.samples"
         )
     parts = groups[held + checked :], groups[held : held + checked], groups[:held]
     train, stop, gate = (np.flatnonzero(np.isin(group, part)) for part in parts)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,7 @@ def fit(
     epoch_done: Callable[[int, float, float], None],
     interrupted: Callable[[], bool],
 ) -> Fitted:
-    """Trains with Adam on |δθ|² + w |J δθ|² (lengths in units of `length_scale`); keeps the epoch of the best validation loss.
+    """Trains with Adam on |δθ|² + w |J δθ|², lengths in units of `length_scale`; keeps the best validated epoch.
 
     One thread and one seeded generator: the result is the same on every run.
     """
@@ -95,7 +96,8 @@ def _fit(
     def loss(x: torch.Tensor, y: torch.Tensor, jacobian: torch.Tensor) -> torch.Tensor:
         error = (network(x) - y) * spread
         task = torch.bmm(jacobian, error.unsqueeze(-1))
-        return (error.square().sum() + task.square().sum()) / len(x)
+        mean: torch.Tensor = (error.square().sum() + task.square().sum()) / len(x)
+        return mean
 
     network = _network([train.inputs.shape[1], *recipe.hidden, train.outputs.shape[1]], generator)
     x, y, jacobian = prepared(train)
@@ -142,7 +144,7 @@ def _moments(values: Array) -> tuple[Array, Array]:
 
 def _network(sizes: list[int], generator: torch.Generator) -> torch.nn.Sequential:
     modules: list[torch.nn.Module] = []
-    for i, (width_in, width_out) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+    for i, (width_in, width_out) in enumerate(pairwise(sizes)):
         layer = torch.nn.Linear(width_in, width_out)
         torch.nn.init.kaiming_uniform_(layer.weight, nonlinearity="linear", generator=generator)
         torch.nn.init.zeros_(layer.bias)

@@ -20,7 +20,7 @@ class ReferenceNetwork:
     """A multilayer perceptron with standardised inputs and outputs, its output kept to the joint limits."""
 
     inputs: tuple[str, ...]
-    """Names: the arm joints, `pelvis_height` or `com_height`, `torso_pitch`, and others where the recipe sampled them."""
+    """Names: the arm joints, `pelvis_height` or `com_height`, `torso_pitch`, and what else the recipe sampled."""
     outputs: tuple[str, ...]
     """Names of the support joints."""
     layers: tuple[tuple[Array, Array], ...]
@@ -35,8 +35,8 @@ class ReferenceNetwork:
     activation: str = "elu"
 
     def __call__(self, arm_reference: Array, base_command: Array) -> Array:
-        """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2 or more), in the order of `inputs`."""
-        x = np.concatenate([arm_reference, base_command], axis=1).astype(np.float32)
+        """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2 or more), as in `inputs`."""
+        x: Array = np.concatenate([arm_reference, base_command], axis=1).astype(np.float32)
         if x.shape[1] != len(self.inputs):
             raise ValueError(
                 f"the reference generator takes {len(self.inputs)} inputs ({', '.join(self.inputs)}), got {x.shape[1]}"
@@ -77,8 +77,8 @@ class ReferenceNetwork:
         architecture = json.loads(source.read_text(encoding="utf-8"))
         if architecture.get("format") != FORMAT or architecture.get("activation") != "elu":
             raise ValueError(
-                f"{source}: format {architecture.get('format')!r}, activation {architecture.get('activation')!r}; this version reads "
-                f"format {FORMAT} with elu; make it anew with `--force rg-fit`"
+                f"{source}: format {architecture.get('format')!r}, activation {architecture.get('activation')!r}; "
+                f"this version reads format {FORMAT} with elu; make it anew with `--force rg-fit`"
             )
         tensors = load_file(folder / WEIGHTS)
         inputs, outputs = tuple(architecture["inputs"]), tuple(architecture["outputs"])

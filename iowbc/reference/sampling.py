@@ -1,4 +1,4 @@
-"""Which arm postures and base commands are labelled: a scrambled Sobol sequence, plus edges, nominal arms and mirror images."""
+"""Which arms and commands are labelled: a scrambled Sobol sequence, with edges, nominal arms and mirror images."""
 
 from typing import Any
 
@@ -19,7 +19,11 @@ COMMAND_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
 
 
 class SamplePlan:
-    """Sample number i as a function of the recipe and the seed alone. After the drawn samples comes the grid of the feasible map."""
+    """Sample number i as a function of the recipe and the seed alone.
+
+    After the drawn samples comes the grid of the feasible map, with two arm postures: the default one, which leans with
+    the trunk, and one that keeps the wrists where they are ahead of an upright trunk, as wrist commands do.
+    """
 
     def __init__(self, robot: Robot, recipe: ReferenceGenerator, seed: int) -> None:
         self.robot, self.recipe = robot, recipe
@@ -29,14 +33,16 @@ class SamplePlan:
         self.original = self.drawn - self.mirrored
         self.heights = np.linspace(sampling.height.low, sampling.height.high, region.heights)
         self.pitches = np.linspace(sampling.pitch.low, sampling.pitch.high, region.pitches)
-        self.count = self.drawn + len(self.heights) * len(self.pitches)
         arms = robot.interaction
         self.rest, self.lower, self.upper = robot.default_position[arms], robot.lower[arms], robot.upper[arms]
         self.uniform_lower, self.uniform_upper = _arm_ranges(robot, recipe)
         self.kinematics = ArmKinematics(robot, posture_gain=0.0)
         self.mirror = interaction_mirror(robot)
+        self.grid_arms = np.stack([np.tile(self.rest, (len(self.pitches), 1)), self._carrying()])
+        self.grid_shape = (len(self.grid_arms), len(self.pitches), len(self.heights))
+        self.count = self.drawn + int(np.prod(self.grid_shape))
         dimensions = 6 + 6 + len(arms) + 2
-        self.unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
+        self.unit: Array = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
             int(np.ceil(np.log2(max(self.original, 2))))
         )
 
@@ -55,12 +61,23 @@ class SamplePlan:
 
     def _one(self, index: int, source: int, originals: dict[int, Sample]) -> Sample:
         if index >= self.drawn:
-            row, column = divmod(index - self.drawn, len(self.heights))
-            return Sample(self.rest, np.array([self.heights[column], self.pitches[row], 0.0, 0.0]), np.zeros(2))
+            arms, row, column = np.unravel_index(index - self.drawn, self.grid_shape)
+            command = np.array([self.heights[column], self.pitches[row], 0.0, 0.0])
+            return Sample(self.grid_arms[arms, row], command, np.zeros(2))
         sample = originals[source]
         if index < self.original:
             return sample
         return Sample(self.mirror(sample.arm), COMMAND_MIRROR * sample.command, sample.payload[::-1].copy())
+
+    def _carrying(self) -> Array:
+        """Arms that keep the wrists at their default place in the heading frame, one posture a pitch, (pitches, 14)."""
+        wrist, _ = self.kinematics.forward(self.rest[None])
+        upright, origin = self.kinematics.torso_in_heading(np.zeros((1, 3)), np.zeros(1))
+        place = np.einsum("nij,nsj->nsi", upright, wrist) + origin[:, None]
+        rotation, position = self.kinematics.torso_in_heading(np.zeros((len(self.pitches), 3)), self.pitches)
+        target = np.einsum("nji,nsj->nsi", rotation, place - position[:, None])
+        arms: Array = self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
+        return arms
 
     def _originals(self, unit: Array) -> list[Sample]:
         command = self._commands(unit)

@@ -1,4 +1,4 @@
-"""What a support posture does to feet, height and torso: errors through forward kinematics, and their Jacobian by the joints."""
+"""What a support posture does to feet, height and torso: errors by forward kinematics, and their Jacobian."""
 
 from dataclasses import dataclass
 from typing import Any, Literal

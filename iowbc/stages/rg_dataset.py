@@ -73,7 +73,6 @@ def run(job: Job) -> None:
         "samples": float(plan.count),
         "kept": float(len(dataset)),
         "kept_share": len(dataset) / plan.count,
-        "labels_per_second": len(dataset) / max(seconds, 1e-9),
         "margin_p1": float(_percentile(dataset.margin, 1)),
         "torque_ratio_p99": float(_percentile(abs(dataset.torque / robot.effort[robot.support]).max(axis=1), 99)),
     }
@@ -83,23 +82,25 @@ def run(job: Job) -> None:
         metrics |= check.metrics
     dataset.save(job.out / "dataset.npz")
     region.map.save(job.out / "feasible.npz")
+    rejected = reasons(result)
     summary = {
         "metrics": metrics,
-        "rejected": reasons(result),
+        "rejected": rejected,
         "worst_crosscheck": [] if check is None else check.worst,
     }
     (job.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     job.report.metrics(metrics, 0)
+    job.report.say(f"{len(dataset)} of {plan.count} samples have a label; labelling took {seconds:.0f} s here")
     figures = job.out / "figures"
     figures.mkdir(exist_ok=True)
-    dataset_figures(figures, plan, dataset, region, summary["rejected"], check)
+    dataset_figures(figures, plan, dataset, region, rejected, check)
     if (trouble := draw_strip(figures / "postures.png", robot, recipe, plan)) is not None:
         job.report.say(f"no picture of postures: {trouble}")
     if check is not None and check.metrics["crosscheck_p90"] > recipe.crosscheck.p90_limit:
         raise StageFailed(
-            f"static labels differ from optimal control by {check.metrics['crosscheck_p90']:.4f} rad (p90 of {check.count} samples, the "
-            f"limit is {recipe.crosscheck.p90_limit} rad). Worst: {'; '.join(check.worst)}. Check rg.problem's weights, or label "
-            "with `rg.method: ocp`"
+            f"static labels differ from optimal control by {check.metrics['crosscheck_p90']:.4f} rad "
+            f"(p90 of {check.count} samples, the limit is {recipe.crosscheck.p90_limit} rad). "
+            f"Worst: {'; '.join(check.worst)}. Check the weights in rg.problem, or label with `rg.method: ocp`"
         )
 
 

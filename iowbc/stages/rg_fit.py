@@ -1,4 +1,4 @@
-"""Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples through forward kinematics."""
+"""Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples."""
 
 import json
 import shutil
@@ -81,8 +81,8 @@ def run(job: Job) -> None:
         raise StageFailed(
             "the reference generator misses its gates on held-out samples: "
             + "; ".join(verdict.failures)
-            + f". Worst samples: {'; '.join(verdict.worst[:WORST_SHOWN])}. Use more samples (rg.sampling.samples) or epochs "
-            "(rg.fit.epochs), or loosen rg.fit.gates openly"
+            + f". Worst samples: {'; '.join(verdict.worst[:WORST_SHOWN])}. Use more samples "
+            "(rg.sampling.samples) or epochs (rg.fit.epochs), or loosen rg.fit.gates openly"
         )
 
 
