@@ -5,16 +5,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.robot import rotations
+from iowbc.robot.chain import Chain, turn
 from iowbc.robot.description import Robot
-from iowbc.robot.mjcf import Body
 
 Array = NDArray[Any]
 
 DAMPING = 0.05
 """Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·DAMPING) next to a singular posture."""
+REACH = 0.2
+"""Further squared damping for each metre of error [m]: out of reach, a stretched arm settles instead of overshooting,
+since its reach falls off by no more than half of this times the squared angle of the elbow."""
+LONGEST = 0.1
+"""Longest error that a step answers to [m]: a wrist turns towards a distant target without overshooting."""
 POSTURE_GAIN = 1.0
 """Rate at which the redundant joints return to the rest posture [1/s]."""
+X, Y = 0, 1
+IDENTITY = np.eye(3)
 
 
 class ArmKinematics:
@@ -39,46 +45,36 @@ class ArmKinematics:
         own = robot.velocity_limit[robot.interaction]
         self.speed = own if joint_speed is None else np.minimum(own, joint_speed)
         self.damping, self.posture_gain = damping, posture_gain
-        self._offset = np.stack([np.stack([body.position for body in chain]) for chain in chains], axis=1)
-        self._rotation = np.stack([rotations.matrix(np.stack([body.quaternion for body in c])) for c in chains], axis=1)
-        self._skew, self._square = _rodrigues([[_axis(body) for body in chain] for chain in chains])
-        self._axis = np.stack([np.stack([_axis(body) for body in chain]) for chain in chains], axis=1)
-        self._grip = robot.grip_offset
-        waist = robot.tree.chain(robot.torso, robot.base)
-        self._waist = [(body.position, rotations.matrix(body.quaternion), _axis(body)) for body in waist]
+        self._chain, self._waist = Chain(chains), Chain([robot.tree.chain(robot.torso, robot.base)])
+        self._grip = robot.grip_offset.T[:, :, None]
 
     def forward(self, arm_position: Array) -> tuple[Array, Array]:
         """Wrist positions (n, 2, 3) [m] in the torso frame and their Jacobian (n, 2, 3, 7), of arms (n, 14) [rad]."""
-        count, joints = len(arm_position), self._offset.shape[0]
-        angle = arm_position.reshape(count, 2, joints)
-        sine, versine = np.sin(angle), 1.0 - np.cos(angle)
-        origins, axes = np.empty((count, 2, joints, 3)), np.empty((count, 2, joints, 3))
-        position = np.zeros((count, 2, 3))
-        rotation = np.broadcast_to(np.eye(3), (count, 2, 3, 3))
-        for j in range(joints):
-            position = position + np.einsum("nsij,sj->nsi", rotation, self._offset[j])
-            rotation = rotation @ self._rotation[j]
-            origins[:, :, j] = position
-            axes[:, :, j] = np.einsum("nsij,sj->nsi", rotation, self._axis[j])
-            turn = sine[:, :, j, None, None] * self._skew[j] + versine[:, :, j, None, None] * self._square[j]
-            rotation = rotation + rotation @ turn
-        wrist = position + np.einsum("nsij,sj->nsi", rotation, self._grip)
-        jacobian = rotations.cross(axes, wrist[:, :, None] - origins)
-        return wrist, np.swapaxes(jacobian, -1, -2)
+        count, joints = len(arm_position), self._chain.length
+        vectors = np.empty((3, joints + 1, 2, count))
+        vectors[:, joints] = self._grip
+        self._chain.carry(arm_position.reshape(count, 2, joints).transpose(2, 1, 0), vectors, joints)
+        rows = np.ascontiguousarray(vectors.transpose(3, 2, 0, 1))
+        return rows[..., joints], rows[..., :joints]
 
     def solve_step(self, arm_position: Array, target: Array, dt: float) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
         `arm_position` (n, 14) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
-        next = q + J⁺(x - FK(q)) + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ²)⁻¹,
+        next = q + J⁺(x - FK(q)) + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|x - FK(q)|)⁻¹, |x - FK(q)| cut off,
         kept to the joint ranges and the joint speed.
         """
         count = len(arm_position)
         wrist, jacobian = self.forward(arm_position)
         transposed = np.swapaxes(jacobian, -1, -2)
-        gram = jacobian @ transposed + self.damping**2 * np.eye(3)
+        error = target - wrist
+        distance = np.sqrt((error * error).sum(axis=-1))
+        near = np.minimum(distance, LONGEST)
+        error *= (LONGEST / np.maximum(distance, LONGEST))[..., None]
+        damping = self.damping**2 + REACH * near
+        gram = jacobian @ transposed + damping[..., None, None] * IDENTITY
         posture = (self.posture_gain * dt * (self.rest - arm_position)).reshape(count, 2, -1)
-        wanted = target - wrist - np.einsum("nsij,nsj->nsi", jacobian, posture)
+        wanted = error - np.einsum("nsij,nsj->nsi", jacobian, posture)
         step = posture + np.einsum("nsji,nsj->nsi", jacobian, np.linalg.solve(gram, wanted[..., None])[..., 0])
         bound = self.speed * dt
         moved = arm_position + np.clip(step.reshape(count, -1), -bound, bound)
@@ -98,23 +94,12 @@ class ArmKinematics:
 
         `waist` (n, 3): yaw, roll, pitch positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
         """
-        roll = np.zeros_like(pelvis_pitch) if pelvis_roll is None else pelvis_roll
-        rotation = rotations.matrix(rotations.from_euler(roll, pelvis_pitch, np.zeros_like(pelvis_pitch)))
-        position = np.zeros((len(waist), 3))
-        for j, (offset, fixed, axis) in enumerate(self._waist):
-            position = position + rotation @ offset
-            rotation = rotation @ fixed @ rotations.axis_matrix(axis, waist[:, j])
-        return rotation, position
-
-
-def _axis(body: Body) -> Array:
-    if body.hinge is None:
-        raise ValueError(f"body {body.name!r} lies on a joint chain but has no hinge")
-    return body.hinge.axis
-
-
-def _rodrigues(axes: list[list[Array]]) -> tuple[Array, Array]:
-    """Skew matrices K and K² of the axes, shapes (joints, 2, 3, 3): R = 1 + sin K + (1 - cos) K²."""
-    skew = np.array([[[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in chain] for chain in axes], dtype=np.float64)
-    skew = np.swapaxes(skew, 0, 1)
-    return skew, skew @ skew
+        vectors = np.zeros((3, 4, 1, len(waist)))
+        for axis in range(3):
+            vectors[axis, axis] = 1.0
+        self._waist.carry(waist.T[:, None], vectors)
+        if pelvis_roll is not None:
+            turn(vectors, X, pelvis_roll[None])
+        turn(vectors, Y, pelvis_pitch[None])
+        rows = np.ascontiguousarray(vectors[:, :, 0].transpose(2, 0, 1))
+        return rows[..., :3], rows[..., 3]

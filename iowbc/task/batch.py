@@ -319,6 +319,9 @@ class Batch:
                 name = f"divergence-{divergence.environment}-{divergence.episode}-{divergence.step}.npz"
                 divergence.save(self._divergences / name)
 
+    def __len__(self) -> int:
+        return self.n
+
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (n,) or (n, k)."""
         return {name: values.copy() for name, values in self.simulation.drawn.items()}

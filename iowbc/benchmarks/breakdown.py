@@ -1,0 +1,102 @@
+"""Where the time of a step of the vector environment goes."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from iowbc.benchmarks.bare_loop import wander
+from iowbc.task.crew import Alone, Workers
+from iowbc.task.setup import Setup
+
+PARTS = ("physics", "simulation", "references", "reward", "observation", "rest")
+"""mj_step; partner, delays, sensors and gathering; commands and references; motion, reward and terminations; writing
+observations; signals, counters and the like."""
+
+
+class Stopwatch:
+    """Adds up the time that methods take."""
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = {}
+
+    def watch(self, owner: Any, name: str, label: str) -> None:
+        """Times every call of a method from now on."""
+        method: Callable[..., Any] = getattr(owner, name)
+        self.spent.setdefault(label, 0.0)
+
+        def timed(*arguments: Any, **options: Any) -> Any:
+            begin = time.perf_counter()
+            try:
+                return method(*arguments, **options)
+            finally:
+                self.spent[label] += time.perf_counter() - begin
+
+        setattr(owner, name, timed)
+
+
+class _Timed:
+    """MuJoCo's batch, which takes no attributes, with a method of its own."""
+
+    def __init__(self, batch: Any) -> None:
+        self._batch, self.step = batch, batch.step
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._batch, name)
+
+
+def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
+    """Time of each part of a step of `setup.count` environments in this process [ms]: medians over rounds from a reset.
+
+    Also `reset`: what the end of one episode adds.
+    """
+    crew = Alone(setup)
+    batch, watch = crew.batch, Stopwatch()
+    watch.watch(batch, "step", "step")
+    for world in batch.simulation._worlds:
+        world.batch = _Timed(world.batch)
+        watch.watch(world.batch, "step", "physics")
+    watch.watch(batch.simulation, "step", "simulation")
+    watch.watch(batch, "_advance", "references")
+    for name in ("_motion", "_follow", "_score"):
+        watch.watch(batch, name, "reward")
+    watch.watch(batch, "_observe", "observation")
+    rows: list[dict[str, float]] = []
+    for _ in range(rounds):
+        batch.reset()
+        for name in watch.spent:
+            watch.spent[name] = 0.0
+        for period in range(periods):
+            crew.buffers["action"][:] = wander(period, batch.n, crew.buffers["action"].shape[1])
+            batch.step()
+        row = {name: 1e3 * spent / periods for name, spent in watch.spent.items()}
+        row["simulation"] -= row["physics"]
+        row["rest"] = row.pop("step") - sum(row.values())
+        rows.append(row)
+    parts = {name: float(np.median([row[name] for row in rows])) for name in PARTS}
+    return parts | {"reset": _reset_time(batch)}
+
+
+def _reset_time(batch: Any) -> float:
+    """Time to begin one episode anew [ms]."""
+    times = []
+    for index in range(batch.n):
+        begin = time.perf_counter()
+        batch._begin(np.array([index]))
+        times.append(time.perf_counter() - begin)
+    return 1e3 * float(np.median(times))
+
+
+def transfer_time(crew: Workers, rounds: int) -> float:
+    """Time to ask all workers for next to nothing and to copy what a step leaves behind [ms], median."""
+    times = []
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        crew.buffers["action"][:] = 0.0
+        crew.ask("__len__")
+        crew.answers()
+        for name in ("observation", "reward", "done"):
+            crew.buffers[name].copy()
+        times.append(time.perf_counter() - begin)
+    return 1e3 * float(np.median(times))

@@ -1,0 +1,148 @@
+"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against the usual vector environments."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from stable_baselines3.common.vec_env import SubprocVecEnv
+
+from iowbc.benchmarks.bare_loop import BareLoops, wander
+from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.task import SceneShares
+from iowbc.robot.description import robot_folder
+from iowbc.task.crew import Workers
+from iowbc.task.environment import Environment
+from iowbc.task.setup import Setup
+from iowbc.task.vector_env import VectorEnv
+
+PERIODS = 40
+"""Control steps from a reset that are measured: nobody has fallen yet, so that both loops step the same states."""
+EPISODE = 10.0
+"""Length of an episode [s] over which the cost of a reset is spread."""
+
+
+def main(
+    recipe: Recipe | None = None,
+    robot: Path | None = None,
+    rg: Path | None = None,
+    *,
+    scene: str = "lift",
+    environments: int = 48,
+    workers: Sequence[int] = (),
+    turns: int = 7,
+    others: bool = True,
+    say: Callable[[str], None] = print,
+) -> dict[str, float]:
+    """Measures, prints the tables, returns every figure by name (rates in environment steps a second, times in ms).
+
+    `environments` a worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
+    the vector environment take turns, and the ratio is the median over turns: the speed of a shared machine drifts.
+    `others`: also measure stable-baselines3's and gymnasium's vector environments.
+    """
+    recipe = recipe or Recipe(name="bench")
+    folder = robot or robot_folder(recipe.robot)
+    cores = len(os.sched_getaffinity(0))
+    counts = sorted(set(workers) or {1, 2, cores})
+    only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
+    recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
+    say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
+    parts = step_breakdown(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns)
+    say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
+    figures: dict[str, float] = {}
+    for count in counts:
+        setup = Setup(recipe, folder, rg, count * environments, recipe.seed)
+        figures |= _against_bare(setup, count, turns, environments * parts["reset"], say)
+        if others:
+            figures |= _others(recipe, folder, rg, scene, count, figures[f"vector_env_{count}"], say)
+    parts["transfer"] = figures[f"transfer_ms_{counts[-1]}"]
+    total = sum(parts[name] for name in (*PARTS, "transfer"))
+    say(f"a step of {environments} environments: {total:.2f} ms")
+    for name in (*PARTS, "transfer"):
+        say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
+    say(f"  an episode's end adds {parts['reset']:.2f} ms")
+    return figures | {f"step_{name}_ms": value for name, value in parts.items()}
+
+
+def _against_bare(
+    setup: Setup, count: int, turns: int, resets: float, say: Callable[[str], None]
+) -> dict[str, float]:
+    """Rates of the bare loop and of the vector environment in turn, with `count` processes.
+
+    `resets`: time in which all environments of a worker begin an episode, one after another [ms].
+    """
+    env = VectorEnv(setup.recipe, setup.robot, rg=setup.rg, num_envs=setup.count, workers=count, seed=setup.seed)
+    try:
+        crew = env._crew
+        assert isinstance(crew, Workers)
+        with BareLoops(setup, crew.groups, PERIODS) as bare:
+            pairs = np.array([(bare.rate(), _rate(env)) for _ in range(turns)])
+        transfer = transfer_time(crew, 20 * turns)
+    finally:
+        env.close()
+    rates, ratio = np.median(pairs, axis=0), float(np.median(pairs[:, 1] / pairs[:, 0]))
+    a_step = 1e-3 * resets / (EPISODE * setup.recipe.task.control_frequency)
+    spread = 1.0 / (1.0 + a_step * rates[1] / setup.count)
+    say(f"{f'bare mj_step loop, {count} process(es)':34}{rates[0]:10.0f}{1.0:10.2f}")
+    say(f"{f'vector environment, {count} worker(s)':34}{rates[1]:10.0f}{ratio:10.2f}")
+    say(f"{f'  with a reset every {EPISODE:g} s':34}{rates[1] * spread:10.0f}{ratio * spread:10.2f}")
+    return {
+        f"bare_{count}": float(rates[0]),
+        f"vector_env_{count}": float(rates[1]),
+        f"ratio_{count}": ratio,
+        f"ratio_with_resets_{count}": ratio * spread,
+        f"transfer_ms_{count}": transfer,
+    }
+
+
+def _rate(env: VectorEnv) -> float:
+    """Environment steps a second over the first periods of the episodes that the bare loop replays."""
+    env.seed(env.setup.seed)
+    env.reset()
+    given = [wander(period, env.num_envs, env.action_space.shape[0]) for period in range(PERIODS)]
+    begin = time.perf_counter()
+    for action in given:
+        env.step(action)
+    return float(env.num_envs * PERIODS / (time.perf_counter() - begin))
+
+
+def _others(
+    recipe: Recipe, robot: Path, rg: Path | None, scene: str, count: int, own: float, say: Callable[[str], None]
+) -> dict[str, float]:
+    """Rates of the usual vector environments: one environment a process, `count` processes."""
+    make = partial(Environment, scene, recipe, robot, rg)
+    figures = {}
+    for name, label, build in (
+        ("sb3", "SB3 SubprocVecEnv", partial(SubprocVecEnv, start_method="forkserver")),
+        ("gymnasium", "gymnasium AsyncVectorEnv", partial(gymnasium.vector.AsyncVectorEnv, context="forkserver")),
+    ):
+        env: Any = build([make] * count)
+        try:
+            rate = _rate_of_other(env, count)
+        finally:
+            env.close()
+        figures[f"{name}_{count}"] = rate
+        say(f"{f'{label}, {count} process(es)':34}{rate:10.0f}{'':10}  vector environment {own / rate:.1f} times as fast")
+    return figures
+
+
+def _rate_of_other(env: Any, count: int) -> float:
+    width = env.get_attr("action_space")[0].shape[0] if hasattr(env, "get_attr") else env.single_action_space.shape[0]
+    env.reset()
+    rates = []
+    for _ in range(5):
+        begin = time.perf_counter()
+        for period in range(PERIODS):
+            env.step(wander(period, count, width))
+        rates.append(count * PERIODS / (time.perf_counter() - begin))
+        env.reset()
+    return float(np.median(rates))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,109 @@
+"""Chains of hinges, many rows at once: vectors fixed to the last body are carried inward, hinge by hinge, to the base.
+
+Rows are last in memory, so that NumPy's loops are long, and a turn about a coordinate axis mixes two components.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.robot import rotations
+from iowbc.robot.mjcf import Body
+
+Array = NDArray[Any]
+
+PLANES = (slice(1, 3), slice(2, None, -2), slice(0, 2))
+"""Components that a turn about x, y and z mixes, in the order in which the first turns towards the second."""
+QUARTER = np.array([-1.0, 1.0])[:, None, None]
+
+
+def turn(vectors: Array, axis: int, angle: Array) -> None:
+    """Turns vectors (3, k, ...) in place about a coordinate axis by angles (...) [rad]."""
+    sine = np.sin(angle)
+    mix(vectors, axis, np.cos(angle), np.stack([-sine, sine])[:, None])
+
+
+def mix(vectors: Array, axis: int, cosine: Array, sines: Array) -> None:
+    """As `turn`, from cosines (...) and the pair of -sine and sine, (2, 1, ...)."""
+    pair = vectors[PLANES[axis]]
+    crossed = pair[::-1] * sines
+    pair *= cosine
+    pair += crossed
+
+
+class Chain:
+    """Equally long chains side by side, such as two arms."""
+
+    def __init__(self, chains: Sequence[Sequence[Body]]) -> None:
+        """`chains`: their bodies from the base outward, each with a hinge."""
+        self.length = len(chains[0])
+        self._axis: list[int] = []
+        self._sign = np.ones((self.length, len(chains), 1))
+        self._offset = np.empty((self.length, 3, len(chains), 1))
+        self._before: list[Array | None] = []
+        self._after: list[Array | None] = []
+        for j in range(self.length):
+            bodies = [chain[j] for chain in chains]
+            axes = np.stack([hinge_axis(body) for body in bodies])
+            fixed = np.stack([rotations.matrix(body.quaternion) for body in bodies])
+            axis = int(np.argmax(np.abs(axes[0])))
+            aside = np.stack([_turning_to(one, axis) for one in axes])
+            if np.allclose(np.abs(axes), np.eye(3)[axis]):
+                self._sign[j, :, 0] = axes[:, axis]
+                aside[:] = np.eye(3)
+            self._axis.append(axis)
+            self._offset[j, :, :, 0] = np.stack([body.position for body in bodies], axis=-1)
+            self._before.append(_unless_identity(np.swapaxes(aside, 1, 2)))
+            self._after.append(_unless_identity(fixed @ aside))
+
+    def carry(self, angle: Array, vectors: Array, columns: int = 0) -> None:
+        """Takes vectors from the last bodies' frames to the bases', in place.
+
+        `angle` (hinges, chains, n) [rad]; `vectors` (3, k, chains, n), of which the last is a point and the others are
+        directions. The first `columns` of them, one a hinge, are filled with the point's Jacobian instead.
+        """
+        angle = angle * self._sign
+        sine, cosine = np.sin(angle), np.cos(angle)
+        sines = np.stack([-sine, sine], axis=1)[:, :, None]
+        for j in reversed(range(self.length)):
+            axis, plane = self._axis[j], PLANES[self._axis[j]]
+            first = min(columns, j + 1)
+            carried = vectors[:, first:]
+            _apply(self._before[j], carried)
+            mix(carried, axis, cosine[j], sines[j])
+            if columns:
+                first = j
+                vectors[axis, j] = 0.0
+                np.multiply(vectors[plane, -1][::-1], QUARTER * self._sign[j], out=vectors[plane, j])
+            _apply(self._after[j], vectors[:, first:])
+            vectors[:, -1] += self._offset[j]
+
+
+def _apply(rotation: Array | None, vectors: Array) -> None:
+    """Multiplies vectors (3, k, chains, n) in place by matrices (3, 3, chains)."""
+    if rotation is not None:
+        vectors[:] = np.einsum("rcs,cksn->rksn", rotation, vectors)
+
+
+def _unless_identity(rotation: Array) -> Array | None:
+    """Matrices (chains, 3, 3) with the chains last, or nothing where they do nothing."""
+    return None if np.allclose(rotation, np.eye(3)) else np.moveaxis(rotation, 0, -1).copy()
+
+
+def _turning_to(direction: Array, axis: int) -> Array:
+    """A rotation that brings a coordinate axis to a unit vector that is not opposite to it, (3, 3)."""
+    start = np.eye(3)[axis]
+    between = rotations.cross(start, direction)
+    sine = float(np.linalg.norm(between))
+    if sine == 0.0:
+        return np.eye(3)
+    return np.asarray(rotations.axis_matrix(between / sine, np.arctan2(sine, start @ direction)))
+
+
+def hinge_axis(body: Body) -> Array:
+    """Axis of a body's hinge, (3,). Raises ValueError where there is none."""
+    if body.hinge is None:
+        raise ValueError(f"body {body.name!r} lies on a joint chain but has no hinge")
+    return body.hinge.axis
