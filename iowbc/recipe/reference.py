@@ -127,10 +127,11 @@ class OptimalControl(Section):
     label_at: Annotated[float, Field(gt=0, lt=1)] = 0.7
     """Fraction of the horizon whose node is the label: the terminal node is biased by the terminal cost."""
     velocity_weight: Positive = 0.03
-    """Joint and base velocities [s²/rad²]. Postures that cost nearly the same are left with a time constant of 0.2 s at 0.03, 0.3 s at 0.1."""
+    """Joint and base velocities [s²/rad²]. Postures that cost nearly as little as the optimum are left with a time
+    constant of 0.2 s at 0.03, 0.3 s at 0.1."""
     terminal_factor: Positive = 0.05
-    """Terminal weights over running weights, which count for each second: 0.05 is one more interval. At 10 the missing torques at the end
-    bend the flattest postures by 0.25 rad, and by 0.1 at the label's node."""
+    """Terminal weights over running weights, which count for each second: 0.05 is one more interval. At 10 the missing
+    torques at the end bend the flattest postures by 0.25 rad, and by 0.1 at the label's node."""
     terminal_velocity_weight: Positive = 1e2
     """Velocities at the end of the horizon [s²/rad²]."""
     limit_weight: Positive = 1e3
@@ -180,7 +181,7 @@ class FeasibleRegion(Section):
     """Grid points over the height range, labelled with two arm postures."""
     pitches: int = Field(default=41, ge=3)
     """Grid points over the pitch range."""
-    steepest: Positive = 9.8
+    steepest: Positive = 9.0
     """Largest move of a joint per metre of height [rad/m]: near straight legs the reference would jump."""
     bound_slope: Positive = 0.5
     """Steepest change of the map's bounds with pitch [m/rad]: a clamped height does not leap when the pitch moves."""

@@ -23,18 +23,21 @@ HEIGHTS, PITCHES = 4, 7
 """Postures down and across."""
 SIZE = 260
 """Edge of a rendered posture [pixel]."""
-AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 2.3, (0.1, 0.0, 0.55)
+AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.9, (0.1, 0.0, 0.58)
 """Camera [degree, degree, m, m]."""
 EMPTY = 235
 """Grey of a command without a label."""
 
 
 def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan) -> str | None:
-    """Labels a small grid with the default arms by the static method and draws it; where nothing can draw, says why."""
+    """Labels a small grid by the static method and draws it; where nothing can draw, says why.
+
+    The arms are in the default posture, or keep the wrists ahead of the pelvis where that one has no label.
+    """
     support = SupportModel(robot, recipe.problem)
     method, judge = make_method("static", support, recipe), Judge(support, recipe.gates, recipe.height)
-    heights = np.linspace(plan.heights[-1], plan.heights[0], HEIGHTS)
-    pitches = np.linspace(plan.pitches[0], plan.pitches[-1], PITCHES)
+    heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
+    columns = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
     try:
         model, renderer = _scene(robot)
     except Exception as error:
@@ -44,18 +47,25 @@ def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: Sampl
         FigureCanvasAgg(figure)
         axes = figure.subplots(HEIGHTS, PITCHES)
         for row, height in enumerate(heights):
-            for column, pitch in enumerate(pitches):
-                sample = Sample(plan.rest, np.array([height, pitch, 0.0, 0.0]), np.zeros(2))
-                axis = axes[row, column]
+            for column, place in enumerate(columns):
+                axis, pitch = axes[row, column], plan.pitches[place]
                 axis.axis("off")
                 axis.set_title(f"{height:.2f} m, {pitch:+.2f} rad", fontsize=8)
-                try:
-                    posture = method.solve(sample)
-                    judge.label(sample, posture)
+                command = np.array([height, pitch, 0.0, 0.0])
+                reason = ""
+                for arms in plan.grid_arms[:, place]:
+                    sample = Sample(arms, command, np.zeros(2))
+                    try:
+                        posture = method.solve(sample)
+                        judge.label(sample, posture)
+                    except Rejected as rejected:
+                        reason = str(rejected)
+                        continue
                     axis.imshow(_picture(robot, model, renderer, sample, posture))
-                except Rejected as reason:
+                    break
+                else:
                     axis.imshow(np.full((SIZE, SIZE, 3), EMPTY, dtype=np.uint8))
-                    axis.text(0.5, 0.5, str(reason), ha="center", va="center", transform=axis.transAxes, fontsize=8)
+                    axis.text(0.5, 0.5, reason, ha="center", va="center", transform=axis.transAxes, fontsize=8)
         figure.savefig(path, dpi=110)
     finally:
         renderer.close()
@@ -69,8 +79,12 @@ def _scene(robot: Robot) -> tuple[Any, Any]:
     spec.visual.headlight.ambient, spec.visual.headlight.diffuse = (0.45, 0.45, 0.45), (0.5, 0.5, 0.5)
     floor = spec.worldbody.add_geom()
     floor.type, floor.size, floor.rgba = mujoco.mjtGeom.mjGEOM_PLANE, (3.0, 3.0, 0.1), (0.93, 0.94, 0.96, 1.0)
+    sky = spec.add_texture()
+    sky.type, sky.builtin = mujoco.mjtTexture.mjTEXTURE_SKYBOX, mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+    sky.rgb1, sky.rgb2, sky.width, sky.height = (1.0, 1.0, 1.0), (0.86, 0.89, 0.93), 64, 384
     light = spec.worldbody.add_light()
-    light.pos, light.dir = (1.0, -1.0, 3.0), (-0.3, 0.3, -1.0)
+    light.pos, light.dir, light.castshadow = (1.0, -1.0, 3.0), (-0.3, 0.3, -1.0), True
+    light.diffuse, light.specular = (0.35, 0.35, 0.35), (0.1, 0.1, 0.1)
     model = spec.compile()
     return model, mujoco.Renderer(model, SIZE, SIZE)
 

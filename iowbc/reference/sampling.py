@@ -14,6 +14,8 @@ from iowbc.robot.mirror import interaction_mirror
 
 Array = NDArray[Any]
 
+ABOVE_STRAIGHT = 1.1
+"""Heights up to this part of the straight-legged one may be tried; the feasible map finds the true bound."""
 COMMAND_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
 """Height and pitch stay, roll and yaw change sign."""
 
@@ -121,17 +123,18 @@ class SamplePlan:
         start = np.clip(self.rest + region.redundancy * (2.0 * turn - 1.0), self.lower, self.upper)
         if by_wrist.any():
             arm[by_wrist] = self.kinematics.solve(start[by_wrist], target[by_wrist])
-        return arm
+        return np.asarray(arm)
 
 
 def check_ranges(robot: Robot, recipe: ReferenceGenerator) -> None:
     """Raises ValueError where a sampling range makes no sense for this robot."""
     _arm_ranges(robot, recipe)
-    legs = robot.default_height + 0.5 * float(np.ptp(robot.upper[robot.support]))
+    straight = dict(zip(robot.joints, np.clip(0.0, robot.lower, robot.upper).tolist(), strict=True))
+    tallest = -ABOVE_STRAIGHT * float(robot.tree.forward(straight, robot.base, robot.soles[0])[0][2])
     height = recipe.sampling.height
-    if height.low <= 0.0 or height.high > legs:
+    if height.low <= 0.0 or height.high > tallest:
         raise ValueError(
-            f"rg.sampling.height: {height.low} to {height.high} m; {robot.name} stands between 0 and {legs:.2f} m"
+            f"rg.sampling.height: {height.low} to {height.high} m; {robot.name} stands between 0 and {tallest:.2f} m"
         )
     for name in ("pitch", "roll", "yaw"):
         interval = getattr(recipe.sampling, name)

@@ -28,7 +28,8 @@ def measure_jumps(
 ) -> Jumps:
     """Walks random lines between feasible commands; line i keeps the arms arm[i % n].
 
-    Steps outside the map, which need not be convex, do not count. A step is one step of the height, one of the pitch, or a mixture of parts of both that add up to one.
+    A step is one step of the height, one of the pitch, or a mixture of parts of both that add up to one. Steps outside
+    the map, which need not be convex, do not count.
     """
     generator, smooth = np.random.default_rng(seed), recipe.fit.smoothness
     largest, where = np.empty(smooth.lines), np.empty((smooth.lines, 2))
