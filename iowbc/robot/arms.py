@@ -61,7 +61,7 @@ class ArmKinematics:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
         `arm_position` (n, 14) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
-        next = q + J⁺(x - FK(q)) + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|x - FK(q)|)⁻¹, |x - FK(q)| cut off,
+        next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to LONGEST;
         kept to the joint ranges and the joint speed.
         """
         count = len(arm_position)
