@@ -143,7 +143,7 @@ def run(job: Job) -> None:
             if stop or current % settings.checkpoint_every == 0:
                 save(current)
             if stop:
-                raise Interrupted(f"distill: stopped at round {current} of {rounds}, checkpoint written")
+                raise Interrupted(f"stopped at round {current} of {rounds}, checkpoint written")
     finally:
         environment.close()
 

@@ -58,9 +58,7 @@ def run(job: Job) -> None:
             arrays, _ = found
             environment.restore(checkpoint.under("environment", arrays))
             ppo.restore_ppo(model, env, arrays)
-            job.report.say(
-                f"resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps"
-            )
+            job.report.say(f"resumed from its checkpoint at {model.num_timesteps:,} of {settings.steps:,} steps")
         curves = Curves(job.work / "curves.jsonl", model.num_timesteps)
         clock = _Clock(model.num_timesteps)
 
@@ -84,7 +82,7 @@ def run(job: Job) -> None:
             if stop or updates % settings.checkpoint_every == 0:
                 save()
             if stop:
-                raise Interrupted(f"teacher: stopped at {steps:,} of {settings.steps:,} steps, checkpoint written")
+                raise Interrupted(f"stopped at {steps:,} of {settings.steps:,} steps, checkpoint written")
 
         if model.num_timesteps < settings.steps:
             model.learn(
