@@ -21,6 +21,7 @@ def run(job: Job) -> None:
     from iowbc.reference.posture_strip import draw_strip
     from iowbc.reference.sampling import SamplePlan, check_ranges
     from iowbc.robot.description import load_robot
+    from iowbc.sim.headless import NoRenderer, context
 
     recipe, seed = job.recipe.rg, job.recipe.seed
     robot = load_robot(job.robot)
@@ -94,8 +95,10 @@ def run(job: Job) -> None:
     figures = job.out / "figures"
     figures.mkdir(exist_ok=True)
     dataset_figures(figures, plan, dataset, region, rejected, check)
-    if (trouble := draw_strip(figures / "postures.png", robot, recipe, plan)) is not None:
-        job.report.say(f"no picture of postures: {trouble}")
+    try:
+        draw_strip(figures / "postures.png", robot, recipe, plan, context)
+    except NoRenderer as error:
+        job.report.say(f"no picture of postures: {error}")
     if check is not None and check.metrics["crosscheck_p90"] > recipe.crosscheck.p90_limit:
         raise StageFailed(
             f"static labels differ from optimal control by {check.metrics['crosscheck_p90']:.4f} rad "
