@@ -27,8 +27,10 @@ class Grasps(Section):
 class ArmReference(Section):
     """Differential inverse kinematics of the arms (eq. 3)."""
 
-    settling: int = Field(default=12, ge=1)
-    """Iterations at the start of an episode, so that it begins in the grasp."""
+    settling: int = Field(default=5, ge=1)
+    """Iterations at the start of an episode that bring the arms near the grasp and to their rest posture."""
+    refining: int = Field(default=3, ge=0)
+    """Iterations after that which bring the wrists to their targets; without, arms creep in the first seconds."""
 
 
 class GaitPrior(Section):

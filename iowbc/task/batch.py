@@ -31,6 +31,9 @@ Array = NDArray[Any]
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+EVERY = slice(None)
+"""All environments."""
+
 
 def full_layout(recipe: Recipe) -> FullLayout:
     """Layout of the rows that the environments of a recipe deliver."""
@@ -116,9 +119,9 @@ class Batch:
         self._begin(np.arange(self.n))
         for name in ("reward", "done", "truncated", "terminal_observation"):
             self.buffers[name][:] = 0
-        self._observe(self.buffers["observation"])
-        nothing = Ending.none(self.n)
-        write_signals(self.buffers, self.simulation.state, self._motion(), self.memory, nothing, self.period)
+        moved, nothing = self._motion(), Ending.none(self.n)
+        self._observe(moved)
+        write_signals(self.buffers, self.simulation.state, moved, self.memory, nothing, self.period)
 
     def step(self) -> None:
         """One control step of every environment; those that end begin anew."""
@@ -142,7 +145,7 @@ class Batch:
         write_signals(self.buffers, simulation.state, moved, memory, ending, self.period)
         memory.action[:] = action
         self._advance()
-        self._finish(scored, ending)
+        self._finish(moved, scored, ending)
 
     def _motion(self) -> Motion:
         return motion(self.simulation.state, self.recipe.rg.height)
@@ -195,7 +198,7 @@ class Batch:
         memory.arms[:], memory.posture[:] = arms, posture
         np.add(posture, gait.swing_prior(phase, stepping, settings), out=memory.support)
 
-    def _finish(self, scored: Scored, ending: Ending) -> None:
+    def _finish(self, moved: Motion, scored: Scored, ending: Ending) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""
         memory, buffers = self.memory, self.buffers
         memory.total += scored.reward
@@ -204,7 +207,7 @@ class Batch:
         buffers["reward"][:] = scored.reward
         buffers["done"][:] = done
         buffers["truncated"][:] = ending.truncated
-        self._observe(buffers["observation"])
+        self._observe(moved)
         count_step(buffers, scored)
         if not done.any():
             return
@@ -216,9 +219,7 @@ class Batch:
         self._promote(ending, which)
         self._keep_divergences()
         self._begin(which)
-        fresh = np.empty_like(buffers["observation"])
-        self._observe(fresh)
-        buffers["observation"][which] = fresh[which]
+        self._observe(self._motion(), which)
 
     def _promote(self, ending: Ending, which: Indices) -> None:
         """Moves the curriculum level of environments whose episode ended by itself; trials keep theirs."""
@@ -284,9 +285,9 @@ class Batch:
         self._scales["impulse_scale"][which] = self._scales["push_scale"][which] = scales.disturbance
         self.simulation.hold(self._scales)
 
-    def _observe(self, out: NDArray[np.float32]) -> None:
-        """Writes rows of s_t and s_priv, (n, layout.size)."""
-        memory, measured = self.memory, self.simulation.measured
+    def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
+        """Writes the rows of s_t and s_priv of some environments."""
+        memory, measured, layout = self.memory, self.simulation.measured, self.layout
         self._joint_reference[:, self.robot.support] = memory.support
         self._joint_reference[:, self.robot.interaction] = memory.arms
         sensed = Sensed(
@@ -304,10 +305,11 @@ class Batch:
             object_linear_velocity=measured.object_linear_velocity,
             object_angular_velocity=measured.object_angular_velocity,
         )
-        observe(self.layout.state, sensed, out[:, self.layout.observation])
-        self.layout.extra.gather(
-            privileged(self.simulation.state, self.simulation.drawn), out[:, self.layout.privileged]
-        )
+        extra = privileged(moved, self.simulation.drawn)
+        rows = np.empty((len(moved.heading[which]), layout.size), np.float32)
+        observe(layout.state, sensed.rows(which), rows[:, layout.observation])
+        layout.extra.gather({name: values[which] for name, values in extra.items()}, rows[:, layout.privileged])
+        self.buffers["observation"][which] = rows
 
     def _keep_divergences(self) -> None:
         """Writes simulations that diverged to the folder for replay."""

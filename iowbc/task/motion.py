@@ -8,23 +8,23 @@ from numpy.typing import NDArray
 
 from iowbc.robot import rotations
 from iowbc.sim.state import SimulationState
-from iowbc.task.observation import to_heading
 
 Array = NDArray[np.floating[Any]]
+
+UPRIGHT = 1e-9
+"""Keeps a base that points straight up or down from dividing by zero."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The true state of n environments, reduced to what the task speaks of."""
+    """The true state of n environments, reduced to what the task speaks of. Vectors are in the heading frame."""
 
     heading: Array
     """Yaw of the base, (n,) [rad]."""
-    heading_frame: Array
-    """The heading frame's quaternion, (n, 4)."""
     system_velocity: Array
-    """v_sys, heading frame, (n, 3) [m/s]."""
+    """v_sys, (n, 3) [m/s]."""
     base_velocity: Array
-    """Velocity of the pelvis, heading frame, (n, 3) [m/s]."""
+    """Velocity of the pelvis, (n, 3) [m/s]."""
     yaw_rate: Array
     """Turning of the base about the vertical, (n,) [rad/s]."""
     pelvis_height: Array
@@ -38,32 +38,57 @@ class Motion:
     torso_roll: Array
     """(n,) [rad]."""
     foot_position: Array
-    """Soles from the base, heading frame, (n, 2, 3) [m]."""
+    """Soles from the base, (n, 2, 3) [m]."""
+    foot_force: Array
+    """Force of the ground on each foot, (n, 2, 3) [N]."""
     object_offset: Array
-    """Object from the base, heading frame, (n, 3) [m]; zero without an object."""
+    """Object from the base, (n, 3) [m]; zero without an object."""
+    external_force: Array
+    """Force of partner and impulses on the object, (n, 3) [N]."""
+    external_torque: Array
+    """Their torque about the object's centre of mass, (n, 3) [N·m]."""
 
 
 def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") -> Motion:
     """The motion in a simulation state; `height`: what H speaks of."""
-    quaternion = state.base_quaternion
-    frame = rotations.heading(quaternion)
-    up = 1.0 - 2.0 * (quaternion[:, 1] ** 2 + quaternion[:, 2] ** 2)
-    from_base = state.foot_position - state.base_position[:, None]
-    to_object = (state.object_position - state.base_position) * state.has_object[:, None]
+    rotation, base = state.base_rotation, state.base_position
+    vectors = np.empty((len(base), 9, 3))
+    vectors[:, 0] = state.system_velocity
+    vectors[:, 1] = state.base_linear_velocity
+    np.subtract(state.foot_position, base[:, None], out=vectors[:, 2:4])
+    vectors[:, 4:6] = state.foot_force
+    np.subtract(state.object_position, base, out=vectors[:, 6])
+    vectors[:, 6] *= state.has_object[:, None]
+    vectors[:, 7:] = state.external_force.reshape(-1, 2, 3)
+    to_heading(rotation, vectors)
     return Motion(
-        heading=rotations.yaw_of(quaternion),
-        heading_frame=frame,
-        system_velocity=to_heading(frame, state.system_velocity),
-        base_velocity=to_heading(frame, state.base_linear_velocity),
-        yaw_rate=rotations.rotate(quaternion, state.base_angular_velocity)[:, 2],
-        pelvis_height=state.base_position[:, 2],
-        height=state.base_position[:, 2] if height == "pelvis" else state.com_position[:, 2],
-        pelvis_tilt=np.arccos(np.clip(up, -1.0, 1.0)),
+        heading=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]),
+        system_velocity=vectors[:, 0],
+        base_velocity=vectors[:, 1],
+        yaw_rate=np.einsum("ni,ni->n", rotation[:, 2], state.base_angular_velocity),
+        pelvis_height=base[:, 2],
+        height=base[:, 2] if height == "pelvis" else state.com_position[:, 2],
+        pelvis_tilt=np.arccos(np.clip(rotation[:, 2, 2], -1.0, 1.0)),
         torso_pitch=rotations.lean_of(state.torso_quaternion),
         torso_roll=rotations.roll_of(state.torso_quaternion),
-        foot_position=to_heading(frame, from_base),
-        object_offset=to_heading(frame, to_object),
+        foot_position=vectors[:, 2:4],
+        foot_force=vectors[:, 4:6],
+        object_offset=vectors[:, 6],
+        external_force=vectors[:, 7],
+        external_torque=vectors[:, 8],
     )
+
+
+def to_heading(rotation: Array, vectors: Array) -> None:
+    """Turns world vectors (n, k, 3) in place into the heading frame of bases with these rotations (n, 3, 3)."""
+    forward = rotation[:, :2, 0]
+    cosine, sine = (forward / np.maximum(np.hypot(forward[:, 0], forward[:, 1]), UPRIGHT)[:, None]).T[..., None]
+    x, y = vectors[..., 0], vectors[..., 1]
+    ahead = cosine * x
+    ahead += sine * y
+    y *= cosine
+    y -= sine * x
+    x[:] = ahead
 
 
 def low_pass(filtered: Array, value: Array, time_constant: float, dt: float) -> Array:

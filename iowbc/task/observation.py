@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.robot import rotations
-
 Array = NDArray[np.floating[Any]]
 Observation = NDArray[np.float32]
 
@@ -165,7 +163,7 @@ class Sensed:
     object_angular_velocity: Array
     """Object's angular velocity, base frame, (n, 3) [rad/s]."""
 
-    def rows(self, which: NDArray[np.intp]) -> "Sensed":
+    def rows(self, which: NDArray[np.intp] | slice) -> "Sensed":
         """The same of some environments."""
         return Sensed(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
@@ -198,8 +196,3 @@ def observe(layout: ObservationLayout, sensed: Sensed, out: Observation | None =
         },
         out,
     )
-
-
-def to_heading(heading: Array, vectors: Array) -> Array:
-    """World vectors in the heading frame; heading quaternion (n, 4), vectors (n, 3) or (n, k, 3)."""
-    return rotations.rotate_inverse(heading if vectors.ndim == 2 else heading[:, None], vectors)

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.robot import rotations
-from iowbc.sim.state import SimulationState
-from iowbc.task.observation import to_heading
+from iowbc.task.motion import Motion
 
 Array = NDArray[np.floating[Any]]
 
@@ -19,15 +17,14 @@ DRAWN = (
 """Drawn quantities that are privileged observations under their own names."""
 
 
-def privileged(state: SimulationState, drawn: Mapping[str, Array]) -> dict[str, Array]:
+def privileged(moved: Motion, drawn: Mapping[str, Array]) -> dict[str, Array]:
     """The parts of s_priv by name, each (n, k): vectors in the heading frame, SI units."""
-    frame = rotations.heading(state.base_quaternion)
-    values = {name: drawn[name].reshape(len(frame), -1) for name in DRAWN}
+    values = {name: drawn[name].reshape(len(moved.heading), -1) for name in DRAWN}
     return values | {
-        "base_linear_velocity": to_heading(frame, state.base_linear_velocity),
-        "system_velocity": to_heading(frame, state.system_velocity),
-        "pelvis_height": state.base_position[:, 2:],
-        "foot_force": to_heading(frame, state.foot_force).reshape(-1, 6),
-        "external_force": to_heading(frame, state.external_force[:, :3]),
-        "external_torque": to_heading(frame, state.external_force[:, 3:]),
+        "base_linear_velocity": moved.base_velocity,
+        "system_velocity": moved.system_velocity,
+        "pelvis_height": moved.pelvis_height[:, None],
+        "foot_force": moved.foot_force.reshape(-1, 6),
+        "external_force": moved.external_force,
+        "external_torque": moved.external_torque,
     }

@@ -17,6 +17,9 @@ from iowbc.task.command import HEIGHT, OFFSET, PITCH
 
 Array = NDArray[np.floating[Any]]
 
+SETTLING, REFINING = 0.3, 0.02
+"""Time that an iteration of inverse kinematics stands for at the start [s]: the longer, the more it heeds the rest
+posture of the arms, and the less their targets."""
 WAIST = slice(12, 15)
 """Waist yaw, roll and pitch among the support joints."""
 
@@ -40,7 +43,7 @@ class ReferenceLayer:
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
             self.feasible = FeasibleMap.load(rg / "feasible.npz")
-        self.settling = references.arms.settling
+        self.settling = (SETTLING,) * references.arms.settling + (REFINING,) * references.arms.refining
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
@@ -60,8 +63,8 @@ class ReferenceLayer:
         """
         arms = np.tile(self.default_arms, (len(command), 1))
         support = self.support(arms, command)
-        for _ in range(self.settling):
-            arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt=1.0)
+        for dt in self.settling:
+            arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt)
             support = self.support(arms, command)
         return arms, support
 
