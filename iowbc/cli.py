@@ -1,6 +1,7 @@
 """The commands. Nothing heavy is imported before a command needs it, so that `iowbc --help` answers at once."""
 
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -241,8 +242,14 @@ def _runs(folder: Path | None) -> "Runs":
     return Runs(folder or Path("runs"))
 
 
+def _leave(number: int, frame: object) -> None:
+    """Ctrl-C before a run has begun, or in any other command."""
+    sys.exit(130)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 a stage failed, 2 the recipe or the usage is wrong, 130 interrupted."""
+    signal.signal(signal.SIGINT, _leave)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     try:
         app(arguments, prog_name="iowbc")

@@ -10,11 +10,11 @@ from rich.console import Console
 
 from iowbc.pipeline.history import recall
 from iowbc.pipeline.journal import Journal, sent_path, unsent
-from iowbc.pipeline.listing import size
 from iowbc.pipeline.locking import holder
 from iowbc.pipeline.naming import known_recipes, last_used
 from iowbc.pipeline.results import shown_path
 from iowbc.pipeline.store import Store
+from iowbc.pipeline.wording import size
 from iowbc.pipeline.workspace import unfinished
 from iowbc.recipe.problems import UsageError, nearest
 

@@ -7,8 +7,9 @@ from typing import Any
 from rich.console import Console
 
 from iowbc.pipeline.naming import Named, named
-from iowbc.pipeline.planning import changed_code, flattened
+from iowbc.pipeline.planning import changed_code
 from iowbc.pipeline.store import Artifact, Store
+from iowbc.pipeline.trees import MISSING, differences, nested
 from iowbc.recipe.loading import load_recipe
 from iowbc.recipe.problems import UsageError, shown
 
@@ -66,14 +67,12 @@ def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> I
 
 
 def _changes(prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str]:
-    old, new = flattened(before) if before else {}, flattened(after) if after else {}
-    for path in sorted(old.keys() | new.keys()):
-        if path not in old or path not in new or old[path] != new[path]:
-            yield f"{prefix}{path}: {_value(old, path)} -> {_value(new, path)}"
+    for path, old, new in differences(nested(before), nested(after)):
+        yield f"{prefix}{path}: {_value(old)} -> {_value(new)}"
 
 
-def _value(values: Mapping[str, Any], path: str) -> str:
-    return shown(values[path]) if path in values else "(absent)"
+def _value(value: Any) -> str:
+    return "(absent)" if value is MISSING else shown(value)
 
 
 def _number(value: float | None) -> str:

@@ -1,5 +1,6 @@
 """What the console shows of a run: the state of each stage, and its output as plain lines."""
 
+import os
 import sys
 import time
 from collections import deque
@@ -7,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import IO, Protocol
 
-from iowbc.pipeline.planning import duration
+from iowbc.pipeline.wording import duration
 
 RATE_WINDOW = 60.0
 """Seconds over which a stage's rate is averaged."""
@@ -116,8 +117,11 @@ class PlainDisplay:
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:
-        """One line."""
-        print(text, file=self.stream, flush=True)
+        """One line; a reader that has gone away (`| head`) does not stop the run."""
+        try:
+            print(text, file=self.stream, flush=True)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
 
     def end(self) -> None:
         """Nothing more comes."""

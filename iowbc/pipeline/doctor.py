@@ -16,7 +16,7 @@ from rich.text import Text
 
 from iowbc.pipeline.layout import Runs
 from iowbc.pipeline.machine import available_cores
-from iowbc.pipeline.planning import duration
+from iowbc.pipeline.wording import duration
 
 Verdict = Literal["good", "doubtful", "bad"]
 STYLES = {"good": "green", "doubtful": "yellow", "bad": "bold red"}

@@ -6,8 +6,9 @@ import sys
 
 from rich.console import Console
 
+from iowbc.pipeline.delivery import client, set_up
 from iowbc.pipeline.layout import Runs
-from iowbc.pipeline.sender import client, set_up
+from iowbc.pipeline.tracking import backlog, start_sender
 
 HOST = "127.0.0.1"
 
@@ -18,13 +19,11 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     uri = f"sqlite:///{runs.database.absolute()}"
     with set_up(runs):
         client(uri).search_experiments(max_results=1)
+    if backlog(runs):
+        start_sender(runs)
     console.print(f"MLflow on http://{HOST}:{port} in about a quarter of a minute; Ctrl-C ends it", highlight=False)
     command = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(port), "--workers", "1"]
     command += ["--backend-store-uri", uri, "--default-artifact-root", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
     with subprocess.Popen(command, env=environment) as server:
-        try:
-            return server.wait()
-        except KeyboardInterrupt:
-            server.wait()
-            return 0
+        return server.wait()

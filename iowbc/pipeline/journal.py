@@ -44,11 +44,18 @@ class Journal:
                 if time.monotonic() >= limit:
                     return False
                 time.sleep(0.01)
-        content = self.path.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        if whole != len(content):
-            os.truncate(self.path, whole)
+        self._mend()
         return True
+
+    def _mend(self) -> None:
+        """Cut off a last line that a dying process left half written."""
+        size = self.path.stat().st_size
+        with self.path.open("rb") as file:
+            file.seek(max(0, size - 1))
+            if size == 0 or file.read(1) == b"\n":
+                return
+            file.seek(0)
+            os.truncate(self.path, file.read().rfind(b"\n") + 1)
 
     def write(self, event: str, **fields: Any) -> None:
         """Append one event with the time."""
@@ -80,20 +87,33 @@ def events(path: Path, offset: int = 0) -> Iterator[tuple[dict[str, Any], int]]:
             yield json.loads(line), offset
 
 
-def statuses(path: Path) -> dict[str, str]:
-    """The status of every run in a journal: `RUNNING`, or what its end said."""
+def statuses(path: Path, end: int | None = None) -> dict[str, str]:
+    """The status of every run in a journal, or in its first bytes: `RUNNING`, or what its end said."""
     found: dict[str, str] = {}
-    for event, _ in events(path):
-        if event["event"] in ("run", "reopen"):
-            found[event["id"]] = "RUNNING"
-        elif event["event"] == "end":
-            found[event["id"]] = event["status"]
+    for event, behind in events(path):
+        if end is not None and behind > end:
+            break
+        note_status(found, event)
     return found
+
+
+def note_status(found: dict[str, str], event: Mapping[str, Any]) -> None:
+    """Take one more event into account."""
+    if event["event"] in ("run", "reopen"):
+        found[event["id"]] = "RUNNING"
+    elif event["event"] == "end":
+        found[event["id"]] = event["status"]
 
 
 def header(path: Path) -> dict[str, Any]:
     """The first event of a journal; empty where there is none yet."""
     return next((event for event, _ in events(path)), {})
+
+
+def lives(path: Path) -> bool:
+    """Whether the process that writes a journal lives."""
+    with Journal(path) as journal:
+        return not journal.acquire()
 
 
 def close_orphaned(path: Path) -> bool:

@@ -11,16 +11,14 @@ from rich.text import Text
 from iowbc.pipeline.history import recall
 from iowbc.pipeline.locking import holder
 from iowbc.pipeline.naming import known_recipes, last_used, named
-from iowbc.pipeline.planning import duration, flattened
 from iowbc.pipeline.results import shown_files, shown_path
 from iowbc.pipeline.store import Artifact, Store
 from iowbc.pipeline.tracking import backlog
+from iowbc.pipeline.trees import flattened
+from iowbc.pipeline.wording import KEY_LENGTH, duration, size
 from iowbc.pipeline.workspace import unfinished
 from iowbc.recipe.problems import shown
 from iowbc.recipe.recipe import Recipe
-
-KEY_LENGTH = 12
-"""Characters of a key that are shown."""
 
 
 def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
@@ -144,15 +142,6 @@ def metrics_text(artifact: Artifact, limit: int | None = None) -> str:
     items = list(artifact.metrics.items())
     text = ", ".join(f"{name} {value:.4g}" for name, value in items[:limit])
     return text + (", ..." if limit is not None and len(items) > limit else "")
-
-
-def size(count: float) -> str:
-    """A number of bytes for people."""
-    for unit in ("B", "kB", "MB"):
-        if count < 1000:
-            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
-        count /= 1000
-    return f"{count:.2f} GB"
 
 
 def _ago(moment: float) -> str:

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from iowbc.pipeline.display import StageView
-from iowbc.pipeline.planning import duration
+from iowbc.pipeline.wording import duration
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE_WIDTH = 24

@@ -77,6 +77,15 @@ def key_lock(
         yield True
 
 
+@contextmanager
+def named_lock(path: Path) -> Iterator[None]:
+    """Hold the lock of a file; waits for another holder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
 def _read(path: Path) -> Holder:
     data = read_json(path) or {}
     return Holder(int(data.get("pid", 0)), str(data.get("host", "?")), float(data.get("since", time.time())))

@@ -1,6 +1,6 @@
 """What would run, and why."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -9,6 +9,8 @@ import iowbc
 from iowbc.pipeline.fingerprint import code_digests, data_digest, folder_digest
 from iowbc.pipeline.history import previous
 from iowbc.pipeline.store import Artifact, Damaged, Store
+from iowbc.pipeline.trees import MISSING, differences, nested
+from iowbc.pipeline.workspace import Workspace
 from iowbc.recipe.loading import LoadedRecipe
 from iowbc.recipe.problems import Problem, RecipeError, shown
 from iowbc.stages.contract import Stage
@@ -135,7 +137,18 @@ class Planner:
             if changed:
                 text = f"code changed since it was made: {', '.join(changed)}"
                 (found if self.options.on_code_change == "rerun" else notes).append(text)
+        if found:
+            notes.extend(self._checkpoint(stage, key))
         return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code)
+
+    def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
+        """What an earlier attempt has left."""
+        record = Workspace(self.store.runs, stage.name, key).record
+        forced = stage.name in self.options.force
+        if record and (record.get("forced") or not forced):
+            total = float(record.get("total", 0.0))
+            share = f", {100 * float(record.get('done', 0.0)) / total:.0f} %" if total else ""
+            yield f"goes on from attempt {record.get('attempts', 1)}{share}"
 
     def _differences(self, ingredients: Mapping[str, Any], former: Artifact | None) -> list[str]:
         """How a key's ingredients differ from those of an earlier artifact, each with its place in the recipe."""
@@ -143,11 +156,8 @@ class Planner:
             return ["nothing stored yet"]
         old = former.ingredients
         texts = []
-        before, after = flattened(old.get("recipe", {})), flattened(ingredients["recipe"])
-        for path in sorted(before.keys() | after.keys()):
-            if before.get(path, MISSING) != after.get(path, MISSING):
-                change = f"{_shown(before, path)} -> {_shown(after, path)}"
-                texts.append(f"{path} ({self.loaded.place(path)}): {change}")
+        for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
+            texts.append(f"{path} ({self.loaded.place(path)}): {_shown(before)} -> {_shown(after)}")
         if old.get("version") != ingredients["version"]:
             texts.append(f"stage version {old.get('version')} -> {ingredients['version']}")
         if old.get("robot") != ingredients["robot"]:
@@ -162,24 +172,6 @@ class Planner:
         return texts
 
 
-MISSING = object()
-
-
-def flattened(value: Any, path: str = "") -> dict[str, Any]:
-    """Leaves of nested mappings, and of lists of mappings, by dotted path; a list of plain values is one leaf."""
-    if isinstance(value, Mapping) and value:
-        entries = value.items()
-    elif isinstance(value, (list, tuple)) and any(isinstance(item, Mapping) for item in value):
-        entries = {str(index): item for index, item in enumerate(value)}.items()
-    else:
-        return {path: value}
-    return {
-        leaf: found
-        for name, entry in entries
-        for leaf, found in flattened(entry, f"{path}.{name}" if path else str(name)).items()
-    }
-
-
 def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     """Names of the subpackages and modules whose code differs."""
     return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
@@ -192,30 +184,8 @@ def stage_code(stage: Stage) -> dict[str, str]:
     return code_digests(Path(iowbc.__file__).parent, own | set(stage.packages))
 
 
-def describe(steps: Sequence[Step]) -> list[tuple[str, str, str, str]]:
-    """Rows of a plan: stage, `cached` or `run`, why (lines), expected time."""
-    rows = []
-    for step in steps:
-        state = "cached" if step.cached else "run"
-        why = "\n".join((*step.reasons, *step.notes)) or (step.key or "")[:12]
-        rows.append((step.stage.name, state, why, "" if step.cached else duration(step.expected)))
-    return rows
-
-
-def duration(seconds: float | None) -> str:
-    """A time span for people: `0.4 s`, `42 s`, `12 min`, `3 h 05 min`; empty for None."""
-    if seconds is None:
-        return ""
-    if seconds < 10:
-        return f"{seconds:.1f} s"
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
-
-
-def _shown(values: Mapping[str, Any], path: str) -> str:
-    return shown(values[path]) if path in values else "(absent)"
+def _shown(value: Any) -> str:
+    return "(absent)" if value is MISSING else shown(value)
 
 
 def slice_value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:

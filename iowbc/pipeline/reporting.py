@@ -33,5 +33,6 @@ class StageReport:
         self._display.moved(self._view)
 
     def say(self, text: str) -> None:
-        """Print one line."""
-        self._display.say(f"{self._view.name}: {text}")
+        """Print one line, with the stage's name before it."""
+        prefix = f"{self._view.name}: "
+        self._display.say(prefix + text.removeprefix(prefix))

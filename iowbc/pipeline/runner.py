@@ -12,6 +12,7 @@ from iowbc.pipeline.planning import Planner, Step, changed_code
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.store import Artifact, Damaged
 from iowbc.pipeline.tracking import Tracker
+from iowbc.pipeline.wording import short
 from iowbc.pipeline.workspace import Workspace
 from iowbc.recipe.writing import as_yaml
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
@@ -110,12 +111,11 @@ class Runner:
         assert key is not None
         earlier = workspace.record.get("code", step.code)
         resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code))
-        view.state, view.note = "runs", "; ".join(step.reasons)
+        view.state, view.note = "runs", short(step.notes or step.reasons, 1)
         self.display.changed(view)
-        if resumed:
-            changed = changed_code(earlier, step.code)
-            warning = f"; code changed since it began: {', '.join(changed)}" if changed else ""
-            self.display.say(f"{stage.name}: goes on from attempt {workspace.attempts - 1}{warning}")
+        changed = changed_code(earlier, step.code)
+        if resumed and changed:
+            self.display.say(f"{stage.name}: code changed since its first attempt: {', '.join(changed)}")
         if self.tracker is not None:
             self.tracker.stage(stage.name, key, (step.ingredients or {}).get("recipe", {}), resumed)
         workers = self.options.workers or self.loaded.recipe.execution.workers or available_cores()
@@ -175,7 +175,7 @@ class Runner:
 
     def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
         workspace.write()
-        view.state, view.note, view.seconds = state, message.partition("\n")[0], workspace.seconds
+        view.state, view.note, view.seconds = state, "", workspace.seconds
         self.display.changed(view)
         if self.tracker is not None:
             self.tracker.end(view.name, status, message)

@@ -12,18 +12,21 @@ from rich.text import Text
 from iowbc.pipeline.display import Display, PlainDisplay
 from iowbc.pipeline.layout import Runs
 from iowbc.pipeline.live import LiveDisplay
-from iowbc.pipeline.planning import Options, Planner, describe, duration
+from iowbc.pipeline.planning import Options, Planner, Step
 from iowbc.pipeline.results import print_results
 from iowbc.pipeline.runner import PipelineFailed, Runner
 from iowbc.pipeline.stopping import StopRequest
 from iowbc.pipeline.store import Store
 from iowbc.pipeline.tracking import Tracker, backlog
+from iowbc.pipeline.wording import KEY_LENGTH, duration, short
 from iowbc.recipe.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.problems import Problem, RecipeError
 from iowbc.stages.contract import Interrupted, Stage
 
 DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
+REASONS_SHOWN = 8
+"""Reasons of a stage that a plan prints; the rest is counted."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +38,15 @@ class Request:
     runs: Runs
     options: Options
 
-    def command(self, unfinished: Sequence[str]) -> str:
-        """The command that goes on with this run, where `unfinished` stages are not made yet."""
+    def command(self, forced: Sequence[str]) -> str:
+        """The command that goes on with this run; `forced` stages are still to be made anew."""
         words = ["iowbc", "run", str(self.file)]
         for override in self.overrides:
             words += ["--set", override]
         if self.options.until:
             words += ["--until", self.options.until]
-        for stage in unfinished:
-            if stage in self.options.force:
-                words += ["--force", stage]
+        for stage in sorted(forced):
+            words += ["--force", stage]
         if self.options.workers:
             words += ["--workers", str(self.options.workers)]
         if self.options.on_code_change != "report":
@@ -73,8 +75,8 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> i
     table = Table(box=None, padding=(0, 1))
     for name in ("stage", "plan", "why", "takes about"):
         table.add_column(name, no_wrap=name != "why")
-    for stage, state, why, time in describe(steps):
-        table.add_row(stage, Text(state, style="cyan" if state == "cached" else "bold yellow"), Text(why), time)
+    for step in steps:
+        table.add_row(*_row(step))
     console.print(table)
     missing = [step for step in steps if not step.cached]
     known = [step.expected for step in missing if step.expected is not None]
@@ -86,28 +88,41 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> i
     return DONE
 
 
+def _row(step: Step) -> tuple[str | Text, ...]:
+    """Stage, what is planned for it, why, and the time it took last."""
+    if step.cached:
+        why = "\n".join(step.notes) or (step.key or "")[:KEY_LENGTH]
+        return step.stage.name, Text("cached", style="cyan"), Text(why), ""
+    why = "\n".join((short(step.reasons, REASONS_SHOWN), *step.notes))
+    return step.stage.name, Text("run", style="bold yellow"), Text(why), duration(step.expected)
+
+
 def run(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`."""
     planner, robot = prepared(request, registry)
     loaded = planner.loaded
     tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
-    with StopRequest() as stop:
-        runner = Runner(planner, robot, _display(loaded, console), tracker, stop)
-        status, code, closing = "FAILED", STAGE_FAILED, ""
-        try:
-            artifacts = runner.run()
-            status, code = "FINISHED", DONE
-        except PipelineFailed as error:
-            closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, runner)}"
-        except (Interrupted, KeyboardInterrupt) as error:
-            status, code = "KILLED", INTERRUPTED
-            closing = "\n".join(filter(None, (str(error), f"interrupted; to go on:\n{_rest(request, runner)}")))
-        finally:
-            if tracker is not None:
-                wait = bool(runner.made) and not stop()
-                delivered = tracker.close(status, wait) or not wait
-    if code == DONE:
-        print_results(artifacts, console)
+    runner: Runner | None = None
+    status, code, closing, delivered = "KILLED", INTERRUPTED, "", True
+    try:
+        with StopRequest() as stop:
+            runner = Runner(planner, robot, _display(loaded, console), tracker, stop)
+            try:
+                runner.run()
+                status, code = "FINISHED", DONE
+            except PipelineFailed as error:
+                status, code = "FAILED", STAGE_FAILED
+                closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, runner)}"
+            except Interrupted as error:
+                closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
+            finally:
+                if tracker is not None:
+                    wait = bool(runner.made) and not stop()
+                    delivered = tracker.close(status, wait) or not wait
+    except KeyboardInterrupt:
+        code, closing = INTERRUPTED, _resumption(request, runner)
+    if code == DONE and runner is not None:
+        print_results(runner.artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:
@@ -115,8 +130,14 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console) -> in
     return code
 
 
-def _rest(request: Request, runner: Runner) -> str:
-    return request.command([stage.name for stage in runner.planner.stages if stage.name not in runner.made])
+def _resumption(request: Request, runner: Runner | None) -> str:
+    return f"interrupted; to go on:\n{_rest(request, runner)}"
+
+
+def _rest(request: Request, runner: Runner | None) -> str:
+    """The command that makes what is missing."""
+    made = runner.made if runner is not None else []
+    return request.command([name for name in request.options.force if name not in made])
 
 
 def _display(loaded: LoadedRecipe, console: Console) -> Display:

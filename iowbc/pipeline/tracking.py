@@ -16,8 +16,8 @@ from iowbc.pipeline.fingerprint import data_digest
 from iowbc.pipeline.journal import Journal, header, statuses, unsent
 from iowbc.pipeline.layout import Runs
 from iowbc.pipeline.machine import boot, host
-from iowbc.pipeline.planning import flattened
 from iowbc.pipeline.store import INGREDIENTS, RECIPE, Artifact
+from iowbc.pipeline.trees import flattened
 from iowbc.recipe.loading import LoadedRecipe
 from iowbc.recipe.writing import as_yaml
 

@@ -26,7 +26,7 @@ def test_a_failed_stage_goes_on_from_its_checkpoint(workplace: Workplace) -> Non
     workplace.command("run", "small.yaml", behaviour={"teacher": {"raise": "out of luck"}})
     command = workplace.command("run", "small.yaml")
     assert command.code == 0
-    assert "teacher: goes on from attempt 1" in command.output
+    assert "teacher: runs - goes on from attempt 1, 100 %" in command.output
     assert list(workplace.store.runs.work.iterdir()) == []
 
 

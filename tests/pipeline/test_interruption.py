@@ -32,7 +32,7 @@ def test_a_signal_leaves_a_checkpoint_and_the_command_that_resumes(
     again = workplace.command(*last[1:])
     assert again.code == 0, again.errors
     assert "rg-fit: cached" in again.output
-    assert "teacher: goes on from attempt 1" in again.output
+    assert "teacher: runs - goes on from attempt 1" in again.output
     assert started_at(workplace, "teacher") == reached
     assert workplace.store.artifacts("teacher")[0].manifest.attempts == 2
 

@@ -9,7 +9,7 @@ from conftest import RECIPE, Workplace
 
 from iowbc.pipeline import planning
 from iowbc.pipeline.fingerprint import canonical_json, code_digests, data_digest
-from iowbc.pipeline.planning import duration
+from iowbc.pipeline.wording import duration
 from iowbc.recipe.problems import RecipeError
 
 

@@ -1,0 +1,33 @@
+"""Spans of time, sizes and lists of reasons in words for people."""
+
+from collections.abc import Sequence
+
+KEY_LENGTH = 12
+"""Characters of a key that are shown."""
+
+
+def short(reasons: Sequence[str], count: int) -> str:
+    """The first few reasons, a line each, and how many more there are."""
+    more = len(reasons) - count
+    return "\n".join(reasons[:count]) + (f" (and {more} more)" if more > 0 else "")
+
+
+def duration(seconds: float | None) -> str:
+    """A time span for people: `0.4 s`, `42 s`, `12 min`, `3 h 05 min`; empty for None."""
+    if seconds is None:
+        return ""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def size(count: float) -> str:
+    """A number of bytes: `812 B`, `1.2 MB`."""
+    for unit in ("B", "kB", "MB"):
+        if count < 1000:
+            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
+        count /= 1000
+    return f"{count:.2f} GB"
