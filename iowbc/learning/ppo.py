@@ -26,6 +26,10 @@ Mirrors = tuple[MirrorMap, MirrorMap]
 """Of the observation and of the action."""
 
 
+SB3_KL_MARGIN = 1.5
+"""PPO of stable-baselines3 ends an update beyond this many times its `target_kl`."""
+
+
 def normalize(env: VecEnv, teacher: Teacher, mirrors: Mirrors | None) -> VecNormalize:
     """Normalise observations and rewards of `env` by running statistics."""
     normalized = VecNormalize(env, gamma=teacher.gamma, clip_obs=teacher.normalization_clip, epsilon=VARIANCE_FLOOR)
@@ -36,7 +40,6 @@ def normalize(env: VecEnv, teacher: Teacher, mirrors: Mirrors | None) -> VecNorm
 
 def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | None) -> PPO:
     """PPO with the recipe's numbers; starts as the reference itself (the mean action begins near zero)."""
-    first, last = teacher.learning_rate, teacher.learning_rate_end or teacher.learning_rate
     buffer: dict[str, Any] = {"rollout_buffer_class": RolloutBuffer}
     if mirrors is not None:
         arguments = {"observation_mirror": mirrors[0], "action_mirror": mirrors[1]}
@@ -45,7 +48,7 @@ def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | 
     model = PPO(
         "MlpPolicy",
         env,
-        learning_rate=lambda remaining: last + (first - last) * remaining,
+        learning_rate=teacher.learning_rate,
         n_steps=teacher.rollout,
         batch_size=teacher.environments * teacher.rollout // teacher.minibatches,
         n_epochs=teacher.epochs,
@@ -55,7 +58,7 @@ def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | 
         ent_coef=teacher.entropy,
         vf_coef=teacher.value_weight,
         max_grad_norm=teacher.gradient_norm,
-        target_kl=teacher.target_kl,
+        target_kl=teacher.largest_kl / SB3_KL_MARGIN if teacher.largest_kl else None,
         seed=seed,
         device="cpu",
         policy_kwargs={
@@ -69,6 +72,25 @@ def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | 
         model.rollout_buffer.policy = model.policy
     model.set_logger(Logger(folder=None, output_formats=[]))
     return model
+
+
+def adapt_learning_rate(model: PPO, teacher: Teacher, kl: float) -> float:
+    """Move the step size of the next update towards the desired KL divergence; returns it."""
+    rate = float(model.learning_rate)
+    if teacher.desired_kl is not None:
+        if kl > 1.5 * teacher.desired_kl:
+            rate *= 0.8
+        elif kl < teacher.desired_kl / 1.5:
+            rate *= 1.2
+        low, high = teacher.learning_rate_range
+        set_learning_rate(model, min(max(rate, low), high))
+    return float(model.learning_rate)
+
+
+def set_learning_rate(model: PPO, rate: float) -> None:
+    """Use a step size from the next update on."""
+    model.learning_rate = rate
+    model._setup_lr_schedule()
 
 
 class AfterUpdate(BaseCallback):  # type: ignore[misc]
@@ -109,6 +131,7 @@ def ppo_arrays(model: PPO, env: VecNormalize) -> checkpoint.Arrays:
         "last/observation": np.asarray(model._last_obs),
         "last/episode_starts": np.asarray(model._last_episode_starts),
         "counters": np.array([model.num_timesteps, model._n_updates]),
+        "learning_rate": np.array([model.learning_rate]),
     }
 
 
@@ -124,6 +147,7 @@ def restore_ppo(model: PPO, env: VecNormalize, arrays: Mapping[str, NDArray[Any]
     model._last_obs = np.array(arrays["last/observation"])
     model._last_episode_starts = np.array(arrays["last/episode_starts"])
     model.num_timesteps, model._n_updates = (int(value) for value in arrays["counters"])
+    set_learning_rate(model, float(arrays["learning_rate"][0]))
     checkpoint.restore_random(checkpoint.under("random", arrays))
 
 

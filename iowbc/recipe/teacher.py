@@ -23,9 +23,13 @@ class Teacher(Section):
     hidden: tuple[int, ...] = (512, 256, 128)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
-    """Adam's step size (paper Table I)."""
-    learning_rate_end: float | None = Field(default=None, gt=0)
-    """Step size at the end of a linear schedule; none keeps it constant."""
+    """Adam's step size at the start (paper Table I)."""
+    desired_kl: float | None = Field(default=0.04, gt=0)
+    """KL divergence that an update should have: the step size falls by a fifth beyond one and a half times as much, and
+    rises by a fifth below two thirds. At 0.02 to 0.04 training is stable, below 0.02 it is several times slower; empty
+    keeps the step size constant."""
+    learning_rate_range: tuple[float, float] = (2e-5, 1e-3)
+    """Bounds of the step size."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
     gae_lambda: float = Field(default=0.95, ge=0, le=1)
@@ -38,8 +42,8 @@ class Teacher(Section):
     """Weight of the value loss."""
     gradient_norm: float = Field(default=1.0, gt=0)
     """Largest norm of a gradient step."""
-    target_kl: float | None = Field(default=None, gt=0)
-    """Ends the epochs of an update early beyond this KL divergence; none never does."""
+    largest_kl: float | None = Field(default=0.15, gt=0)
+    """An update ends before its last epoch where the KL divergence passes this; empty never does."""
     initial_std: float = Field(default=0.5, gt=0)
     """Initial standard deviation of the action, in units of the action (before the action scale)."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
@@ -53,8 +57,7 @@ class Teacher(Section):
 
     @model_validator(mode="after")
     def _minibatches_divide(self) -> "Teacher":
-        if (self.environments * self.rollout) % self.minibatches:
-            raise ValueError(
-                f"minibatches: {self.minibatches} does not divide environments x rollout = {self.environments * self.rollout}"
-            )
+        samples = self.environments * self.rollout
+        if samples % self.minibatches:
+            raise ValueError(f"minibatches: {self.minibatches} does not divide environments x rollout = {samples}")
         return self

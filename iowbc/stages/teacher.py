@@ -1,10 +1,11 @@
 """Stage `teacher`: PPO with privileged information on the vector environment, resumable at every checkpoint."""
 
+import math
 import time
 from typing import TYPE_CHECKING
 
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.contract import Interrupted, Job, Stage
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
 
 if TYPE_CHECKING:
     from iowbc.learning.curves import Curves
@@ -14,6 +15,7 @@ PANELS = (
     "reward",
     "curriculum_level",
     "train/approx_kl",
+    "learning_rate",
     "train/std",
     "train/explained_variance",
 )
@@ -71,7 +73,13 @@ def run(job: Job) -> None:
 
         def after_update(training: dict[str, float]) -> None:
             steps = model.num_timesteps
-            values = {**environment.statistics(), **training, "steps_per_second": clock.rate(steps)}
+            if not all(math.isfinite(value) for value in training.values()):
+                raise StageFailed(
+                    f"the networks diverged at {steps:,} steps; lower teacher.learning_rate or teacher.largest_kl"
+                )
+            rate = ppo.adapt_learning_rate(model, settings, training["train/approx_kl"])
+            values = {**environment.statistics(), **training, "learning_rate": rate}
+            values["steps_per_second"] = clock.rate(steps)
             curves.append(steps, values)
             job.report.metrics(values, steps)
             job.report.progress(
@@ -88,7 +96,7 @@ def run(job: Job) -> None:
             model.learn(
                 settings.steps - model.num_timesteps,
                 callback=ppo.AfterUpdate(after_update),
-                log_interval=None,  # type: ignore[arg-type]  # never dumps: the figures are read after each update
+                log_interval=None,  # never dumps: the figures are read after each update
                 reset_num_timesteps=False,
             )
         save()

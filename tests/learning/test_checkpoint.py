@@ -18,7 +18,6 @@ SETTINGS = Teacher(
     minibatches=2,
     hidden=(16,),
     learning_rate=1e-2,
-    learning_rate_end=1e-3,
 )
 ODD = MirrorMap(np.array([0, 1]), np.array([-1, -1], np.float32)), MirrorMap(np.array([0]), np.array([-1], np.float32))
 
@@ -65,9 +64,10 @@ def train(path: Path, stop_after: int | None = None) -> dict[str, np.ndarray]:
         ppo.restore_ppo(model, normalised, found[0])
     count = 0
 
-    def after(_: dict[str, float]) -> None:
+    def after(training: dict[str, float]) -> None:
         nonlocal count
         count += 1
+        ppo.adapt_learning_rate(model, SETTINGS, training["train/approx_kl"])
         arrays = {**ppo.ppo_arrays(model, normalised), "environment/state": env.state}
         checkpoint.save_checkpoint(path, "key", arrays, {})
         if count == stop_after:
@@ -118,3 +118,15 @@ def test_an_unfinished_write_leaves_the_old_checkpoint(tmp_path: Path) -> None:
     checkpoint.save_checkpoint(path, "k", {"x": np.arange(3)}, {})
     (tmp_path / "checkpoint.fresh").write_bytes(b"half")
     assert checkpoint.load_checkpoint(path, "k") is not None
+
+
+def test_the_step_size_follows_the_kl_divergence_within_its_bounds() -> None:
+    env = PushToCentre()
+    settings = SETTINGS.model_copy(update={"learning_rate": 1e-3, "learning_rate_range": (5e-4, 1.1e-3)})
+    model = ppo.make_ppo(settings, ppo.normalize(env, settings, None), 0, None)
+    assert ppo.adapt_learning_rate(model, settings, kl=0.04) == 1e-3
+    assert ppo.adapt_learning_rate(model, settings, kl=0.01) == 1.1e-3
+    for _ in range(9):
+        rate = ppo.adapt_learning_rate(model, settings, kl=0.2)
+    assert rate == 5e-4
+    assert model.lr_schedule(0.5) == 5e-4
