@@ -37,6 +37,6 @@ class Distillation(Section):
     teacher_share: float = Field(default=0.1, ge=0, le=1)
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
     std_floor: float = Field(default=0.1, gt=0)
-    """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales a mean error."""
+    """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales the error."""
     checkpoint_every: int = Field(default=50, ge=1)
     """Rounds between two checkpoints."""
