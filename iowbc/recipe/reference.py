@@ -182,11 +182,13 @@ class FeasibleRegion(Section):
     pitches: int = Field(default=41, ge=3)
     """Grid points over the pitch range."""
     steepest: Positive = 9.0
-    """Largest move of a joint per metre of height [rad/m]: near straight legs the reference would jump."""
+    """Largest move of a joint per metre of height [rad/m]: near straight legs and joint limits the reference leaps."""
+    gentle_share: Share = 0.98
+    """A command needs this share of the labels around it to be less steep than that."""
     bound_slope: Positive = 0.5
     """Steepest change of the map's bounds with pitch [m/rad]: a clamped height does not leap when the pitch moves."""
     kept_share: Share = 0.5
-    """A command also needs this share of the samples around it, with any arms, to have a label."""
+    """A command needs this share of the samples around it, with any arms, to have a label."""
     window: tuple[Positive, Positive] = (0.02, 0.1)
     """Which samples are around a command: within this height [m] and pitch [rad]."""
     enough: int = Field(default=20, ge=1)

@@ -41,6 +41,8 @@ class Dataset:
     """Distance of the centre of mass inside the support polygon, shape (n,) [m]."""
     reached: Array
     """Height reached, shape (n,) [m]."""
+    slope: Array
+    """Largest move of a joint per metre of height around the label, shape (n,) [rad/m]."""
     rejected_arm: Array
     rejected_command: Array
     rejected_payload: Array
@@ -60,7 +62,7 @@ class Dataset:
     @classmethod
     def load(cls, path: Path) -> "Dataset":
         """Reads the archive. Raises ValueError where arrays are missing or not finite."""
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             missing = [f.name for f in fields(cls) if f.name not in stored.files]
             if missing:
                 raise ValueError(f"{path}: no arrays {', '.join(missing)}; make it anew with `--force rg-dataset`")

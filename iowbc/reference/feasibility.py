@@ -41,7 +41,7 @@ class FeasibleMap:
     def load(cls, path: Path) -> "FeasibleMap":
         """Reads the map. Raises FileNotFoundError, or ValueError where it is damaged."""
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
                 arrays = [np.asarray(stored[name], dtype=np.float64) for name in ("pitch", "low", "high")]
         except FileNotFoundError as error:
             raise FileNotFoundError(f"{path}: no feasible map; run `iowbc run RECIPE --until rg-fit`") from error

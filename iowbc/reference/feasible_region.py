@@ -24,7 +24,7 @@ class Region:
     held: NDArray[np.bool_]
     """Whether one of the grid's two arm postures has a label."""
     gentle: NDArray[np.bool_]
-    """Whether it has one that moves no more than allowed from the height below."""
+    """Whether that label and nearly all around it are less steep than the recipe allows."""
     share: Array
     """Share of the samples around a command that have a label; -1 where there were too few."""
 
@@ -32,24 +32,26 @@ class Region:
 def measure_region(plan: SamplePlan, dataset: Dataset) -> Region:
     """The feasible map. Raises ValueError when it is empty."""
     recipe = plan.recipe.feasible
-    posture = np.zeros((*plan.grid_shape, dataset.support.shape[1]))
-    labelled = np.zeros(plan.grid_shape, dtype=bool)
-    on_grid = dataset.index >= plan.drawn
-    cells = dataset.index[on_grid] - plan.drawn
-    posture.reshape(-1, posture.shape[-1])[cells] = dataset.support[on_grid]
-    labelled.ravel()[cells] = True
-    climb = np.abs(np.diff(posture, axis=2)).max(axis=-1)
-    steep = np.zeros_like(labelled)
-    steep[..., 1:] = labelled[..., 1:] & labelled[..., :-1] & (climb > recipe.steepest * np.diff(plan.heights))
+    on_grid, flat = dataset.index >= plan.drawn, dataset.slope <= recipe.steepest
+    held, gentle = (_on_grid(plan, dataset.index[on_grid & which]) for which in (flat | ~flat, flat))
     told = dataset.rejected_reason != ARMS_COLLIDE
     kept = _around(plan, dataset.command[~on_grid])
     tried = kept + _around(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])
     enough = tried >= recipe.enough
     share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
-    held: NDArray[np.bool_] = np.any(labelled, axis=0, keepdims=False)
-    gentle: NDArray[np.bool_] = np.any(labelled & ~steep, axis=0, keepdims=False)
-    feasible = gentle & (~enough | (share >= recipe.kept_share))
-    return Region(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope), held, gentle, share)
+    calm = _around(plan, dataset.command[~on_grid & flat]) >= recipe.gentle_share * kept
+    feasible = gentle & (~enough | ((share >= recipe.kept_share) & calm))
+    return Region(
+        build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope), held, gentle & (calm | ~enough), share
+    )
+
+
+def _on_grid(plan: SamplePlan, index: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Grid points (pitches, heights) that have one of these samples, with either arm posture."""
+    found = np.zeros(plan.grid_shape, dtype=bool)
+    found.ravel()[index - plan.drawn] = True
+    either: NDArray[np.bool_] = np.any(found, axis=0, keepdims=False)
+    return either
 
 
 def _around(plan: SamplePlan, command: Array) -> Array:

@@ -5,6 +5,7 @@ base's equilibrium as linearised equalities, eliminated by an orthogonal decompo
 limits as inequalities of a small QP.
 """
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import daqp
@@ -22,6 +23,8 @@ Array = NDArray[Any]
 
 REGULARISATION = 1e-9
 """Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""
+SLOPE_STEP = 0.005
+"""Height step by which a label's slope is measured [m]."""
 SOLVED = 1
 """daqp's exit flag of an optimum."""
 
@@ -74,6 +77,24 @@ class StaticMethod:
             if np.abs(step).max() < problem.tolerance:
                 return Posture(q, wrench)
         raise Rejected("not converged")
+
+    def slope(self, sample: Sample, posture: Posture) -> float:
+        """Largest move of a support joint per metre of commanded height around a label [rad/m], up or down.
+
+        It is how the first Gauss-Newton step changes with the command; a neighbour without equilibrium does not count.
+        The support model must be locked to the sample.
+        """
+        torso = pinocchio.SE3(sample.torso_rotation(), np.zeros(3))
+        here, _ = self._step(posture.configuration, posture.wrench, sample, torso)
+        steepest = 0.0
+        for rise in (-SLOPE_STEP, SLOPE_STEP):
+            neighbour = replace(sample, command=sample.command + np.array([rise, 0.0, 0.0, 0.0]))
+            try:
+                step, _ = self._step(posture.configuration, posture.wrench, neighbour, torso)
+            except Rejected:
+                continue
+            steepest = max(steepest, float(np.abs((step - here)[6:]).max()) / SLOPE_STEP)
+        return steepest
 
     def _step(self, q: Array, wrench: Array, sample: Sample, torso: Any) -> tuple[Array, Array]:
         """One Gauss-Newton step: tangent (21,) and change of the wrenches (2, 6)."""
