@@ -48,7 +48,7 @@ def write_shard(path: Path, key: str, shard: Shard) -> None:
 def read_shard(path: Path, key: str, indices: Sequence[int]) -> Shard | None:
     """The shard, or None where it is missing, damaged, of another run, or not finite: it is then made anew."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             content = {name: stored[name] for name in stored.files}
         shard = Shard(
             content["kept"],

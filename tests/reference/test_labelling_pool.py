@@ -1,0 +1,134 @@
+"""Labelling in processes: the same result for any number of them, after crashes, damage and interruption."""
+
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # workers find the doubles by this path too
+from labelling_doubles import DoubleTask
+
+from iowbc.reference.labelling_pool import CRASHED, Stopped, label_all
+from iowbc.reference.shards import Shard, read_shard, write_shard
+
+COUNT, CHUNK = 40, 8
+
+
+def run(folder: Path, task: DoubleTask | None = None, *, workers: int = 1, key: str = "key", **changes: Any) -> Shard:
+    settings: dict[str, Any] = {"interrupted": lambda: False, "progress": lambda done, total: None, **changes}
+    return label_all(
+        task or DoubleTask(), range(COUNT), folder=folder, key=key, chunk_size=CHUNK, workers=workers, **settings
+    )
+
+
+def same(a: Shard, b: Shard) -> bool:
+    return (
+        np.array_equal(a.kept, b.kept)
+        and np.array_equal(a.rejected, b.rejected)
+        and list(a.reasons) == list(b.reasons)
+        and np.array_equal(a.labels["support"], b.labels["support"])
+    )
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shards of a whole run."""
+    folder = tmp_path_factory.mktemp("finished")
+    run(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def expected(finished: Path) -> Shard:
+    return run(finished)
+
+
+@pytest.fixture
+def shards(finished: Path, tmp_path: Path) -> Path:
+    """A copy of the shards, to harm."""
+    return Path(shutil.copytree(finished, tmp_path / "shards"))
+
+
+def test_each_sample_is_labelled_or_has_a_reason(expected: Shard) -> None:
+    assert sorted([*expected.kept, *expected.rejected]) == list(range(COUNT))
+    np.testing.assert_array_equal(expected.labels["support"][:, 0], expected.kept)
+    assert set(expected.reasons) == {"a third"}
+
+
+@pytest.mark.parametrize("workers", [2, 5])
+def test_the_number_of_workers_changes_nothing(tmp_path: Path, expected: Shard, workers: int) -> None:
+    assert same(run(tmp_path, workers=workers), expected)
+
+
+def test_a_native_crash_ends_one_sample(tmp_path: Path, expected: Shard) -> None:
+    result = run(tmp_path, DoubleTask(crashes=(10, 13, 31)), workers=2)
+    lost = dict(zip(result.rejected.tolist(), result.reasons, strict=True))
+    assert [index for index, reason in lost.items() if reason == CRASHED] == [10, 13, 31]
+    assert set(result.kept) == set(expected.kept) - {10, 13, 31}
+
+
+def test_workers_that_cannot_start_end_the_stage_with_advice(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match=r"end before their first sample \(exit code -11\).*iowbc doctor"):
+        run(tmp_path, DoubleTask(start=False))
+
+
+def test_an_error_in_python_is_shown(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match=r"(?s)a labelling worker failed.*KeyError: 'a mistake at 20'"):
+        run(tmp_path, DoubleTask(mistakes=(20,)))
+
+
+def test_finished_shards_are_used_again(shards: Path, expected: Shard) -> None:
+    before = {path: path.stat().st_mtime_ns for path in shards.glob("*.npz")}
+    ready: list[int] = []
+    result = run(shards, DoubleTask(start=False), progress=lambda done, total: ready.append(done))
+    assert same(result, expected)
+    assert ready == [COUNT]
+    assert {path: path.stat().st_mtime_ns for path in shards.glob("*.npz")} == before
+
+
+def test_damaged_shards_are_made_anew(shards: Path, expected: Shard) -> None:
+    paths = sorted(shards.glob("*.npz"))
+    shard = read_shard(paths[4], "key", range(32, 40))
+    assert shard is not None
+    paths[0].write_bytes(paths[0].read_bytes()[:-40])
+    paths[1].unlink()
+    paths[2].write_bytes(b"")
+    not_a_number = {"support": shard.labels["support"] * np.nan}
+    write_shard(paths[4], "key", Shard(shard.kept, not_a_number, shard.rejected, shard.reasons))
+    untouched = paths[3].stat().st_mtime_ns
+    assert same(run(shards, workers=2), expected)
+    assert paths[3].stat().st_mtime_ns == untouched
+
+
+def test_a_shard_of_other_samples_or_another_key_is_not_taken(shards: Path) -> None:
+    path = shards / "00004.npz"
+    shard = read_shard(path, "key", range(32, 40))
+    assert shard is not None
+    assert read_shard(path, "another key", range(32, 40)) is None
+    assert read_shard(path, "key", range(31, 39)) is None
+    fewer = {"support": shard.labels["support"][1:]}
+    write_shard(path, "key", Shard(shard.kept, fewer, shard.rejected, shard.reasons))
+    assert read_shard(path, "key", range(32, 40)) is None
+
+
+def stop_after(samples: int) -> tuple[Callable[[], bool], Callable[[int, int], None]]:
+    done = [0]
+
+    def progress(ready: int, total: int) -> None:
+        done[0] = ready
+
+    return (lambda: done[0] >= samples), progress
+
+
+def test_an_interruption_keeps_finished_shards_and_leaves_no_process(tmp_path: Path, expected: Shard) -> None:
+    interrupted, progress = stop_after(16)
+    with pytest.raises(Stopped):
+        run(tmp_path, DoubleTask(pause=0.02), workers=2, interrupted=interrupted, progress=progress)
+    assert not [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
+    assert 2 <= len(list(tmp_path.glob("*.npz"))) < 5
+    assert same(run(tmp_path), expected)

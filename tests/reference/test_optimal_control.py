@@ -1,0 +1,124 @@
+"""The optimal control problem over a horizon, and static labels held against it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio
+import pytest
+
+from iowbc.recipe.reference import LabelGates, ReferenceGenerator
+from iowbc.reference.crosscheck import compare, pick
+from iowbc.reference.dataset import Dataset
+from iowbc.reference.gates import Judge
+from iowbc.reference.kinematic_start import KinematicStart
+from iowbc.reference.optimal_control import OptimalControlMethod
+from iowbc.reference.sample import Sample
+from iowbc.reference.sampling import SamplePlan
+from iowbc.reference.shards import Shard
+from iowbc.reference.static import StaticMethod
+from iowbc.reference.support_model import SupportModel
+from iowbc.reference.wrench_cone import sole_limits
+from iowbc.reference.wrench_distribution import distribute
+from iowbc.robot.description import Robot
+from iowbc.stages.contract import Job
+
+COMMANDS = ((0.70, 0.0), (0.60, 0.4), (0.66, -0.2), (0.68, 0.9))
+
+
+@pytest.fixture(scope="module")
+def method(support: SupportModel, recipe: ReferenceGenerator) -> OptimalControlMethod:
+    return OptimalControlMethod(support, recipe)
+
+
+def test_mid_horizon_postures_equal_static_labels(
+    method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]
+) -> None:
+    static = StaticMethod(support, "pelvis")
+    for height, pitch in COMMANDS:
+        sample = command(height, pitch)
+        np.testing.assert_allclose(method.solve(sample).support, static.solve(sample).support, atol=0.02)
+
+
+def test_its_postures_pass_the_physical_gates(
+    method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]
+) -> None:
+    judge = Judge(support, LabelGates(), "pelvis")
+    for height, pitch in COMMANDS:
+        sample = command(height, pitch)
+        judge.label(sample, method.solve(sample))
+
+
+def test_the_horizon_starts_at_rest_and_ends_at_rest(
+    method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]
+) -> None:
+    sample = command(0.62, 0.5)
+    support.lock(sample)
+    states = method.trajectory(sample)
+    assert len(states) == method.ocp.nodes + 1
+    speeds = [float(np.linalg.norm(state[support.model.nq :])) for state in states]
+    assert speeds[0] == 0.0
+    assert speeds[-1] < method.ocp.settled
+    assert max(speeds) > 1e-3, "the optimum is not the kinematic start"
+
+
+def test_the_label_does_not_depend_on_what_was_solved_before(
+    method: OptimalControlMethod, support: SupportModel, recipe: ReferenceGenerator, command: Callable[..., Sample]
+) -> None:
+    fresh = OptimalControlMethod(SupportModel(support.robot, recipe.problem), recipe).solve(command(0.6, 0.5))
+    method.solve(command(0.72, -0.2, payload=(3.0, 1.0)))
+    np.testing.assert_array_equal(method.solve(command(0.6, 0.5)).configuration, fresh.configuration)
+
+
+def test_a_payload_is_felt(method: OptimalControlMethod, support: SupportModel, command: Callable[..., Sample]) -> None:
+    sample = command(0.68, 0.2, payload=(3.0, 3.0))
+    found = method.solve(sample)
+    np.testing.assert_allclose(found.support, StaticMethod(support, "pelvis").solve(sample).support, atol=0.02)
+    assert found.wrench[:, 2].sum() == pytest.approx(9.81 * (33.341142 + 6.0), rel=1e-3)
+
+
+def test_the_kinematic_start_stands_as_commanded(support: SupportModel, command: Callable[..., Sample]) -> None:
+    start = KinematicStart(support, "pelvis")
+    for height, pitch in COMMANDS:
+        sample = command(height, pitch)
+        support.lock(sample)
+        q = start.posture(sample)
+        com = pinocchio.centerOfMass(support.model, support.data, q).copy()
+        pinocchio.framesForwardKinematics(support.model, support.data, q)
+        for sole, place in zip(support.soles, support.stance, strict=True):
+            assert np.linalg.norm(pinocchio.log6(place.actInv(support.data.oMf[sole])).vector) < 1e-4
+        assert support.data.oMf[support.base].translation[2] == pytest.approx(height, abs=5e-3)
+        assert np.abs(com[:2]).max() < 5e-3
+
+
+def test_wrenches_are_distributed_as_in_the_static_optimum(
+    robot: Robot, support: SupportModel, recipe: ReferenceGenerator, command: Callable[..., Sample]
+) -> None:
+    label = StaticMethod(support, "pelvis").solve(command(0.64, 0.4))
+    wrench = distribute(support, label.configuration, sole_limits(robot, recipe.problem))
+    np.testing.assert_allclose(wrench, label.wrench, atol=0.5)
+
+
+def test_the_cross_check_measures_the_largest_joint_difference(robot: Robot, dataset_job: Job) -> None:
+    dataset = Dataset.load(dataset_job.out / "dataset.npz")
+    rows = np.array([1, 5, 9, 20])
+    other = dataset.support[rows[:3]].copy()
+    other[0, 3] += 0.01
+    other[2, 14] -= 0.05
+    again = Shard(dataset.index[rows[:3]], {"support": other}, dataset.index[rows[3:]], ["feet"])
+    check = compare(dataset, again)
+    assert check is not None
+    np.testing.assert_allclose(check.difference, [0.01, 0.0, 0.05], atol=1e-12)
+    assert check.metrics["crosscheck_max"] == pytest.approx(0.05)
+    assert check.metrics["crosscheck_solved"] == pytest.approx(0.75)
+    assert f"number {dataset.index[9]} " in check.worst[0]
+
+
+def test_the_cross_check_takes_drawn_samples_from_all_over_the_dataset(robot: Robot, dataset_job: Job) -> None:
+    dataset, rg = Dataset.load(dataset_job.out / "dataset.npz"), dataset_job.recipe.rg
+    plan = SamplePlan(robot, rg, dataset_job.recipe.seed)
+    wider = rg.model_copy(update={"crosscheck": rg.crosscheck.model_copy(update={"samples": 20})})
+    chosen = pick(dataset, plan, wider)
+    assert len(set(chosen)) == 20
+    assert max(chosen) < plan.drawn
+    assert set(chosen) <= set(dataset.index.tolist())
+    assert max(chosen) - min(chosen) > 0.9 * plan.drawn
