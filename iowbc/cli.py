@@ -22,6 +22,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"max_content_width": 120},
 )
+bench = typer.Typer(help="Measure the speed of this machine.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(bench, name="bench")
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe, a YAML file.", metavar="RECIPE")]
 Overrides = Annotated[
@@ -190,6 +192,23 @@ def play(
             disturbances=disturbances,
         )
     )
+
+
+@bench.command("sim")
+def bench_simulation(
+    recipe: Annotated[Path | None, typer.Argument(help="Recipe of the world; the defaults.", metavar="RECIPE")] = None,
+    scene: Annotated[str, typer.Option(help="Scene of the recipe.")] = "lift",
+    environments: Annotated[int, typer.Option(help="Environments a worker.", min=1)] = 48,
+    workers: Annotated[list[int] | None, typer.Option(help="Worker processes; repeat to measure several.")] = None,
+    others: Annotated[bool, typer.Option(help="Also measure the usual vector environments.")] = True,
+) -> None:
+    """Measure how fast the vector environment steps, against a bare loop of MuJoCo."""
+    from iowbc.recipe.loading import load_recipe
+
+    loaded = load_recipe(recipe).recipe if recipe is not None else None
+    from iowbc.benchmarks import simulation
+
+    simulation.main(loaded, scene=scene, environments=environments, workers=tuple(workers or ()), others=others)
 
 
 @app.command()

@@ -23,13 +23,19 @@ def play_word(
     store: Store, console: Console, word: str, stage: str | None, *, video: Path | None, **settings: Any
 ) -> int:
     """Play what a word names; `settings` are those of `iowbc.evaluation.playing.play`. Returns the exit code."""
+    artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
+
     from iowbc.deploy.contract import ContractBroken
-    from iowbc.evaluation.playing import NoDisplay, play
+    from iowbc.evaluation.playing import NoDisplay, exported_source, play
     from iowbc.evaluation.rollout import Stopped
     from iowbc.sim.headless import NoRenderer
 
     try:
-        result = play(playable(store, word, stage), video=video, **settings)
+        if artifact is None or artifact.manifest.stage == "export":
+            source = exported_source(artifact.folder if artifact is not None else Path(word))
+        else:
+            source = _source(store, artifact)
+        result = play(source, video=video, **settings)
     except (NoDisplay, NoRenderer, ContractBroken) as error:
         raise UsageError(str(error)) from error
     except Stopped as stopped:
@@ -41,12 +47,8 @@ def play_word(
     return 0
 
 
-def playable(store: Store, word: str, stage: str | None) -> "Source":
+def playable(store: Store, word: str, stage: str | None) -> Artifact:
     """The policy that a word and `--stage` name. Raises `UsageError`."""
-    from iowbc.evaluation.playing import exported_source
-
-    if (Path(word) / CONTRACT).is_file():
-        return exported_source(Path(word))
     found = named(store, word)
     ready = [name for name in POLICIES if name in found.artifacts]
     if not ready or (stage is not None and stage not in ready):
@@ -54,17 +56,15 @@ def playable(store: Store, word: str, stage: str | None) -> "Source":
             f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
             f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found.artifacts) or 'none'}"
         )
-    return _source(store, found.artifacts[stage or ready[0]])
+    return found.artifacts[stage or ready[0]]
 
 
 def _source(store: Store, artifact: Artifact) -> "Source":
     """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
-    from iowbc.evaluation.playing import Source, exported_source
+    from iowbc.evaluation.playing import Source
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
 
-    if artifact.manifest.stage == "export":
-        return exported_source(artifact.folder)
     recipe = Recipe.model_validate(yaml.safe_load((artifact.folder / RECIPE).read_text(encoding="utf-8")))
     digest = artifact.ingredients.get("inputs", {}).get("rg-fit")
     generator = next((found for found in store.artifacts("rg-fit") if found.manifest.digest == digest), None)

@@ -7,8 +7,9 @@ from pathlib import Path
 from rich.console import Console
 
 from iowbc.pipeline.store import Artifact
-from iowbc.pipeline.tracking import SHOWN_FOLDERS
 
+SEEN_FOLDERS = ("figures", "videos")
+"""Folders whose files are listed; tables are printed."""
 EXPORTED = "policy.onnx"
 
 
@@ -31,8 +32,8 @@ def print_results(artifacts: Mapping[str, Artifact], console: Console) -> None:
 
 
 def shown_files(artifact: Artifact) -> Iterator[str]:
-    """Files of an artifact for the eye, and the exported graph."""
-    for folder in SHOWN_FOLDERS:
+    """Figures and films of an artifact, and the exported graph."""
+    for folder in SEEN_FOLDERS:
         for path in sorted((artifact.folder / folder).glob("*")):
             yield shown_path(path)
     if (artifact.folder / EXPORTED).is_file():

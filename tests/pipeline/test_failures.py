@@ -1,6 +1,6 @@
 """A failing stage says why and what to do, and takes nothing else with it."""
 
-from conftest import Workplace
+from workplace import Workplace
 
 
 def test_a_missed_gate_is_told_without_a_traceback(workplace: Workplace) -> None:

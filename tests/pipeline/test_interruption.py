@@ -5,7 +5,7 @@ import shlex
 import signal
 
 import pytest
-from conftest import Workplace, until
+from workplace import Workplace, until
 
 SLOW = {"teacher": {"steps": 40, "pause": 0.05}}
 

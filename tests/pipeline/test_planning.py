@@ -5,7 +5,7 @@ from pathlib import Path
 
 import fake_stages
 import pytest
-from conftest import RECIPE, Workplace
+from workplace import RECIPE, Workplace
 
 from iowbc.pipeline import planning
 from iowbc.pipeline.fingerprint import canonical_json, code_digests, data_digest

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import Workplace
+from workplace import Workplace
 
 from iowbc.pipeline.store import MANIFEST, Damaged, Store
 from iowbc.pipeline.workspace import Workspace

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from conftest import RECIPE, Workplace, until
+from workplace import RECIPE, Workplace, until
 
 from iowbc.pipeline.journal import Journal, close_orphaned, statuses, unsent
 from iowbc.pipeline.layout import Runs

@@ -1,0 +1,164 @@
+"""The commands answer fast, say what was meant, and end with the right exit code."""
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+Key = Callable[[str, str], str]
+
+
+def seconds(*arguments: str) -> float:
+    began = time.monotonic()
+    subprocess.run([sys.executable, "-m", "iowbc.cli", *arguments], capture_output=True, check=False)
+    return time.monotonic() - began
+
+
+def test_help_answers_at_once() -> None:
+    assert statistics.median(seconds("--help") for _ in range(5)) < 0.4
+
+
+def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text("teacher:\n  stebs: 3\n")
+    assert statistics.median(seconds("run", str(path)) for _ in range(3)) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["run", "wrong.yaml"], "wrong.yaml:2:3: key 'teacher.stebs' = 3"),
+        (["plan", "nothing.yaml"], "no such file; recipes in .: first.yaml, second.yaml"),
+        (["plan", "first.yaml", "--set", "seed"], "should read a.b.c=value"),
+        (["run", "first.yaml", "--until", "taecher"], "valid: rg-dataset, rg-fit, teacher"),
+        (["run", "first.yaml", "--set", "robot=r2d2"], "no robot 'r2d2'"),
+        (["run", "first.yaml", "--workers", "0"], "workers"),
+        (["run"], "RECIPE"),
+        (["fly"], "fly"),
+        (["show", "thrid"], "neither a recipe that has run"),
+        (["show", "first/nothing"], "finished: rg-dataset, rg-fit"),
+        (["diff", "first", "thrid"], "neither a recipe that has run"),
+        (["compare", "first"], "two or more"),
+        (["gc"], "--unused"),
+        (["gc", "--recipe", "frist"], "did you mean 'first'?"),
+        (["play", "first/eval"], "stages that leave one: export, distill, teacher"),
+        (["bench", "fly"], "fly"),
+    ],
+)
+def test_wrong_usage_ends_with_2_and_a_reason(folder: Path, command: Command, arguments: list[str], text: str) -> None:
+    if "wrong.yaml" in arguments:
+        (folder / "wrong.yaml").write_text("teacher:\n  stebs: 3\n")
+    done = command(*arguments)
+    assert done.returncode == 2
+    assert text in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_finished_recipe_is_cached_and_fast(command: Command) -> None:
+    began = time.monotonic()
+    done = command("run", "first.yaml")
+    assert time.monotonic() - began < 3.0
+    assert done.returncode == 0
+    assert done.stdout.count(": cached") == 6
+    assert "all stages are cached" in command("plan", "first.yaml").stdout
+
+
+def test_a_dry_run_is_a_plan(folder: Path, command: Command) -> None:
+    before = sorted(folder.rglob("*"))
+    done = command("run", "first.yaml", "--dry-run", "--set", "eval.trials=9")
+    assert done.returncode == 0
+    assert "eval.trials (--set eval.trials=9): 5 -> 9" in " ".join(done.stdout.split())
+    assert "1 stages would run" in done.stdout
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_ls_lists_artifacts_and_who_uses_them(command: Command, key: Key) -> None:
+    lines = command("ls").stdout.splitlines()
+    teachers = [line for line in lines if line.lstrip().startswith("teacher")]
+    assert {line.split()[1] for line in teachers} == {key(name, "teacher")[:12] for name in ("first", "second")}
+    assert any("first, second" in line for line in lines)
+    assert len(command("ls", "teacher").stdout.splitlines()) == 3
+
+
+def test_show_tells_an_artifact_by_key_or_name(command: Command, key: Key) -> None:
+    by_key = command("show", key("second", "teacher")[:8]).stdout
+    assert "teacher.steps: 8192" in by_key
+    assert "count 3" in by_key
+    by_name = command("show", "second/teacher").stdout
+    assert key("second", "teacher") in by_name
+    assert "distill" in command("show", "second").stdout
+
+
+def test_diff_names_fields_keys_and_metrics(folder: Path, command: Command, key: Key) -> None:
+    lines = command("diff", "first", "second").stdout.splitlines()
+    assert "teacher.steps: 4096 -> 8192" in lines
+    assert f"teacher: key {key('first', 'teacher')[:12]} -> {key('second', 'teacher')[:12]}" in lines
+    assert not any(line.startswith("rg-fit") for line in lines)
+    assert "teacher: teacher.steps: 4096 -> 8192" in command("diff", "first/teacher", "second/teacher").stdout
+    assert command("diff", "first", "first").stdout == "no difference\n"
+    (folder / "third.yaml").write_text("extends: first.yaml\nseed: 8\n")
+    assert "seed: 3 -> 8" in command("diff", "first", "third.yaml").stdout
+
+
+def test_compare_puts_metrics_side_by_side(folder: Path, command: Command) -> None:
+    done = command("compare", "first", "second")
+    assert done.returncode == 0
+    assert "| teacher | count | 3 | 3 |" in (folder / "runs" / "compare" / "metrics.md").read_text()
+
+
+def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: Command, key: Key) -> None:
+    teachers = folder / "runs" / "store" / "teacher"
+    assert "would remove" in command("gc", "--recipe", "second", "--dry-run").stdout
+    assert len(list(teachers.iterdir())) == 2
+    assert command("gc", "--unused").stdout == "0 B in all\n"
+    assert command("gc", "--recipe", "second", "--older-than", "1").stdout == "0 B in all\n"
+    assert command("gc", "--recipe", "second").returncode == 0
+    assert [path.name for path in teachers.iterdir()] == [key("first", "teacher")]
+    assert "all stages are cached" in command("plan", "first.yaml").stdout
+
+
+def test_gc_keeps_an_unused_artifact_only_until_it_is_told(folder: Path, command: Command) -> None:
+    assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
+    assert "runs/store/teacher" in command("gc", "--unused").stdout
+    assert command("run", "first.yaml", "--set", "seed=4").stdout.count(": cached") == 6
+
+
+def test_status_tells_what_each_recipe_has(command: Command) -> None:
+    output = command("status").stdout
+    assert "first" in output
+    assert "rg-dataset, rg-fit, teacher, distill, eval, export" in output
+
+
+def test_the_runs_folder_can_be_named_by_option_or_environment(
+    folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = str(folder / "elsewhere")
+    assert f"nothing has run in {other} yet" in command("status", "--runs", other).stdout.replace("\n", "")
+    monkeypatch.setenv("IOWBC_RUNS", other)
+    assert f"nothing is stored in {other}/store yet" in command("ls").stdout.replace("\n", "")
+
+
+def test_schema_is_written_for_editors(folder: Path, command: Command) -> None:
+    printed = json.loads(command("schema").stdout)
+    assert command("schema", "--output", "schema.json").returncode == 0
+    assert json.loads((folder / "schema.json").read_text()) == printed
+    assert printed["properties"]["teacher"]["$ref"] == "#/$defs/Teacher"
+
+
+def test_the_output_may_be_cut_short(folder: Path) -> None:
+    """`iowbc run ... | head -1` ends the reader, not the run."""
+    command = (
+        f"{sys.executable} {Path(__file__).parents[1] / 'pipeline' / 'fake_stages.py'} run first.yaml --set seed=9"
+    )
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {command} | head -1"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(list((folder / "runs" / "store" / "export").iterdir())) == 2 + 1

@@ -1,0 +1,25 @@
+"""The doctor computes a contact, draws a picture, and fails where something essential does."""
+
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from iowbc.pipeline import doctor
+from iowbc.pipeline.layout import Runs
+
+
+def test_this_machine_is_fit(tmp_path: Path) -> None:
+    found = {finding.name: finding for finding in doctor.findings(Runs(tmp_path / "runs"))}
+    assert found["crocoddyl and pin"].verdict == "good", found["crocoddyl and pin"].text
+    assert [finding.name for finding in found.values() if finding.verdict == "bad"] == []
+
+
+@pytest.mark.parametrize("script", ["import os; os.kill(os.getpid(), 11)", "raise ValueError('no')"])
+def test_a_crash_of_the_contact_model_is_essential(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str
+) -> None:
+    monkeypatch.setattr(doctor, "CONTACT_MODEL", script)
+    console = Console(record=True, width=200)
+    assert doctor.examine(Runs(tmp_path / "runs"), console) == 1
+    assert "pip install crocoddyl==3.2.1 pin==4.0.0" in console.export_text()
