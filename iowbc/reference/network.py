@@ -43,10 +43,10 @@ class ReferenceNetwork:
             )
         x = (x - self.input_mean) / self.input_std
         for weight, bias in self.layers[:-1]:
-            x = x @ weight.T + bias
+            x = _rowwise(x, weight) + bias
             x = np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
         weight, bias = self.layers[-1]
-        output: Array = np.clip((x @ weight.T + bias) * self.output_std + self.output_mean, self.lower, self.upper)
+        output: Array = np.clip((_rowwise(x, weight) + bias) * self.output_std + self.output_mean, self.lower, self.upper)
         return output
 
     def save(self, folder: Path) -> None:
@@ -92,3 +92,10 @@ class ReferenceNetwork:
             name: tensors[name] for name in ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper")
         }
         return cls(inputs=inputs, outputs=outputs, layers=layers, **rest)
+
+
+def _rowwise(x: Array, weight: Array) -> Array:
+    """x Wᵀ, (n, in) to (n, out), a product a row: products of whole matrices round otherwise for other numbers of rows,
+    and a robot's reference would depend on how many are computed beside it."""
+    product: Array = (x[:, None] @ weight.T)[:, 0]
+    return product
