@@ -46,7 +46,9 @@ class ReferenceNetwork:
             x = _rowwise(x, weight) + bias
             x = np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
         weight, bias = self.layers[-1]
-        output: Array = np.clip((_rowwise(x, weight) + bias) * self.output_std + self.output_mean, self.lower, self.upper)
+        output: Array = np.clip(
+            (_rowwise(x, weight) + bias) * self.output_std + self.output_mean, self.lower, self.upper
+        )
         return output
 
     def save(self, folder: Path) -> None:
