@@ -1,17 +1,18 @@
 FROM python:3.11-slim-bookworm
 
-# OSMesa draws pictures without a display or a GPU.
+# OSMesa draws pictures without a display or a GPU; pinocchio's wheel expects the system's OpenMP runtime.
 RUN apt-get update \
- && apt-get install --yes --no-install-recommends libosmesa6 \
+ && apt-get install --yes --no-install-recommends libgomp1 libosmesa6 \
  && rm -rf /var/lib/apt/lists/*
 
 WORKDIR /iowbc
-COPY pyproject.toml constraints.txt README.md LICENSE NOTICE ./
+COPY pyproject.toml constraints.txt ./
 # The heavy packages are a layer of their own, made again only when the versions change.
 RUN python3 -m venv /opt/venv \
  && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt torch==2.13.0 \
- && mkdir iowbc robots && touch iowbc/__init__.py \
+ && mkdir iowbc robots && touch iowbc/__init__.py README.md LICENSE NOTICE \
  && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt --editable .
+COPY README.md LICENSE NOTICE ./
 COPY iowbc iowbc
 COPY robots robots
 COPY recipes recipes
