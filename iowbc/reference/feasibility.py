@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+Run = tuple[int, int]
+"""First and last place of a row of feasible heights."""
 
 
 @dataclass(frozen=True)
@@ -57,34 +59,58 @@ class FeasibleMap:
 
 
 def build_map(pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope: float) -> FeasibleMap:
-    """The map of a grid of decisions (pitches, heights): the longest run of heights at each pitch, and of pitches.
+    """The map of a grid of decisions (pitches, heights), with one run of heights at each pitch.
 
-    Its bounds change with pitch by at most `slope` [m/rad]. Raises ValueError when no cell is feasible.
+    It grows from the pitch with the longest run to both sides, each time into the run that shares most heights with the
+    one before. Its bounds change with pitch by at most `slope` [m/rad]. Raises ValueError when no cell is feasible.
     """
-    runs = [_longest_run(row) for row in feasible]
-    rows = _longest_run(np.array([run is not None for run in runs]))
-    if rows is None:
+    runs = [_runs(row) for row in feasible]
+    longest = [max((last - first + 1 for first, last in row), default=0) for row in runs]
+    start = int(np.argmax(longest))
+    if not longest[start]:
         raise ValueError(
             f"the feasible set is empty: none of {feasible.size} commands with heights {heights[0]:.2f} to "
             f"{heights[-1]:.2f} m and pitches {pitches[0]:.2f} to {pitches[-1]:.2f} rad has a gentle label; "
             "widen rg.sampling.height and rg.sampling.pitch"
         )
-    chosen = [(pitches[i], heights[run[0]], heights[run[1]]) for i in range(rows[0], rows[1] + 1) if (run := runs[i])]
-    pitch, low, high = np.array(chosen).T
+    first = max(runs[start], key=_length)
+    above = _grow(first, runs[start + 1 :])
+    below = _grow(first, runs[:start][::-1])[::-1]
+    chosen = np.array([*below, first, *above])
+    pitch = pitches[start - len(below) : start + len(above) + 1]
+    low, high = heights[chosen[:, 0]], heights[chosen[:, 1]]
     reach = slope * np.abs(pitch[:, None] - pitch)
     low, high = (low - reach).max(axis=1), (high + reach).min(axis=1)
-    span = _longest_run(low <= high)
-    if span is None:
+    open_rows = _runs(low <= high)
+    if not open_rows:
         raise ValueError(f"the feasible set is empty under rg.feasible.bound_slope {slope} m/rad; raise it")
-    chosen_rows = slice(span[0], span[1] + 1)
-    return FeasibleMap(pitch[chosen_rows], low[chosen_rows], high[chosen_rows])
+    begin, end = max(open_rows, key=_length)
+    return FeasibleMap(pitch[begin : end + 1], low[begin : end + 1], high[begin : end + 1])
 
 
-def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:
-    """First and last place of the longest run of True."""
+def _grow(run: Run, rows: list[list[Run]]) -> list[Run]:
+    """Follows a run through neighbouring rows for as long as there is one that overlaps."""
+    followed: list[Run] = []
+    for row in rows:
+        touching = [other for other in row if _overlap(run, other) > 0]
+        if not touching:
+            break
+        previous = run
+        run = max(touching, key=lambda other: (_overlap(previous, other), _length(other)))
+        followed.append(run)
+    return followed
+
+
+def _runs(row: NDArray[np.bool_]) -> list[Run]:
+    """First and last place of each run of True."""
     edges = np.diff(np.concatenate([[0], row.astype(np.int8), [0]]))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    if not len(starts):
-        return None
-    best = int(np.argmax(ends - starts))
-    return int(starts[best]), int(ends[best]) - 1
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+
+def _length(run: Run) -> int:
+    return run[1] - run[0] + 1
+
+
+def _overlap(a: Run, b: Run) -> int:
+    return min(a[1], b[1]) - max(a[0], b[0]) + 1
