@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
+from iowbc.reference.constrained_step import constrained_step
 from iowbc.reference.costs import posture_weights
 from iowbc.reference.sample import Sample
 from iowbc.reference.support_model import SupportModel
@@ -21,27 +22,23 @@ class KinematicStart:
         self.rest = support.start()
         problem = support.problem
         task = [problem.com_weight] * 2 + [problem.height_weight] + [problem.torso_weight] * 3
+        self.angle_rows = np.eye(len(self.rest) - 7, support.model.nv, 6)
         self.weight = np.sqrt(np.concatenate([task, posture_weights(support.robot, problem)]))
 
     def posture(self, sample: Sample) -> Array:
         """Configuration (22,) of the support model, which must be locked to the sample.
 
-        Gauss-Newton steps on the cost without torques, feet as linearised equalities, joints clipped to ranges.
+        Gauss-Newton steps on the cost without torques, with the feet as linearised equalities and the joint ranges.
+        Raises `Rejected` where the feet cannot stay in place.
         """
         support, problem = self.support, self.support.problem
-        q = self.rest.copy()
+        q, largest = self.rest.copy(), problem.largest_step
         for _ in range(problem.iterations):
             gradient, residual, equality, error = self._linearise(q, sample)
-            orthogonal, triangle = np.linalg.qr(equality.T, mode="complete")
-            count = len(error)
-            particular = orthogonal[:, :count] @ np.linalg.solve(triangle[:count].T, -error)
-            free = orthogonal[:, count:]
-            solution = np.linalg.lstsq(gradient @ free, -(residual + gradient @ particular), rcond=None)[0]
-            step = particular + free @ solution
-            size = float(np.abs(step).max())
-            q = pinocchio.integrate(support.model, q, step * min(1.0, problem.largest_step / max(size, 1e-12)))
-            q[7:] = np.clip(q[7:], support.lower, support.upper)
-            if size < problem.tolerance:
+            lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
+            step = constrained_step(gradient, residual, equality, error, self.angle_rows, lower, upper)
+            q = pinocchio.integrate(support.model, q, step)
+            if np.abs(step).max() < problem.tolerance:
                 break
         return q
 
@@ -51,11 +48,10 @@ class KinematicStart:
         pinocchio.updateFramePlacements(model, data)
         base = pinocchio.getFrameJacobian(model, data, support.base, pinocchio.LOCAL_WORLD_ALIGNED)
         torso = pinocchio.getFrameJacobian(model, data, support.torso, pinocchio.LOCAL)
-        joints = np.concatenate([np.zeros((len(q) - 7, 6)), np.eye(len(q) - 7)], axis=1)
         com, of_com = data.com[0], self.height == "com"
         lift = com[2] if of_com else data.oMf[support.base].translation[2]
         turn = pinocchio.log3(sample.torso_rotation().T @ data.oMf[support.torso].rotation)
-        gradient = np.concatenate([com_rows[:2], (com_rows if of_com else base)[2:3], torso[3:], joints])
+        gradient = np.concatenate([com_rows[:2], (com_rows if of_com else base)[2:3], torso[3:], self.angle_rows])
         residual = np.concatenate([com[:2], [lift - sample.height], turn, (q - self.rest)[7:]])
         equality = np.concatenate([pinocchio.getFrameJacobian(model, data, f, pinocchio.LOCAL) for f in support.soles])
         error = np.concatenate(

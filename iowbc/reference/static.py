@@ -1,19 +1,18 @@
 """The steady state of the optimal control problem (paper eq. 4): the least-torque posture in equilibrium on two soles.
 
 Variables are the base pose, the support joints and the two sole wrenches; Gauss-Newton steps with the feet and the
-base's equilibrium as linearised equalities, eliminated by an orthogonal decomposition, and joint, torque and contact
-limits as inequalities of a small QP.
+base's equilibrium as linearised equalities, and joint, torque and contact limits as inequalities.
 """
 
 from dataclasses import replace
 from typing import Any, Literal
 
-import daqp
 import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
 from iowbc.recipe.reference import Problem
+from iowbc.reference.constrained_step import UNBOUNDED, constrained_step
 from iowbc.reference.costs import posture_weights
 from iowbc.reference.sample import Posture, Rejected, Sample
 from iowbc.reference.support_model import SupportModel
@@ -21,12 +20,8 @@ from iowbc.reference.wrench_cone import sole_limits
 
 Array = NDArray[Any]
 
-REGULARISATION = 1e-9
-"""Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""
 SLOPE_STEP = 0.005
 """Height step by which a label's slope is measured [m]."""
-SOLVED = 1
-"""daqp's exit flag of an optimum."""
 
 
 class StaticMethod:
@@ -52,13 +47,10 @@ class StaticMethod:
             )
         )
         cone, bound = sole_limits(support.robot, problem).rows()
-        self.cone = np.zeros((2 * len(cone), 12))
-        self.cone[: len(cone), :6] = cone
-        self.cone[len(cone) :, 6:] = cone
+        self.cone = np.kron(np.eye(2), cone)
         self.cone_bound = np.tile(bound, 2)
-        rows = 2 * self.joints + len(self.cone)
-        self.sense = np.zeros(rows, dtype=np.int32)
-        self.below = np.full(len(self.cone), -1e30)
+        self.angle_rows = np.eye(self.joints, self.size, 6)
+        self.cone_rows = np.concatenate([np.zeros((len(self.cone), self.velocities)), self.cone], axis=1)
         total = sum(inertia.mass for inertia in support.full.inertias)
         self.weight = 9.81 * total
 
@@ -100,25 +92,19 @@ class StaticMethod:
         """One Gauss-Newton step: tangent (21,) and change of the wrenches (2, 6)."""
         support, nv = self.support, self.velocities
         residual, gradient, torque, torque_rows, equality, error = self._linearise(q, wrench, sample, torso)
-        orthogonal, triangle = np.linalg.qr(equality.T, mode="complete")
-        count = len(error)
-        particular = orthogonal[:, :count] @ np.linalg.solve(triangle[:count].T, -error)
-        free = orthogonal[:, count:]
-        reduced = gradient @ free
-        hessian = reduced.T @ reduced
-        hessian[np.diag_indices_from(hessian)] += REGULARISATION * hessian.max()
-        linear = reduced.T @ (residual + gradient @ particular)
-        rows = np.concatenate([free[6:nv], torque_rows @ free, self.cone @ free[nv:]])
         angle, largest = q[7:], self.problem.largest_step
-        shift = np.concatenate([particular[6:nv], torque + torque_rows @ particular, self.cone @ particular[nv:]])
-        upper = np.concatenate(
-            [np.minimum(support.upper - angle, largest), support.effort, self.cone_bound - self.cone @ wrench.ravel()]
+        rows = np.concatenate([self.angle_rows, torque_rows, self.cone_rows])
+        lower = np.concatenate(
+            [np.maximum(support.lower - angle, -largest), -support.effort - torque, np.full(len(self.cone), -UNBOUNDED)]
         )
-        lower = np.concatenate([np.maximum(support.lower - angle, -largest), -support.effort, self.below])
-        solution, _, flag, _ = daqp.solve(hessian, linear, rows, upper - shift, lower - shift, self.sense)
-        if flag != SOLVED or not np.isfinite(solution).all():
-            raise Rejected("infeasible")
-        step = particular + free @ solution
+        upper = np.concatenate(
+            [
+                np.minimum(support.upper - angle, largest),
+                support.effort - torque,
+                self.cone_bound - self.cone @ wrench.ravel(),
+            ]
+        )
+        step = constrained_step(gradient, residual, equality, error, rows, lower, upper)
         return step[:nv], step[nv:].reshape(2, 6)
 
     def _linearise(
