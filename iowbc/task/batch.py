@@ -135,11 +135,12 @@ class Batch:
         moved = self._motion()
         self._follow(moved)
         place = self._object_place()
+        diverged = simulation.state.diverged.copy()
         ending = Ending(
-            fallen=fallen(moved, memory.command[:, PITCH], termination),
-            dropped=dropped(moved, place, self._held, simulation.state.grasped, termination),
+            fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
+            dropped=dropped(moved, place, self._held, simulation.state.grasped, termination) & ~diverged,
             time_limit=memory.steps >= memory.limit,
-            diverged=simulation.state.diverged.copy(),
+            diverged=diverged,
         )
         scored = self._score(moved, action, place, ending)
         write_signals(self.buffers, simulation.state, moved, memory, ending, self.period)

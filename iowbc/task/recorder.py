@@ -22,7 +22,7 @@ COLUMN = {name: index for index, name in enumerate(COUNTERS)}
 
 @dataclass(frozen=True)
 class Ending:
-    """Why episodes end in a step, each (n,)."""
+    """Why episodes end in a step, each (n,). What diverged neither fell nor dropped anything."""
 
     fallen: Mask
     dropped: Mask
@@ -37,7 +37,7 @@ class Ending:
     @property
     def failed(self) -> Mask:
         """Fell or dropped the object."""
-        return (self.fallen | self.dropped) & ~self.diverged
+        return self.fallen | self.dropped
 
     @property
     def done(self) -> Mask:
@@ -52,8 +52,8 @@ class Ending:
     def reasons(self) -> dict[str, Mask]:
         """Exactly one reason for each that ended."""
         return {
-            "fallen": self.fallen & ~self.diverged,
-            "dropped": self.dropped & ~self.fallen & ~self.diverged,
+            "fallen": self.fallen,
+            "dropped": self.dropped & ~self.fallen,
             "time_limit": self.truncated,
             "diverged": self.diverged,
         }

@@ -1,0 +1,77 @@
+"""The gait clock and the swing it adds."""
+
+import numpy as np
+import pytest
+
+from iowbc.recipe.references import GaitPrior
+from iowbc.task import gait
+
+PRIOR = GaitPrior(frequency=1.0, stance=0.6)
+DT = 0.02
+
+
+def run(commands: list[bool], phase: float = 0.0) -> list[tuple[float, bool]]:
+    """Phase and whether the clock runs, after each step with or without a command to move."""
+    now, stepping = np.array([phase]), np.array([False])
+    course = []
+    for moving in commands:
+        now, stepping = gait.advance(now, stepping, np.array([moving]), PRIOR, DT)
+        course.append((float(now[0]), bool(stepping[0])))
+    return course
+
+
+def test_the_clock_runs_at_its_frequency_while_a_motion_is_commanded() -> None:
+    course = run([True] * 100)
+    assert [phase for phase, _ in course[:3]] == pytest.approx([0.02, 0.04, 0.06])
+    assert course[-1][0] % 1.0 == pytest.approx(0.0, abs=1e-9)
+    assert all(stepping for _, stepping in course)
+
+
+def test_after_the_command_it_runs_on_to_the_next_double_support_and_rests_there() -> None:
+    course = run([True] * 10 + [False] * 40)
+    assert course[15] == (pytest.approx(0.32), True)
+    assert course[-1] == (0.5, False)
+    assert course[30] == (0.5, False)
+
+
+def test_it_rests_until_it_is_told_to_move() -> None:
+    assert run([False] * 5, phase=0.5) == [(0.5, False)] * 5
+
+
+def test_the_feet_swing_in_turn_and_both_stand_in_between() -> None:
+    phases = np.linspace(0.0, 1.0, 200, endpoint=False)
+    stance = gait.expected_stance(phases, np.ones(200, bool), 0.6)
+    assert stance.mean(axis=0) == pytest.approx([0.6, 0.6], abs=0.01)
+    assert stance.any(axis=1).all()
+    assert stance.all(axis=1).mean() == pytest.approx(0.2, abs=0.02)
+    assert gait.expected_stance(phases, np.zeros(200, bool), 0.6).all()
+
+
+def test_the_prior_bends_the_swinging_leg_alone_and_most_at_mid_swing() -> None:
+    middle = 0.6 + 0.4 / 2
+    added = gait.swing_prior(np.array([middle, middle - 0.5]), np.array([True, True]), PRIOR)
+    left, right = list(gait.LEFT_LEG_PITCH), list(gait.RIGHT_LEG_PITCH)
+    bend = [PRIOR.hip_pitch, PRIOR.knee, PRIOR.ankle_pitch]
+    assert added[0, left] == pytest.approx(bend)
+    assert added[1, right] == pytest.approx(bend)
+    assert not np.delete(added[0], left).any()
+    assert not np.delete(added[1], right).any()
+
+
+def test_the_prior_is_nothing_at_rest_and_when_switched_off() -> None:
+    phase = np.array([0.8])
+    assert not gait.swing_prior(phase, np.array([False]), PRIOR).any()
+    off = PRIOR.model_copy(update={"enabled": False})
+    assert not gait.swing_prior(phase, np.array([True]), off).any()
+
+
+def test_the_phase_signal_is_on_the_circle_or_zero_at_rest() -> None:
+    signal = gait.phase_signal(np.array([0.25, 0.25]), np.array([True, False]))
+    assert signal[0] == pytest.approx([1.0, 0.0], abs=1e-12)
+    assert signal[1].tolist() == [0.0, 0.0]
+
+
+def test_small_commands_ask_for_no_steps() -> None:
+    command = np.zeros((3, 11))
+    command[1, 0], command[2, 2] = 0.3, -0.3
+    assert gait.wants_to_move(command, PRIOR).tolist() == [False, True, True]
