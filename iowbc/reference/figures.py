@@ -91,7 +91,7 @@ def _feasible_map(path: Path, plan: SamplePlan, region: Region) -> None:
     extent = (plan.pitches[0], plan.pitches[-1], plan.heights[0], plan.heights[-1])
     level = region.held.T.astype(float) + region.gentle.T
     left.pcolormesh(plan.pitches, plan.heights, level, cmap="Blues", vmin=-0.6, vmax=3.0, shading="nearest")
-    left.set_title("dark: a label; pale blue: one, but too steep")
+    left.set_title("dark: held; middle: held, but too steep; pale: not held")
     share = np.ma.masked_less(region.share.T, 0.0)
     shown = right.pcolormesh(plan.pitches, plan.heights, share, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
     right.set_title("share of all arm postures that have a label")
@@ -140,6 +140,7 @@ def _histogram(axes: Any, values: Array, limit: float | None, label: str, top: f
     axes.hist(values, bins=np.linspace(low, high + 1e-9, BINS), color=SOFT, edgecolor=INK, linewidth=0.3)
     if limit is not None:
         axes.axvline(limit, color=WARM, linestyle="--")
+    axes.locator_params(axis="x", nbins=5)
     axes.set_xlabel(label)
     axes.set_ylabel("samples")
 
