@@ -15,7 +15,7 @@ Array = NDArray[Any]
 
 
 class SupportModel:
-    """Base and support joints in the robot's order; `lock` sets what the arms add to the torso."""
+    """Base and support joints in the robot's order; `lock` sets what arms and payloads add."""
 
     def __init__(self, robot: Robot, problem: Problem) -> None:
         self.robot, self.problem = robot, problem
@@ -35,6 +35,7 @@ class SupportModel:
         self.base = self.model.getFrameId(robot.base)
         self._full_torso = self.full.getJointId(self.model.names[self.torso_joint])
         self._wrists = [self.full.frames[self.full.getFrameId(site)] for site in robot.wrists]
+        self._hands = [self.full.inertias[wrist.parentJoint].copy() for wrist in self._wrists]
         places = mean_stance(problem.stance_width)
         self.stance = [pinocchio.SE3(np.eye(3), place) for place in places]
         margin = problem.limit_margin
@@ -47,7 +48,10 @@ class SupportModel:
         return int(self.model.frames[self.torso].parentJoint)
 
     def lock(self, sample: Sample) -> None:
-        """Gives the torso the inertia of the arms in their posture and of the masses at the wrists."""
+        """Hangs the masses on the wrists, and gives the torso the inertia of the arms in their posture."""
+        for wrist, empty, mass in zip(self._wrists, self._hands, sample.payload, strict=True):
+            load = pinocchio.Inertia(float(mass), wrist.placement.translation, np.zeros((3, 3)))
+            self.full.inertias[wrist.parentJoint] = empty + load if mass > 0.0 else empty
         q = self._neutral.copy()
         q[7 + self.robot.interaction] = sample.arm
         pinocchio.forwardKinematics(self.full, self.full_data, q)
@@ -55,10 +59,6 @@ class SupportModel:
         inertia = self.full.inertias[self._full_torso].copy()
         for joint in self._arms:
             inertia += torso.actInv(self.full_data.oMi[joint]).act(self.full.inertias[joint])
-        for wrist, mass in zip(self._wrists, sample.payload, strict=True):
-            if mass > 0.0:
-                point = pinocchio.Inertia(float(mass), wrist.placement.translation, np.zeros((3, 3)))
-                inertia += torso.actInv(self.full_data.oMi[wrist.parentJoint]).act(point)
         self.model.inertias[self.torso_joint] = inertia
 
     def whole(self, configuration: Array, arm: Array) -> Array:

@@ -46,6 +46,20 @@ def test_a_good_label_passes_with_its_evidence(judge: Judge, sample: Sample, lab
     assert 10.0 < np.abs(evidence.torque).max() < 50.0
 
 
+def test_a_label_with_a_payload_passes_and_feels_its_weight(
+    support: SupportModel, judge: Judge, sample: Sample, command: Callable[..., Sample]
+) -> None:
+    method = StaticMethod(support, "pelvis")
+    heavy = command(0.66, 0.3, payload=(3.0, 2.0))
+    loaded = judge.label(heavy, method.solve(heavy))
+    empty = judge.label(sample, method.solve(sample))
+    assert abs(loaded.torque[14]) > abs(empty.torque[14]) + 5.0
+    carried = method.solve(heavy)
+    support.lock(sample)
+    with pytest.raises(Rejected, match="equilibrium"):
+        judge.label(sample, carried)
+
+
 @pytest.mark.parametrize("joint", ["left_ankle_pitch_joint", "right_hip_roll_joint", "left_knee_joint"])
 def test_a_moved_foot_is_rejected(
     support: SupportModel, judge: Judge, sample: Sample, label: Posture, joint: str
