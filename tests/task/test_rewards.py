@@ -1,0 +1,103 @@
+"""The terms of the reward, by worked examples."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from task_worlds import QUIET, rollout
+
+from iowbc.recipe.reward import Reward
+from iowbc.task.rewards import gait, smooth, sync
+from iowbc.task.rewards import object as equilibrium
+from iowbc.task.rewards.kernel import kernel, squared_norm
+from iowbc.task.rewards.total import TERMS
+from iowbc.task.vector_env import VectorEnv
+
+Make = Callable[..., VectorEnv]
+
+
+def test_a_kernel_is_one_without_error_and_falls_to_37_percent_at_its_width() -> None:
+    assert kernel(np.array([0.0, 0.25**2]), 0.25) == pytest.approx([1.0, np.exp(-1.0)])
+
+
+def test_the_papers_two_terms_of_synchronisation() -> None:
+    position, reference = np.zeros((1, 15)), np.zeros((1, 15))
+    position[0, :2] = 0.3, 0.4
+    assert sync.support_reference(position, reference, 0.5)[0] == pytest.approx(np.exp(-1.0))
+    velocity, command = np.array([[0.3, 0.1]]), np.array([[0.3, -0.1]])
+    assert sync.system_velocity(velocity, command, 0.2)[0] == pytest.approx(np.exp(-1.0))
+
+
+def test_power_counts_braking_like_driving() -> None:
+    torque, velocity = np.array([[2.0, -3.0]]), np.array([[1.0, 2.0]])
+    assert smooth.power(torque, velocity)[0] == 8.0
+
+
+def test_action_rate_and_base_rates() -> None:
+    assert smooth.action_rate(np.array([[1.0, 2.0]]), np.array([[0.0, 0.0]]))[0] == 5.0
+    assert smooth.base_rates(np.array([[1.0, 2.0, 9.0]]))[0] == 5.0
+    assert smooth.vertical_velocity(np.array([[9.0, 9.0, 0.3]]), np.array([0.1]))[0] == pytest.approx(0.04)
+    assert smooth.saturation(np.array([[True, False, False, False]]))[0] == 0.25
+
+
+def test_the_object_costs_nothing_where_none_is_held() -> None:
+    away, place, held = np.array([[0.1, 0.2, 0.2]] * 2), np.zeros((2, 3)), np.array([True, False])
+    assert equilibrium.position(away, place, held) == pytest.approx([0.09, 0.0])
+    angle = 0.3
+    tilted = np.array([[np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0]] * 2)
+    assert equilibrium.orientation(tilted, held) == pytest.approx([np.sin(angle) ** 2, 0.0])
+    rising = np.array([[0.0, 0.0, 0.3]] * 2)
+    assert equilibrium.vertical_velocity(rising, np.array([0.1, 0.1]), held) == pytest.approx([0.04, 0.0])
+
+
+def test_an_object_that_only_turns_about_the_vertical_is_level() -> None:
+    turned = np.array([[np.cos(0.4), 0.0, 0.0, np.sin(0.4)]])
+    assert equilibrium.orientation(turned, np.array([True]))[0] == pytest.approx(0.0)
+
+
+def test_contact_timing_counts_from_minus_one_to_one() -> None:
+    contact = np.array([[True, True], [True, True], [False, False]])
+    expected = np.array([[True, True], [True, False], [True, True]])
+    assert gait.contact_timing(contact, expected).tolist() == [1.0, 0.0, -1.0]
+
+
+def test_a_foot_on_its_swing_profile_scores_one_and_a_standing_foot_nothing() -> None:
+    height, progress = np.array([[0.08, 0.0]]), np.array([[0.5, 0.0]])
+    assert gait.swing_height(height, progress, np.array([[True, False]]), 0.08, 0.04)[0] == pytest.approx(1.0)
+    assert gait.swing_height(height, progress, np.array([[False, False]]), 0.08, 0.04)[0] == 0.0
+
+
+def test_slipping_counts_on_the_ground_alone_and_feet_too_close_cost() -> None:
+    velocity = np.array([[[0.3, 0.4, 9.0], [1.0, 0.0, 0.0]]])
+    assert gait.foot_slip(velocity, np.array([[True, False]]))[0] == pytest.approx(0.25)
+    feet = np.array([[[0.0, 0.05, 0.0], [0.0, -0.05, 0.0]], [[0.0, 0.2, 0.0], [0.0, -0.2, 0.0]]])
+    assert gait.foot_distance(feet, 0.16) == pytest.approx([0.0036, 0.0])
+
+
+def test_every_weight_of_the_recipe_moves_its_own_term_and_no_other(make: Make) -> None:
+    base = make(num_envs=2, changes=QUIET)
+    base.reset()
+    rollout(base, 10)
+    before = base.statistics()
+    doubled = make(num_envs=2, changes=QUIET | {"task.reward.sync.height.weight": 2 * Reward().sync.height.weight})
+    doubled.reset()
+    rollout(doubled, 10)
+    after = doubled.statistics()
+    for term in TERMS:
+        name = f"reward/{term.replace('/', '.')}"
+        factor = 2.0 if term == "sync/height" else 1.0
+        assert after[name] == pytest.approx(factor * before[name]), name
+
+
+def test_a_fall_costs_its_price_once_and_is_not_scaled_by_the_period(make: Make) -> None:
+    env = make(num_envs=4)
+    env.reset()
+    seen = rollout(env, 100, size=2.0)
+    falls = seen["fallen"].sum() + (seen["dropped"] * (1 - seen["fallen"])).sum()
+    figures = env.statistics()
+    assert falls > 0
+    assert figures["reward/termination"] * 400 * 0.02 == pytest.approx(falls * Reward().termination)
+
+
+def test_squared_norm_goes_over_all_but_the_first_axis() -> None:
+    assert squared_norm(np.ones((2, 3, 4))).tolist() == [12.0, 12.0]
