@@ -25,6 +25,8 @@ app = typer.Typer(
 bench = typer.Typer(help="Measure the speed of this machine.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(bench, name="bench")
 
+PIPE_WIDTH = 160
+"""Characters in a line of a table where the output is not a terminal."""
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe, a YAML file.", metavar="RECIPE")]
 Overrides = Annotated[
     list[str] | None,
@@ -246,7 +248,7 @@ def doctor(runs: RunsFolder = None) -> None:
 def _console() -> "Console":
     from rich.console import Console
 
-    return Console()
+    return Console(width=None if sys.stdout.isatty() else int(os.environ.get("COLUMNS", PIPE_WIDTH)))
 
 
 def _store(folder: Path | None) -> "Store":

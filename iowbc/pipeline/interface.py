@@ -1,6 +1,7 @@
 """`iowbc ui`: MLflow's web interface on the runs of this folder, for this machine alone."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -15,6 +16,7 @@ HOST = "127.0.0.1"
 
 def serve(runs: Runs, console: Console, port: int) -> int:
     """Serve until interrupted; returns the server's exit code."""
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     runs.root.mkdir(parents=True, exist_ok=True)
     uri = f"sqlite:///{runs.database.absolute()}"
     with set_up(runs):
@@ -26,4 +28,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     command += ["--backend-store-uri", uri, "--default-artifact-root", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
     with subprocess.Popen(command, env=environment) as server:
-        return server.wait()
+        try:
+            return server.wait()
+        finally:
+            server.terminate()

@@ -135,7 +135,8 @@ class Runner:
             artifact = self._published(step, workspace, workers)
         except (Interrupted, KeyboardInterrupt) as error:
             self._ended(workspace, view, "stopped", "KILLED", str(error))
-            raise Interrupted(str(error)) from error
+            text = str(error).removeprefix(f"{stage.name}: ")
+            raise Interrupted(f"{stage.name}: {text or 'aborted'}") from error
         except StageFailed as error:
             self._ended(workspace, view, "failed", "FAILED", str(error))
             raise PipelineFailed(f"{stage.name} failed: {error}") from error
