@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from iowbc.pipeline.layout import Runs
     from iowbc.pipeline.store import Store
+    from iowbc.recipe.recipe import Recipe
 
 app = typer.Typer(
     help="Train, test and export a whole-body controller of a humanoid robot that carries and pushes heavy objects.",
@@ -39,6 +40,11 @@ RunsFolder = Annotated[
 Until = Annotated[str | None, typer.Option(help="Stop after this stage.", metavar="STAGE")]
 Force = Annotated[list[str] | None, typer.Option(help="Make this stage anew; repeat for more.", metavar="STAGE")]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
+SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
+BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe, a YAML file; the defaults.", metavar="RECIPE")]
+BenchWorkers = Annotated[
+    list[int] | None, typer.Option("--workers", help="Worker processes; repeat to measure several.", min=1)
+]
 OnCodeChange = Annotated[
     Literal["report", "rerun"], typer.Option(help="What to do about a cached stage whose code has changed since.")
 ]
@@ -167,7 +173,7 @@ def gc(
 def play(
     what: Annotated[str, typer.Argument(help="Recipe, RECIPE/STAGE, key, or the folder of an export.", metavar="WHAT")],
     stage: Annotated[str | None, typer.Option(help="export, distill or teacher; the last one there is.")] = None,
-    scene: Annotated[str, typer.Option(help="Scene of the recipe.")] = "lift",
+    scene: SceneName = "lift",
     mass: Annotated[float, typer.Option(help="Mass of the object [kg]; 0 for none.", min=0.0)] = 4.0,
     partner_share: Annotated[
         float, typer.Option(help="Part of the weight that a partner bears.", min=0.0, max=1.0)
@@ -178,6 +184,7 @@ def play(
     runs: RunsFolder = None,
 ) -> None:
     """Watch a trained policy in the viewer, or make a film of it."""
+    _check_scene(scene)
     from iowbc.pipeline.playable import play_word
 
     raise typer.Exit(
@@ -198,19 +205,42 @@ def play(
 
 @bench.command("sim")
 def bench_simulation(
-    recipe: Annotated[Path | None, typer.Argument(help="Recipe of the world; the defaults.", metavar="RECIPE")] = None,
-    scene: Annotated[str, typer.Option(help="Scene of the recipe.")] = "lift",
+    recipe: BenchRecipe = None,
+    scene: SceneName = "lift",
     environments: Annotated[int, typer.Option(help="Environments a worker.", min=1)] = 48,
-    workers: Annotated[list[int] | None, typer.Option(help="Worker processes; repeat to measure several.")] = None,
+    workers: BenchWorkers = None,
     others: Annotated[bool, typer.Option(help="Also measure the usual vector environments.")] = True,
 ) -> None:
     """Measure how fast the vector environment steps, against a bare loop of MuJoCo."""
-    from iowbc.recipe.loading import load_recipe
-
-    loaded = load_recipe(recipe).recipe if recipe is not None else None
+    given = _given(recipe)
+    _check_scene(scene)
     from iowbc.benchmarks import simulation
 
-    simulation.main(loaded, scene=scene, environments=environments, workers=tuple(workers or ()), others=others)
+    simulation.main(given, scene=scene, environments=environments, workers=tuple(workers or ()), others=others)
+
+
+@bench.command("rg")
+def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None) -> None:
+    """Measure how fast the reference generator's samples are labelled, by each method."""
+    given = _given(recipe)
+    from iowbc.benchmarks import reference
+
+    reference.main(given, workers=tuple(workers or ()))
+
+
+def _given(recipe: Path | None) -> "Recipe | None":
+    from iowbc.recipe.loading import load_recipe
+
+    return load_recipe(recipe).recipe if recipe is not None else None
+
+
+def _check_scene(name: str) -> None:
+    from iowbc.recipe.problems import UsageError, nearest
+    from iowbc.recipe.task import SceneShares
+
+    known = list(SceneShares.model_fields)
+    if name not in known:
+        raise UsageError(f"--scene {name}: no such scene; valid: {', '.join(known)}{nearest(name, known)}")
 
 
 @app.command()

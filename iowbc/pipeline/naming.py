@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.pipeline.history import recall
+from iowbc.pipeline.layout import Runs
 from iowbc.pipeline.store import Artifact, Damaged, Store
 from iowbc.recipe.problems import UsageError, nearest
 
@@ -40,6 +41,16 @@ def named(store: Store, word: str) -> Named:
         return Named(word, {stage: found.artifacts[stage]})
     artifact = _by_key(store, word)
     return Named(word, {artifact.manifest.stage: artifact})
+
+
+def open_artifact(word: str, runs: Path | str = "runs") -> Artifact:
+    """From Python: the artifact that `RECIPE/STAGE` or the first characters of a key name. Raises `UsageError`."""
+    found = named(Store(Runs(Path(runs))), word)
+    if found.recipe is not None:
+        stages = ", ".join(f"{word}/{stage}" for stage in found.artifacts)
+        raise UsageError(f"'{word}' is a recipe; name one of its artifacts: {stages or 'none is stored'}")
+    (artifact,) = found.artifacts.values()
+    return artifact
 
 
 def known_recipes(store: Store) -> list[str]:

@@ -7,12 +7,15 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from iowbc.pipeline.fingerprint import content_digest, file_digest
 from iowbc.pipeline.layout import Runs, read_json, write_atomically
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MANIFEST = "manifest.json"
 INGREDIENTS = "key.json"
@@ -84,6 +87,19 @@ class Artifact:
         if not isinstance(metrics, dict):
             return {}
         return {str(name): float(value) for name, value in metrics.items() if isinstance(value, (int, float))}
+
+    def table(self, name: str) -> "pd.DataFrame":
+        """A table of the artifact as a pandas frame: `trials` for `trials.parquet`, `summary` for `tables/summary.csv`.
+
+        Raises `KeyError` with the names that there are.
+        """
+        import pandas as pd
+
+        paths = [*self.folder.glob("*.parquet"), *(self.folder / "tables").glob("*.csv")]
+        found = {path.stem: path for path in sorted(paths)}
+        if name not in found:
+            raise KeyError(f"{self.folder} has no table '{name}'; it has: {', '.join(found) or 'none'}")
+        return pd.read_parquet(found[name]) if found[name].suffix == ".parquet" else pd.read_csv(found[name])
 
 
 class Store:

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from iowbc.pipeline.naming import open_artifact
+from iowbc.recipe.problems import UsageError
+
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 Key = Callable[[str, str], str]
 
@@ -48,7 +51,9 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["gc"], "--unused"),
         (["gc", "--recipe", "frist"], "did you mean 'first'?"),
         (["play", "first/eval"], "stages that leave one: export, distill, teacher"),
+        (["play", "first", "--scene", "lifft"], "did you mean 'lift'?"),
         (["bench", "fly"], "fly"),
+        (["bench", "sim", "--scene", "lifft"], "valid: free, lift"),
     ],
 )
 def test_wrong_usage_ends_with_2_and_a_reason(folder: Path, command: Command, arguments: list[str], text: str) -> None:
@@ -162,3 +167,14 @@ def test_the_output_may_be_cut_short(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert len(list((folder / "runs" / "store" / "export").iterdir())) == 2 + 1
+
+
+def test_an_artifact_and_its_tables_are_opened_from_python(folder: Path) -> None:
+    artifact = open_artifact("second/teacher", folder / "runs")
+    assert artifact.manifest.stage == "teacher"
+    (artifact.folder / "tables" / "rows.csv").write_text("a,b\n1,2\n")
+    assert artifact.table("rows").to_dict("list") == {"a": [1], "b": [2]}
+    with pytest.raises(KeyError, match="no table 'nothing'; it has: rows"):
+        artifact.table("nothing")
+    with pytest.raises(UsageError, match="first/teacher"):
+        open_artifact("first", folder / "runs")
