@@ -83,7 +83,7 @@ class Batch:
         self._key = random.environment_key(seeds, streams)
         self._episode_key = self._key.copy()
         scripts = [episode.script for episode in episodes] if episodes is not None else [None] * n
-        self._commander = Commander(task.commands, self.references, scripts, self.period)
+        self._commander = Commander(task, self.references, scripts, self.period)
         self.memory = Memory.blank(n, len(self.robot.interaction), len(self.robot.support))
         self.memory.level[:] = initial_level(task.curriculum, n) if episodes is None else task.curriculum.fixed_level
         self._trials, self._divergences = episodes, divergences
@@ -190,7 +190,7 @@ class Batch:
         """Command, gait clock and references of the step to come."""
         memory, settings = self.memory, self.recipe.task.references.gait
         height = memory.command[:, HEIGHT].copy()
-        self._commander.advance(memory, self._episode_key, difficulty(self.recipe.task.curriculum, memory.level))
+        self._commander.advance(memory, self._episode_key)
         self._height_rate = (memory.command[:, HEIGHT] - height) / self.period
         moving = gait.wants_to_move(memory.command, settings)
         phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, self.period)
@@ -246,7 +246,7 @@ class Batch:
         scales = difficulty(self.recipe.task.curriculum, memory.level[which])
         memory.steps[which] = 0
         memory.limit[which] = self._time_limits(which, key)
-        self._commander.start(which, memory, key, scales)
+        self._commander.start(which, memory, key)
         command, grasp = memory.command[which], self._grasp[which]
         arms, posture = self.references.start(command, grasp)
         memory.arms[which], memory.posture[which], memory.support[which] = arms, posture, posture

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.commands import Commands
+from iowbc.recipe.task import Task
 from iowbc.sim import random
 from iowbc.task.command import COMMAND, VELOCITY, approach, rate_limits
-from iowbc.task.curriculum import Difficulty
+from iowbc.task.curriculum import difficulty
 from iowbc.task.memory import Memory
 from iowbc.task.references import ReferenceLayer
 from iowbc.task.sampling import draw_goals, draw_holding_time, interpolate
@@ -23,18 +23,19 @@ class Commander:
     """Sets goal and command of n environments, in their memory."""
 
     def __init__(
-        self, commands: Commands, references: ReferenceLayer, scripts: Sequence[CommandScript | None], period: float
+        self, task: Task, references: ReferenceLayer, scripts: Sequence[CommandScript | None], period: float
     ) -> None:
-        self._commands, self._references, self._period = commands, references, period
+        commands = task.commands
+        self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
         self._largest_step = rate_limits(commands.rates) * period
         self.scripted = np.array([script is not None for script in scripts])
         self._times, self._values = _knots(scripts)
 
-    def start(self, which: Indices, memory: Memory, key: random.Keys, difficulty: Difficulty) -> None:
-        """First goals of new episodes; `key`, `difficulty` (k,). A drawn episode starts in its posture, standing."""
+    def start(self, which: Indices, memory: Memory, key: random.Keys) -> None:
+        """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can."""
         memory.draws[which] = 0
-        self._draw(which, memory, key, difficulty)
-        command = memory.goal[which]
+        self._draw(which, memory, key)
+        command = self._references.startable(memory.goal[which])
         command[:, VELOCITY] = 0.0
         scripted = self.scripted[which]
         if scripted.any():
@@ -42,19 +43,19 @@ class Commander:
             command[scripted] = memory.goal[which[scripted]]
         memory.command[which] = self._references.clamp(command)
 
-    def advance(self, memory: Memory, key: random.Keys, difficulty: Difficulty) -> None:
+    def advance(self, memory: Memory, key: random.Keys) -> None:
         """Goals and commands of the next control step; `key` of the episodes, (n,)."""
         due = np.flatnonzero((memory.steps >= memory.goal_until) & ~self.scripted)
         if len(due):
-            chosen = Difficulty(**{name: values[due] for name, values in vars(difficulty).items()})
-            self._draw(due, memory, key[due], chosen)
+            self._draw(due, memory, key[due])
         if self.scripted.any():
             memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
         memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
 
-    def _draw(self, which: Indices, memory: Memory, key: random.Keys, difficulty: Difficulty) -> None:
+    def _draw(self, which: Indices, memory: Memory, key: random.Keys) -> None:
         drawn = random.absorb(key, memory.draws[which])
-        memory.goal[which] = draw_goals(self._commands, drawn, difficulty)
+        hardness = difficulty(self._curriculum, memory.level[which])
+        memory.goal[which] = draw_goals(self._commands, drawn, hardness)
         held = draw_holding_time(self._commands, drawn)
         memory.goal_until[which] = memory.steps[which] + np.ceil(held / self._period).astype(np.int64)
         memory.draws[which] += 1

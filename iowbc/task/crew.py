@@ -1,5 +1,6 @@
 """The parent's end of the worker processes: starts them, asks them, notices when one dies or hangs, and ends them."""
 
+import json
 import os
 import signal
 import socket
@@ -11,10 +12,8 @@ import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from typing import Any, Protocol
 
-import iowbc
 from iowbc.task import worker
 from iowbc.task.batch import Batch
 from iowbc.task.setup import Setup, shares
@@ -185,13 +184,11 @@ def _start(memory: int) -> Member:
     bound = threading.current_thread() is threading.main_thread()
     descriptors = (theirs.fileno(), memory, log)
     environment = os.environ | dict.fromkeys(QUIET_THREADS, "1")
-    root = str(Path(iowbc.__file__).resolve().parents[1])
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
-    arguments = [os.getpid(), int(bound), *descriptors]
+    arguments = [json.dumps(sys.path), os.getpid(), int(bound), *descriptors]
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         process = subprocess.Popen(
-            [sys.executable, *worker.ASKED, *map(str, arguments)],
+            [sys.executable, "-c", worker.ASKED, *map(str, arguments)],
             stdin=subprocess.DEVNULL,
             pass_fds=descriptors,
             env=environment,

@@ -56,6 +56,14 @@ class ReferenceLayer:
         clamped[:, HEIGHT], clamped[:, PITCH] = self.feasible.clamp(command[:, HEIGHT], command[:, PITCH])
         return clamped
 
+    def startable(self, command: Array) -> Array:
+        """The command with the posture in which an episode can start, (n, 11): without a generator the default one."""
+        if self.network is not None:
+            return command
+        changed = command.copy()
+        changed[:, HEIGHT], changed[:, PITCH] = self.default_height, 0.0
+        return changed
+
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
         """References at the start of an episode, settled in the commanded posture.
 

@@ -11,9 +11,9 @@ from typing import IO
 
 PARENT_DEATH_SIGNAL = 1
 """prctl's option PR_SET_PDEATHSIG: the kernel sends the signal when the parent dies."""
-ASKED = ("-P", "-c", "from iowbc.task.worker import main; main()")
-"""Arguments with which Python becomes a worker. Then come the parent's process number, whether to die with the thread
-that started the worker, and the descriptors of pipe, shared memory and log."""
+ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.worker import main; main()"
+"""With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
+whether to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
 
 
 def main() -> None:

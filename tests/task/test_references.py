@@ -95,6 +95,15 @@ def test_without_a_generator_the_support_reference_is_the_default_posture(layer:
     assert layer.clamp(command(height=0.1))[0, HEIGHT] == 0.1
 
 
+def test_an_episode_starts_in_the_commanded_posture_only_with_a_generator(
+    layer: ReferenceLayer, robot: Robot, generator: Path
+) -> None:
+    asked = command(height=0.65, pitch=0.4)
+    assert np.array_equal(ReferenceLayer(robot, References(), generator).startable(asked), asked)
+    start = layer.startable(asked)[0]
+    assert (start[HEIGHT], start[PITCH]) == (robot.default_height, 0.0)
+
+
 def test_with_a_generator_commands_are_clamped_to_the_feasible_map(robot: Robot, generator: Path) -> None:
     layer = ReferenceLayer(robot, References(), generator)
     clamped = layer.clamp(command(height=0.9, pitch=1.0))

@@ -1,0 +1,49 @@
+"""The benchmark measures what it says: the bare loop steps the very states of the vector environment."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from task_worlds import with_changes
+
+from iowbc.benchmarks import simulation
+from iowbc.benchmarks.bare_loop import STATE, record
+from iowbc.benchmarks.breakdown import PARTS, step_breakdown
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.setup import Setup
+
+
+@pytest.fixture
+def setup(recipe: Recipe, folder: Path) -> Setup:
+    return Setup(with_changes(recipe, {"task.scenes.free": 0.0}), folder, None, 3, 0)
+
+
+def test_the_bare_loop_takes_the_course_of_the_environments(setup: Setup) -> None:
+    course = record(setup, 0, 3, periods=6)
+    size = course.models[0].nq + course.models[0].nv
+    for index, model in enumerate(course.models):
+        data = mujoco.MjData(model)
+        for now, after in zip(course.states[:-1], course.states[1:], strict=True):
+            mujoco.mj_setState(model, data, now[index], STATE)
+            mujoco.mj_step(model, data, course.substeps)
+            reached = np.empty(len(now[index]))
+            mujoco.mj_getState(model, data, reached, STATE)
+            assert reached[1 : 1 + size] == pytest.approx(after[index, 1 : 1 + size], abs=1e-9)
+
+
+def test_the_parts_of_a_step_add_up(setup: Setup) -> None:
+    parts = step_breakdown(setup, periods=5, rounds=1)
+    assert parts.keys() == {*PARTS, "reset"}
+    assert all(value > 0.0 for value in parts.values())
+    assert parts["physics"] > parts["observation"]
+
+
+@pytest.mark.slow
+def test_the_benchmark_prints_its_table_and_returns_its_figures() -> None:
+    lines: list[str] = []
+    figures = simulation.main(environments=2, workers=(1,), turns=1, say=lines.append)
+    assert {"bare_1", "vector_env_1", "ratio_1", "sb3_1", "gymnasium_1", "step_physics_ms"} <= figures.keys()
+    assert all(np.isfinite(value) for value in figures.values())
+    assert figures["vector_env_1"] > figures["sb3_1"]
+    assert any("SubprocVecEnv" in line for line in lines)
