@@ -28,7 +28,7 @@ def wander(step: int, rows: int, columns: int) -> Array:
 
 @dataclass
 class Course:
-    """What a vector environment asked of MuJoCo in some control periods: models, and states with controls and forces."""
+    """What environments asked of MuJoCo in some control periods: models, and states with controls and forces."""
 
     models: list[Any]
     states: Array

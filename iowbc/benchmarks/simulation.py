@@ -1,4 +1,4 @@
-"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against the usual vector environments."""
+"""`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against usual vector environments."""
 
 import os
 import time
@@ -126,9 +126,7 @@ def _others(
         finally:
             env.close()
         figures[f"{name}_{count}"] = rate
-        say(
-            f"{f'{label}, {count} process(es)':34}{rate:10.0f}{'':10}  vector environment {own / rate:.1f} times as fast"
-        )
+        say(f"{f'{label}, {count} process(es)':34}{rate:10.0f}{'':12}vector environment {own / rate:.1f} times as fast")
     return figures
 
 

@@ -19,7 +19,7 @@ from iowbc.task.batch import Batch
 from iowbc.task.setup import Setup, shares
 from iowbc.task.shared import Buffers, create_shared, private_buffers
 
-STARTING = 120.0
+STARTING = 60.0
 """How long workers may take to build their environments [s]."""
 LEAVING = 2.0
 """How long workers may take to leave by themselves [s]."""
