@@ -232,7 +232,7 @@ class Batch:
             memory.level,
             survived=ending.truncated,
             progress=memory.steps / memory.limit,
-            tracking=memory.tracking / np.maximum(memory.steps, 1),
+            tracking=memory.tracking.min(axis=1) / np.maximum(memory.steps, 1),
         )
         chosen = which[~ending.diverged[which]]
         memory.level[chosen] = moved[chosen]

@@ -42,7 +42,8 @@ def initial_level(curriculum: Curriculum, n: int) -> Array:
 def next_level(curriculum: Curriculum, level: Array, survived: Mask, progress: Array, tracking: Array) -> Array:
     """Levels after an episode, (n,).
 
-    survived: reached its time limit; progress: part of the time limit reached; tracking: mean tracking score.
+    survived: reached its time limit; progress: part of the time limit reached; tracking: the worst of the
+    tracked quantities' mean scores.
     """
     if not curriculum.enabled:
         return level

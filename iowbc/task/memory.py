@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.task.command import COMMAND
+from iowbc.task.rewards.total import TRACKING
 
 Array = NDArray[Any]
 
@@ -52,7 +53,7 @@ class Memory:
     object_place: Array
     """A held object from the middle of the wrist targets at the start of the episode, heading frame, (n, 3) [m]."""
     tracking: Array
-    """Sum of the tracking score over the episode, (n,)."""
+    """Sums of the tracking scores over the episode, (n, 4)."""
     total: Array
     """Sum of the rewards of the episode, (n,)."""
 
@@ -60,10 +61,11 @@ class Memory:
     def blank(cls, n: int, arms: int, support: int) -> Self:
         """All zero."""
         counters = {name: np.zeros(n, np.int64) for name in ("episode", "draws", "steps", "limit", "goal_until")}
-        scalars = ("level", "phase", "filtered_yaw_rate", "heading_reference", "tracking", "total")
+        scalars = ("level", "phase", "filtered_yaw_rate", "heading_reference", "total")
         return cls(
             **counters,
             **{name: np.zeros(n) for name in scalars},
+            tracking=np.zeros((n, len(TRACKING))),
             stepping=np.zeros(n, np.bool_),
             command=np.zeros((n, len(COMMAND))),
             goal=np.zeros((n, len(COMMAND))),

@@ -96,7 +96,7 @@ def count_step(buffers: Buffers, scored: Scored) -> None:
     counters = buffers["counters"]
     counters[:, : len(TERMS)] += scored.terms
     counters[:, COLUMN["steps"]] += 1.0
-    counters[:, COLUMN["tracking"]] += scored.tracking
+    counters[:, COLUMN["tracking"]] += scored.tracking.mean(axis=1)
 
 
 def count_endings(buffers: Buffers, ending: Ending, which: NDArray[np.intp]) -> None:

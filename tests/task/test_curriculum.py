@@ -44,8 +44,23 @@ def test_phases_go_from_standing_with_light_loads_to_more_than_the_recipes_range
     assert (np.diff(scales.disturbance) > 0).all()
 
 
+def test_standing_where_walking_is_asked_for_does_not_raise_the_level(make: Make) -> None:
+    changes = {"task.episode_duration": (0.4, 0.4), "task.commands.standing_share": 0.0, "task.scenes.lift": 0.0}
+    env = make(changes=changes | {"task.commands.velocity_x": (0.5, 0.5), "task.commands.rates.velocity": 10.0})
+    env.set_attr("level", 2.0)
+    env.reset()
+    tracked = []
+    for _ in range(20):
+        _, _, done, infos = env.step(np.zeros((4, 15), np.float32))
+        tracked.append(env.signals["commanded_velocity"][:, 0].copy())
+    assert done.all()
+    assert all(info["TimeLimit.truncated"] for info in infos)
+    assert np.mean(tracked) > 0.15
+    assert env.get_attr("level") == [2.0] * 4
+
+
 def test_each_environment_climbs_by_itself(make: Make) -> None:
-    changes = {"task.episode_duration": (0.2, 0.2), "task.curriculum.tracking": 0.0}
+    changes = {"task.episode_duration": (0.2, 0.2), "task.curriculum.tracking": 0.0, "task.curriculum.rise": 0.1}
     env = make(num_envs=4, changes=changes)
     env.reset()
     for _ in range(10):

@@ -41,7 +41,7 @@ TERMS = (
 )
 """Names of the terms, in the order of the columns of `Scored.terms`."""
 TRACKING = ("system_velocity", "yaw_rate", "height", "torso_pitch")
-"""The scores whose mean says how well an environment tracks."""
+"""The scores that say how well an environment tracks."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Scored:
     terms: Array
     """Each term's part of the reward, (n, len(TERMS))."""
     tracking: Array
-    """Mean of the tracking scores, between 0 and 1, (n,)."""
+    """The scores of `TRACKING`, between 0 and 1, (n, 4)."""
 
     def without(self, which: Mask) -> "Scored":
         """The same with nothing for some environments, (n,): what they did cannot be judged."""
@@ -91,7 +91,8 @@ class Scored:
             return self
         kept = ~which
         terms = np.where(kept[:, None], self.terms, 0.0)
-        return Scored(reward=np.where(kept, self.reward, 0.0), terms=terms, tracking=np.where(kept, self.tracking, 0.0))
+        tracking = np.where(kept[:, None], self.tracking, 0.0)
+        return Scored(reward=np.where(kept, self.reward, 0.0), terms=terms, tracking=tracking)
 
 
 def score(
@@ -137,5 +138,5 @@ def score(
     for column, part in enumerate(parts):
         np.multiply(part, dt, out=terms[:, column])
     terms[:, -1] = reward.termination * step.ended
-    tracking = sum(scores[name] for name in TRACKING) / len(TRACKING)
-    return Scored(reward=terms.sum(axis=1), terms=terms, tracking=np.asarray(tracking))
+    tracking = np.stack([scores[name] for name in TRACKING], axis=1)
+    return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
