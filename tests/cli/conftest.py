@@ -16,7 +16,7 @@ Command = Callable[..., "subprocess.CompletedProcess[str]"]
 def run(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
     """The command line on the small stages."""
     words = [sys.executable, str(SMALL_STAGES), *arguments]
-    return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.fixture(scope="session")

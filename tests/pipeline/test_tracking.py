@@ -21,7 +21,7 @@ TRACKED = RECIPE.replace("track: false", "tracking_patience: 30")
 def deliver(runs: Runs) -> int:
     """Send what is left, as the next run would."""
     command = [sys.executable, "-m", "iowbc.pipeline.sender", str(runs.root)]
-    return subprocess.run(command, check=False, timeout=60, stdin=subprocess.DEVNULL).returncode
+    return subprocess.run(command, check=False, timeout=120, stdin=subprocess.DEVNULL).returncode
 
 
 def tracked(runs: Runs, query: str, *values: Any) -> list[tuple[Any, ...]]:

@@ -124,7 +124,7 @@ class Command:
     errors_path: Path
 
     def finish(self) -> int:
-        return self.process.wait(timeout=60)
+        return self.process.wait(timeout=120)
 
     def signal(self, number: signal.Signals) -> None:
         self.process.send_signal(number)
@@ -143,7 +143,7 @@ class Command:
         return self.errors_path.read_text()
 
 
-def until(condition: Callable[[], Any], patience: float = 20.0) -> None:
+def until(condition: Callable[[], Any], patience: float = 60.0) -> None:
     """Wait for something that another process does."""
     limit = time.monotonic() + patience
     while not condition():
