@@ -117,8 +117,8 @@ def write_contract(contract: Contract, folder: Path) -> None:
 
 
 def read_contract(folder: Path) -> Contract:
-    """The contract of an exported folder, once its graph is there and has the digest. Raises ContractBroken."""
-    missing = [name for name in (CONTRACT, GRAPH) if not (folder / name).is_file()]
+    """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
+    missing = [name for name in (CONTRACT, GRAPH, f"{ROBOT}/robot.yaml") if not (folder / name).is_file()]
     if missing:
         raise ContractBroken(
             f"{folder}: no exported policy, {' and '.join(missing)} missing; give the folder that `export` made"

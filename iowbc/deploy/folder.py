@@ -10,6 +10,7 @@ from iowbc.deploy.graph import ControllerGraph, Port
 from iowbc.deploy.onnx_graph import write_onnx
 from iowbc.recipe.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.reference import ReferenceGenerator
 from iowbc.task.command import COMMAND
 
 PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "torch")
@@ -71,6 +72,7 @@ def world_of(recipe: Recipe) -> Recipe:
         name=recipe.name,
         seed=recipe.seed,
         robot=recipe.robot,
+        rg=ReferenceGenerator(height=recipe.rg.height),
         simulation=recipe.simulation,
         task=recipe.task,
         eval=Evaluation() if asked is None else Evaluation(sequence=asked.sequence),

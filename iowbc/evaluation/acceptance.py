@@ -6,8 +6,9 @@ from pathlib import Path
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.rollout import Played, play_in
-from iowbc.evaluation.trials import FREE_SCENE, UNDISTURBED, Trial, command_script, trials_at
+from iowbc.evaluation.trials import UNDISTURBED, Trial, command_script, trials_at
 from iowbc.recipe.evaluation import Segment
+from iowbc.recipe.holding import FREE
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.vector_env import VectorEnv
 
@@ -18,7 +19,7 @@ def acceptance_trials(recipe: Recipe) -> list[Trial]:
     if settings.acceptance is None:
         duration = settings.golden_steps / recipe.task.control_frequency
         script = command_script([Segment(duration=duration, ramp=0.0)], commands)
-        return trials_at("golden", FREE_SCENE, 0.0, script, count=1, seed=recipe.seed, fixed=UNDISTURBED)
+        return trials_at("golden", FREE, 0.0, script, count=1, seed=recipe.seed, fixed=UNDISTURBED)
     asked = settings.acceptance
     script = command_script(asked.sequence, commands)
     fixed = UNDISTURBED | {"partner_share": asked.partner_share}

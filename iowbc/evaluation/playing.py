@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pydantic import ValidationError
 
 from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
@@ -19,7 +20,7 @@ from iowbc.evaluation.rollout import Acting, Played, Stopped, play_in
 from iowbc.evaluation.trials import UNDISTURBED, command_script, trials_at
 from iowbc.learning.acting import load_policy
 from iowbc.recipe.evaluation import Segment, Video
-from iowbc.recipe.holding import SCENES
+from iowbc.recipe.holding import FREE, SCENES
 from iowbc.recipe.problems import UsageError
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.episode import Episode
@@ -46,7 +47,13 @@ class Source:
 def exported_source(folder: Path) -> Source:
     """The source in an exported folder, which holds all it needs. Raises ContractBroken."""
     contract.read_contract(folder)
-    recipe = Recipe.model_validate_json((folder / contract.RECIPE).read_text())
+    path = folder / contract.RECIPE
+    try:
+        recipe = Recipe.model_validate_json(path.read_bytes())
+    except (FileNotFoundError, ValidationError) as error:
+        raise contract.ContractBroken(
+            f"{path}: missing or not a recipe of this version: {error}; export again"
+        ) from error
     generator = folder / contract.GENERATOR
     return Source(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None, folder)
 
@@ -66,9 +73,9 @@ def play(
 ) -> dict[str, Any]:
     """Play one episode; in the viewer, or with `video` into that mp4 file (no display needed).
 
-    mass: of the object [kg]; 0 plays without one. partner_share: None draws it. sequence: the commands, by default
-    those of the recipe's `eval.sequence`, for an exported folder those of its acceptance. video_settings: by default
-    `eval.video`, without its limit of length.
+    mass: of the object [kg]; 0 plays without one, as the scene `free` does. partner_share: None draws it.
+    sequence: the commands, by default those of the recipe's `eval.sequence`, for an exported folder those of its
+    acceptance. video_settings: by default `eval.video`, without its limit of length.
     Returns how it ended: `end` ("finished", "fell", ...), `seconds`, `duration`, and with a film its `frames`.
     Raises UsageError for an unknown scene or a film that is no mp4, NoDisplay, ContractBroken for a damaged export,
     Stopped when interrupted or when the viewer was closed.
@@ -76,6 +83,7 @@ def play(
     recipe = source.recipe
     if scene not in SCENES:
         raise UsageError(f"no scene {scene!r}; valid: {', '.join(SCENES)}")
+    mass = 0.0 if scene == FREE else mass
     if video is not None and video.suffix != ".mp4":
         raise UsageError(f"{video}: a film is an mp4 file; give a name that ends in .mp4")
     script = command_script(sequence or recipe.eval.sequence, recipe.task.commands)

@@ -96,13 +96,7 @@ def trial_row(recipe: Recipe, trial: Trial, played: Played) -> dict[str, Any]:
         "seed": trial.episode.seed,
         "duration": trial.episode.duration,
         "survived": survived(recipe.eval.success, played),
-        "end": "fell"
-        if played.fallen
-        else "dropped"
-        if played.dropped
-        else "finished"
-        if played.finished
-        else "broke off",
+        "end": ending(played),
         "seconds": played.seconds,
         **trial_metrics(played.trace, gait_steps),
         **{f"drawn_{name}": _plain(values) for name, values in played.drawn.items()},
@@ -111,9 +105,9 @@ def trial_row(recipe: Recipe, trial: Trial, played: Played) -> dict[str, Any]:
 
 
 def survived(success: Success, played: Played) -> bool:
-    """No fall, nothing dropped, for the whole trial; by recipe also no hand that let go."""
+    """Whether a trial counts as survived; by recipe only where no hand ever let go."""
     slipped = success.slip_fails and bool(np.any(played.trace.slipped > 0))
-    return played.finished and not (played.fallen or played.dropped or slipped)
+    return played.survived and not slipped
 
 
 def ending(played: Played) -> str:

@@ -51,6 +51,11 @@ class Played:
     drawn: Mapping[str, Array]
     """Everything that was drawn for it, by name, each of shape (k,)."""
 
+    @property
+    def survived(self) -> bool:
+        """No fall, nothing dropped, for the whole episode."""
+        return self.finished and not (self.fallen or self.dropped)
+
 
 def play_episodes(
     recipe: Recipe,

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 from iowbc.recipe.commands import Commands
 from iowbc.recipe.evaluation import Evaluation, HeavyCase, Segment, Sweep
+from iowbc.recipe.holding import FREE
 from iowbc.task.episode import Episode
 from iowbc.task.script import CommandScript, CommandSegment
 
-FREE_SCENE = "free"
-"""Where a mass of 0 is played: there is nothing to hold."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """Factors on the impulses on the object and the pushes on the base."""
 
@@ -59,10 +58,13 @@ def trials_at(
     fixed: Mapping[str, float],
     case: str | None = None,
 ) -> list[Trial]:
-    """`count` trials with one mass [kg], seeded `seed`, `seed` + 1, ...; what is not `fixed` is drawn."""
+    """`count` trials with one mass [kg], seeded `seed`, `seed` + 1, ...; what is not `fixed` is drawn.
+
+    A mass of 0 is played in the scene without an object.
+    """
     held = dict(fixed)
     if mass == 0:
-        scene = FREE_SCENE
+        scene = FREE
     else:
         held["object_mass"] = mass
     return [

@@ -1,5 +1,6 @@
 """On-policy distillation (DAgger) of the teacher into a student that sees only its history (paper eq. 7)."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,16 @@ def gaussian_kl(teacher_mean: Tensor, student_mean: Tensor, teacher_std: Tensor,
     variance = student_std**2
     difference = teacher_std**2 + (teacher_mean - student_mean) ** 2
     return (torch.log(student_std / teacher_std) + difference / (2 * variance) - 0.5).sum(-1)
+
+
+def spread(environments: int) -> NDArray[np.float64]:
+    """Numbers in [0, 1), shape (n,), evenly spread over any run of neighbours: multiples of the golden ratio, modulo 1.
+
+    The teacher drives the environments whose number is below its share; neighbours play the same scene, and in every
+    scene it then drives the same share.
+    """
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    return np.array([index * golden % 1.0 for index in range(environments)])
 
 
 class Experience:
@@ -76,12 +87,13 @@ def gradient_step(
     histories: NDArray[np.float32],
     targets: NDArray[np.float32],
     std: Tensor,
+    gradient_norm: float,
 ) -> float:
-    """One step down the KL divergence; returns it as it was before the step."""
+    """One step, of a gradient no larger than given, down the KL divergence; returns it as it was before the step."""
     loss = gaussian_kl(torch.from_numpy(targets), student(torch.from_numpy(histories)), std, std).mean()
     optimizer.zero_grad()
     loss.backward()  # type: ignore[no-untyped-call]
-    torch.nn.utils.clip_grad_norm_(student.parameters(), 1.0)
+    torch.nn.utils.clip_grad_norm_(student.parameters(), gradient_norm)
     optimizer.step()
     return float(loss.detach())
 

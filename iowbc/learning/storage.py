@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import torch
 from safetensors.torch import load_file, save_file
 from torch import nn
 
@@ -49,8 +48,3 @@ def load_student(folder: Path) -> tuple[StudentNetwork, dict[str, Any]]:
     network, about = load_network(folder, "student")
     assert isinstance(network, StudentNetwork)
     return network, about
-
-
-def as_tensor(array: Any) -> torch.Tensor:
-    """A float32 tensor of an array."""
-    return torch.as_tensor(array, dtype=torch.float32)

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveInt
 
 from iowbc.recipe.section import Section
 
@@ -22,12 +22,14 @@ class Distillation(Section):
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1)
     """Size of what the encoder makes of the whole history."""
-    hidden: tuple[int, ...] = (512, 256, 128)
+    hidden: tuple[PositiveInt, ...] = (512, 256, 128)
     """Hidden layers behind the encoder (paper Table I)."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of the hidden layers."""
     learning_rate: float = Field(default=5e-4, gt=0)
     """Adam's step size at the start; it falls to a tenth along a cosine."""
+    gradient_norm: float = Field(default=1.0, gt=0)
+    """Largest norm of a gradient step."""
     batch: int = Field(default=1024, ge=1)
     """Samples of a gradient step, drawn from the whole buffer."""
     gradient_steps: int = Field(default=12, ge=1)

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.holding import Held, SceneName
+from iowbc.recipe.holding import Held, ObjectScene
 from iowbc.recipe.section import Section
 
 
@@ -43,7 +43,7 @@ class Beyond(Section):
 class Sweep(Section):
     """Trials over a range of object masses in one scene."""
 
-    scene: SceneName = "lift"
+    scene: ObjectScene = "lift"
     """Scene of `simulation.scenes` in which the object is met; a mass of 0 is played in the scene without an object."""
     masses: tuple[float, ...] = Field(default=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
     """Object masses [kg], ascending."""
@@ -73,7 +73,7 @@ class HeavyCase(Section):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]*$")
     """Name of the case in tables and figures."""
-    scene: SceneName
+    scene: ObjectScene
     """Scene of `simulation.scenes`."""
     mass: float = Field(gt=0)
     """Object mass [kg]."""
@@ -150,6 +150,14 @@ class Evaluation(Section):
     """When a trial counts as survived."""
     video: Video = Video()
     """Short films of trials."""
+
+    @model_validator(mode="after")
+    def _cases_told_apart(self) -> Self:
+        names = [case.name for case in self.heavy]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise ValueError(f"heavy: {', '.join(repeated)} is the name of more than one case; give each its own")
+        return self
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:

@@ -5,15 +5,15 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation import Segment
-from iowbc.recipe.holding import SceneName
+from iowbc.recipe.holding import ObjectScene
 from iowbc.recipe.section import Section
 
 
 class Acceptance(Section):
     """A short trial of the exported controller in the simulation; a gate of the stage."""
 
-    scene: SceneName = "lift"
-    """Scene of `simulation.scenes`."""
+    scene: ObjectScene = "lift"
+    """Scene of `simulation.scenes`, with an object."""
     mass: float = Field(default=4.0, ge=0)
     """Object mass [kg]; 0 is played in the scene without an object."""
     partner_share: float = Field(default=0.0, ge=-1, le=1)
@@ -41,6 +41,9 @@ class Export(Section):
     """ONNX operator set; 18 runs on every onnxruntime since 1.14."""
     parity_tolerance: float = Field(default=1e-5, gt=0)
     """Largest difference between torch and onnxruntime over the golden vectors [rad, action units]."""
+    target_tolerance: float = Field(default=1e-3, gt=0)
+    """Largest difference between the controller's joint targets and those that the simulation computes for the same
+    action [rad]; both round differently, by some 1e-6."""
     golden_steps: int = Field(default=100, ge=1)
     """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
     timing_steps: int = Field(default=500, ge=1)

@@ -11,6 +11,10 @@ from iowbc.recipe.scene import Scenes
 
 SCENES = tuple(Scenes.model_fields)
 """Names of the scenes."""
+FREE = "free"
+"""The scene without an object."""
+LOADED = tuple(name for name in SCENES if name != FREE)
+"""Scenes with an object."""
 SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale")
 """Factors on impulses, pushes, sensor noise, and on how far the object's mass may rise in its range."""
 HOLDABLE = (
@@ -26,9 +30,9 @@ HOLDABLE = (
 """Names of what is drawn for an episode."""
 
 
-def _known_scene(name: str) -> str:
-    if name not in SCENES:
-        raise ValueError(f"no scene {name!r}; valid: {', '.join(SCENES)}")
+def _with_object(name: str) -> str:
+    if name not in LOADED:
+        raise ValueError(f"no scene {name!r} with an object; valid: {', '.join(LOADED)}; a mass of 0 is without one")
     return name
 
 
@@ -39,5 +43,5 @@ def _known_quantities(held: dict[str, float]) -> dict[str, float]:
     return held
 
 
-SceneName = Annotated[str, AfterValidator(_known_scene), Field(json_schema_extra={"enum": list(SCENES)})]
+ObjectScene = Annotated[str, AfterValidator(_with_object), Field(json_schema_extra={"enum": list(LOADED)})]
 Held = Annotated[dict[str, float], AfterValidator(_known_quantities)]

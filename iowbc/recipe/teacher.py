@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from iowbc.recipe.section import Section
 
@@ -20,7 +20,7 @@ class Teacher(Section):
     """Parts into which a rollout is split for the gradient steps; must divide environments x rollout."""
     epochs: int = Field(default=5, ge=1)
     """Passes over a rollout."""
-    hidden: tuple[int, ...] = (512, 256, 128)
+    hidden: tuple[PositiveInt, ...] = (512, 256, 128)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
     """Adam's step size at the start (paper Table I)."""
@@ -28,8 +28,8 @@ class Teacher(Section):
     """KL divergence that an update should have: the step size falls by a fifth beyond one and a half times as much, and
     rises by a fifth below two thirds. At 0.02 to 0.04 training is stable, below 0.02 it is several times slower; empty
     keeps the step size constant."""
-    learning_rate_range: tuple[float, float] = (2e-5, 1e-3)
-    """Bounds of the step size."""
+    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (2e-5, 1e-3)
+    """Least and largest step size, where `desired_kl` moves it."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
     gae_lambda: float = Field(default=0.95, ge=0, le=1)
@@ -54,6 +54,13 @@ class Teacher(Section):
     """Normalised observations are clipped to this many standard deviations."""
     checkpoint_every: int = Field(default=20, ge=1)
     """Updates between two checkpoints."""
+
+    @model_validator(mode="after")
+    def _range_ascends(self) -> "Teacher":
+        low, high = self.learning_rate_range
+        if low > high:
+            raise ValueError(f"learning_rate_range: the least step size {low:g} is above the largest {high:g}")
+        return self
 
     @model_validator(mode="after")
     def _minibatches_divide(self) -> "Teacher":

@@ -3,15 +3,11 @@
 import json
 import time
 
-from iowbc.recipe.recipe import Recipe
 from iowbc.stages.contract import Interrupted, Job, Stage
+from iowbc.stages.inputs import generator_stage
 
 PANELS = ("kl", "action_rmse", "action_agreement", "episode_seconds", "teacher_share", "reward")
 """Shown in the figure of the learning curves."""
-
-
-def _reads(recipe: Recipe) -> tuple[str, ...]:
-    return ("rg-fit", "teacher") if recipe.task.references.use_rg else ("teacher",)
 
 
 def run(job: Job) -> None:
@@ -22,7 +18,7 @@ def run(job: Job) -> None:
     from iowbc.learning import checkpoint
     from iowbc.learning.acting import TeacherPolicy
     from iowbc.learning.curves import Curves
-    from iowbc.learning.distillation import Experience, gradient_step, mirror_half
+    from iowbc.learning.distillation import Experience, gradient_step, mirror_half, spread
     from iowbc.learning.history import History
     from iowbc.learning.networks import StudentNetwork
     from iowbc.learning.storage import load_teacher, save_network
@@ -68,7 +64,7 @@ def run(job: Job) -> None:
         experience = Experience(settings.buffer, settings.environments, size, actions, settings.history)
         history = History(settings.environments, settings.history, size)
         starts = np.ones(settings.environments, np.bool_)
-        teacher_drives = np.arange(settings.environments) / settings.environments
+        teacher_drives = spread(settings.environments)
         rounds = -(-settings.steps // (settings.environments * settings.rollout))
         finished = 0
 
@@ -125,7 +121,7 @@ def run(job: Job) -> None:
                 histories, targets = experience.sample(settings.batch, random)
                 if recipe.teacher.symmetry == "augment":
                     mirror_half(histories, targets, *mirrors, random)
-                losses.append(gradient_step(student, optimizer, histories, targets, std))
+                losses.append(gradient_step(student, optimizer, histories, targets, std, settings.gradient_norm))
 
             steps = current * settings.environments * settings.rollout
             values = {
@@ -158,9 +154,9 @@ def run(job: Job) -> None:
 
 STAGE = Stage(
     name="distill",
-    version=1,
-    slice=("seed", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
-    reads=_reads,
+    version=2,
+    slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
+    reads=lambda recipe: (*generator_stage(recipe), "teacher"),
     run=run,
-    packages=("stages.distill", "learning", "task", "sim", "reference.network", "robot"),
+    packages=("stages.distill", "learning", "task", "sim", "reference.network", "reference.feasibility", "robot"),
 )

@@ -4,7 +4,8 @@ import json
 from typing import TYPE_CHECKING
 
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.contract import Interrupted, Job, Stage
+from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+from iowbc.stages.inputs import generator_stage, policy_stage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -12,11 +13,7 @@ if TYPE_CHECKING:
 
 def acting_stage(recipe: Recipe) -> str:
     """The stage whose artifact holds the policy to evaluate."""
-    return "distill" if recipe.eval.policy == "student" and "distill" in recipe.stages else "teacher"
-
-
-def _reads(recipe: Recipe) -> tuple[str, ...]:
-    return ("rg-fit", acting_stage(recipe)) if recipe.task.references.use_rg else (acting_stage(recipe),)
+    return policy_stage(recipe) if recipe.eval.policy == "student" else "teacher"
 
 
 def run(job: Job) -> None:
@@ -28,12 +25,17 @@ def run(job: Job) -> None:
     from iowbc.evaluation.protocol import Protocol
     from iowbc.evaluation.report import write_report
     from iowbc.evaluation.rollout import Stopped
-    from iowbc.learning.acting import load_policy
+    from iowbc.learning.acting import TeacherPolicy, load_policy
     from iowbc.sim.headless import NoRenderer
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe, rg = job.recipe, job.inputs.get("rg-fit")
     policy = load_policy(job.inputs[acting_stage(recipe)])
+    if recipe.eval.policy == "student" and isinstance(policy, TeacherPolicy):
+        raise StageFailed(
+            "eval.policy asks for the student, and the recipe trains none: add `distill` to its stages, "
+            "or evaluate the teacher with --set eval.policy=teacher"
+        )
     protocol = Protocol(
         recipe,
         job.robot,
@@ -83,8 +85,18 @@ def headline(summary: "pd.DataFrame") -> dict[str, float]:
 STAGE = Stage(
     name="eval",
     version=1,
-    slice=("simulation", "task", "eval"),
-    reads=_reads,
+    slice=("rg.height", "simulation", "task", "eval"),
+    reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
-    packages=("stages.evaluate", "evaluation", "learning", "task", "sim", "reference.network", "robot"),
+    packages=(
+        "stages.evaluate",
+        "evaluation",
+        "deploy",
+        "learning",
+        "task",
+        "sim",
+        "reference.network",
+        "reference.feasibility",
+        "robot",
+    ),
 )

@@ -2,16 +2,8 @@
 
 import json
 
-from iowbc.recipe.recipe import Recipe
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
-
-
-def _policy_stage(recipe: Recipe) -> str:
-    return "distill" if "distill" in recipe.stages else "teacher"
-
-
-def _reads(recipe: Recipe) -> tuple[str, ...]:
-    return ("rg-fit", _policy_stage(recipe)) if recipe.task.references.use_rg else (_policy_stage(recipe),)
+from iowbc.stages.inputs import generator_stage, policy_stage
 
 
 def run(job: Job) -> None:
@@ -33,7 +25,7 @@ def run(job: Job) -> None:
 
     torch.set_num_threads(1)  # as on the robot, where the controller has one thread
     recipe, task, settings = job.recipe, job.recipe.task, job.recipe.export
-    rg, source = job.inputs.get("rg-fit"), job.inputs[_policy_stage(job.recipe)]
+    rg, source = job.inputs.get("rg-fit"), job.inputs[policy_stage(job.recipe)]
     if not (source / "student.json").is_file():
         raise StageFailed(
             f"{source} holds no student: a policy that needs privileged observations cannot run on a robot; "
@@ -67,7 +59,7 @@ def run(job: Job) -> None:
     golden.write_golden(inputs, expected, job.out / contract.GOLDEN)
     seconds = golden.inference_seconds(session, inputs, settings.timing_steps)
 
-    survived = sum(trial.finished and not (trial.fallen or trial.dropped) for trial in played)
+    survived = sum(trial.survived for trial in played)
     metrics = {
         "parity": max(differences.values()),
         "target_difference": policy.largest_difference,
@@ -90,6 +82,12 @@ def run(job: Job) -> None:
             f"parity: output {worst} differs by {differences[worst]:.2e} between torch and onnxruntime, "
             f"export.parity_tolerance is {settings.parity_tolerance:.0e}; try another export.opset or raise it"
         )
+    if not policy.largest_difference <= settings.target_tolerance:
+        raise StageFailed(
+            f"the controller's joint targets differ by {policy.largest_difference:.2e} rad from the simulation's own, "
+            f"export.target_tolerance is {settings.target_tolerance:.0e}: its arm kinematics, reference generator, "
+            "gait clock or action scale are not those of the task: the code of one of the two has changed"
+        )
     if settings.acceptance is not None:
         asked = settings.acceptance
         seconds_asked = sum(segment.duration for segment in asked.sequence)
@@ -108,8 +106,18 @@ def run(job: Job) -> None:
 STAGE = Stage(
     name="export",
     version=1,
-    slice=("name", "seed", "simulation", "task", "export"),
-    reads=_reads,
+    slice=("name", "seed", "rg.height", "simulation", "task", "export"),
+    reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
-    packages=("stages.export", "deploy", "evaluation", "learning", "task", "sim", "reference.network", "robot"),
+    packages=(
+        "stages.export",
+        "deploy",
+        "evaluation",
+        "learning",
+        "task",
+        "sim",
+        "reference.network",
+        "reference.feasibility",
+        "robot",
+    ),
 )

@@ -4,8 +4,8 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from iowbc.recipe.recipe import Recipe
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+from iowbc.stages.inputs import generator_stage
 
 if TYPE_CHECKING:
     from iowbc.learning.curves import Curves
@@ -20,10 +20,6 @@ PANELS = (
     "train/explained_variance",
 )
 """Shown in the figure of the learning curves, before the reward's terms."""
-
-
-def _reads(recipe: Recipe) -> tuple[str, ...]:
-    return ("rg-fit",) if recipe.task.references.use_rg else ()
 
 
 def run(job: Job) -> None:
@@ -139,8 +135,8 @@ def _write_curves(job: Job, curves: "Curves") -> None:
 STAGE = Stage(
     name="teacher",
     version=1,
-    slice=("seed", "simulation", "task", "teacher"),
-    reads=_reads,
+    slice=("seed", "rg.height", "simulation", "task", "teacher"),
+    reads=generator_stage,
     run=run,
-    packages=("stages.teacher", "learning", "task", "sim", "reference.network", "robot"),
+    packages=("stages.teacher", "learning", "task", "sim", "reference.network", "reference.feasibility", "robot"),
 )

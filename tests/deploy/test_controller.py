@@ -114,7 +114,7 @@ def test_a_changed_graph_is_noticed(exported: Path, tmp_path: Path) -> None:
         Controller.load(folder)
 
 
-@pytest.mark.parametrize("name", [GRAPH, CONTRACT])
+@pytest.mark.parametrize("name", [GRAPH, CONTRACT, "robot/robot.yaml"])
 def test_an_incomplete_folder_is_named(name: str, exported: Path, tmp_path: Path) -> None:
     folder = tmp_path / "incomplete"
     shutil.copytree(exported, folder)

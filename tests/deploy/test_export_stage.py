@@ -1,6 +1,7 @@
 """The stage `export` from a student on disk to the accepted controller, and its gates."""
 
 import json
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 
 from iowbc.deploy import golden
-from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
+from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, ContractBroken, read_contract
 from iowbc.deploy.controller import open_session
 from iowbc.deploy.graph import ControllerGraph
 from iowbc.evaluation.playing import NoDisplay, exported_source, play, require_display
@@ -126,6 +127,13 @@ def test_a_graph_that_differs_from_torch_fails_the_stage(robot: Robot, rg: Path,
         export.run(job(tmp_path, robot, rg, student, parity_tolerance=1e-30, acceptance=None))
 
 
+def test_targets_that_differ_from_the_simulations_fail_the_stage(
+    robot: Robot, rg: Path, student: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(StageFailed, match="joint targets differ by"):
+        export.run(job(tmp_path, robot, rg, student, target_tolerance=1e-30, acceptance=None))
+
+
 def test_a_privileged_policy_is_not_exported(robot: Robot, rg: Path, tmp_path: Path) -> None:
     (tmp_path / "teacher").mkdir()
     with pytest.raises(StageFailed, match="holds no student"):
@@ -151,6 +159,15 @@ def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
     assert 1 <= result["frames"] <= 4
     assert film.stat().st_size > 500
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
+
+
+def test_a_damaged_recipe_of_an_export_is_named(done: Job, tmp_path: Path) -> None:
+    folder = tmp_path / "export"
+    shutil.copytree(done.out, folder)
+    for damage in ("{", '{"name": "x", "sofa": 1}', None):
+        (folder / "recipe.json").unlink() if damage is None else (folder / "recipe.json").write_text(damage)
+        with pytest.raises(ContractBroken, match=r"recipe.json: missing or not a recipe"):
+            exported_source(folder)
 
 
 def test_what_cannot_be_played_is_refused_with_what_can(done: Job, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from iowbc.learning.storage import save_network
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
 from iowbc.stages import evaluate
-from iowbc.stages.contract import Interrupted, Job
+from iowbc.stages.contract import Interrupted, Job, StageFailed
 from iowbc.task.batch import full_layout
 
 QUESTION = {
@@ -190,12 +190,19 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
         },
     }
     recipe = Recipe.model_validate(question)
-    assert evaluate.STAGE.reads(recipe) == ("teacher",)
+    assert evaluate.STAGE.reads(recipe) == ("rg-fit", "teacher")
     architecture = {"inputs": full_layout(recipe).size, "actions": 15, "hidden": [8], "activation": "elu", "clip": 10.0}
     save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
     finished = job(recipe, tmp_path, tmp_path / "job")
     evaluate.run(finished)
     assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"]
+
+
+def test_a_teacher_is_not_taken_for_the_student(recipe: Recipe, tmp_path: Path) -> None:
+    architecture = {"inputs": full_layout(recipe).size, "actions": 15, "hidden": [8], "activation": "elu", "clip": 10.0}
+    save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
+    with pytest.raises(StageFailed, match=r"add `distill` .* or evaluate the teacher"):
+        evaluate.run(job(recipe, tmp_path, tmp_path / "job"))
 
 
 def test_a_sweep_goes_on_while_something_survives(recipe: Recipe, student: Path, tmp_path: Path) -> None:

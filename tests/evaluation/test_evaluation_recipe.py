@@ -29,6 +29,18 @@ def test_masses_must_ascend_from_zero(masses: tuple[float, ...]) -> None:
         Sweep(masses=masses)
 
 
+def test_an_object_needs_a_scene_that_has_one() -> None:
+    for section in (Sweep, Acceptance):
+        with pytest.raises(ValidationError, match="a mass of 0 is without one"):
+            section(scene="free")
+
+
+def test_heavy_cases_of_one_name_are_refused() -> None:
+    case = HeavyCase(name="tyre", scene="tyre", mass=18.0)
+    with pytest.raises(ValidationError, match="tyre is the name of more than one case"):
+        Evaluation(heavy=(case, case.model_copy(update={"mass": 20.0})))
+
+
 def test_an_evaluation_of_nothing_is_refused() -> None:
     with pytest.raises(ValidationError, match="nothing to evaluate"):
         Evaluation(lifting=None)
@@ -41,7 +53,7 @@ def test_a_ramp_longer_than_its_segment_is_refused() -> None:
 
 
 def test_unknown_scenes_and_quantities_are_named_with_what_is_valid() -> None:
-    with pytest.raises(ValidationError, match="no scene 'lft'; valid: free, lift"):
+    with pytest.raises(ValidationError, match="no scene 'lft' with an object; valid: lift"):
         Sweep(scene="lft")
     with pytest.raises(ValidationError, match=r"no randomised quantity friction; valid: .*ground_friction"):
         Sweep(fixed={"friction": 1.0})

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import torch
 
-from iowbc.learning.distillation import Experience, gaussian_kl, gradient_step, mirror_half
+from iowbc.learning.distillation import Experience, gaussian_kl, gradient_step, mirror_half, spread
 from iowbc.learning.history import History
 from iowbc.learning.networks import StudentNetwork
 from iowbc.robot.mirror import MirrorMap
@@ -66,7 +66,7 @@ def test_the_student_learns_what_depends_on_the_past() -> None:
     for _ in range(400):
         histories = random.normal(size=(256, 5, 1)).astype(np.float32)
         targets = histories[:, 0] - histories[:, -2]
-        losses.append(gradient_step(student, optimizer, histories, targets, torch.ones(1)))
+        losses.append(gradient_step(student, optimizer, histories, targets, torch.ones(1), 1.0))
     assert losses[-1] < 0.02 * losses[0]
 
 
@@ -80,3 +80,10 @@ def test_half_of_the_samples_are_mirrored_with_their_targets() -> None:
     assert 400 < (targets < 0).sum() < 600
     np.testing.assert_array_equal(histories[:, :, 0], np.repeat(targets, 2, axis=1))
     assert (histories[:, :, 1] == 1).all()
+
+
+def test_a_teacher_that_drives_some_drives_the_same_share_of_every_scene() -> None:
+    driven = spread(96) < 0.5
+    assert all(0.4 <= driven[first : first + 12].mean() <= 0.6 for first in range(84))
+    assert not (spread(96) < 0.0).any()
+    assert (spread(96) < 1.0).all()
