@@ -97,7 +97,10 @@ def _capacity_panel(axes: Axes, summary: pd.DataFrame, rate: float) -> None:
         _nothing(axes)
         return
     groups = {
-        variant: [load_capacity(summary, suite, variant, rate) or 0.0 for suite in suites]
+        variant: [
+            np.nan if _rows(summary, suite, variant).empty else load_capacity(summary, suite, variant, rate) or 0.0
+            for suite in suites
+        ]
         for variant in variants_of(summary)
     }
     _bars(axes, groups, suites, "{:g}")
@@ -114,7 +117,7 @@ def _success_panel(axes: Axes, summary: pd.DataFrame) -> None:
     groups = {}
     for variant in variants_of(summary):
         rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"])["rate"]
-        groups[variant] = [100 * float(rows.get(name, 0.0)) for name in names]
+        groups[variant] = [100 * float(rows.get(name, np.nan)) for name in names]
     _bars(axes, groups, [f"{case}\n{mass:g} kg" for case, mass in names], "{:.0f}")
     axes.set_ylabel("surviving trials [%]")
     axes.set_ylim(0, 110)
@@ -125,7 +128,7 @@ def _bars(axes: Axes, groups: dict[str, list[float]], names: list[str], text: st
     for place, (variant, values) in enumerate(groups.items()):
         positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
         bars = axes.bar(positions, values, width, color=style_of(variant, list(groups))[0], label=variant)
-        axes.bar_label(bars, [text.format(value) for value in values], fontsize=8)
+        axes.bar_label(bars, ["–" if np.isnan(value) else text.format(value) for value in values], fontsize=8)
     axes.set_xticks(range(len(names)), names, fontsize=8)
     axes.margins(y=0.15)
     axes.set_xlim(-0.6, len(names) - 0.4)

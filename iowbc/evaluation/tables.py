@@ -95,7 +95,10 @@ def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
     numbers, rows = [], []
     for variant in variants_of(summary):
         capacities = [load_capacity(summary, suite, variant, rate) for suite in suites]
-        rows.append((variant, *(ABSENT if c is None else f"{c:g} kg" for c in capacities)))
+        played = [set(summary.loc[summary["suite"] == suite, "variant"]) for suite in suites]
+        missing = [FAILS if variant in variants else ABSENT for variants in played]
+        cells = [no if c is None else f"{c:g} kg" for c, no in zip(capacities, missing, strict=True)]
+        rows.append((variant, *cells))
         numbers.append({"variant": variant, **dict(zip(suites, capacities, strict=True))})
     head = ("Algorithm", *(f"{suite.capitalize()} capacity" for suite in suites))
     caption = f"Load capacity: the largest mass up to which every mass reached {100 * rate:.0f} % success."
@@ -153,6 +156,6 @@ def _pipe(cells: Sequence[str]) -> str:
 
 
 def _escape(text: str) -> str:
-    for plain, tex in (("%", r"\%"), ("±", r"$\pm$"), ("–", "--"), ("_", r"\_")):
+    for plain, tex in (("%", r"\%"), ("&", r"\&"), ("#", r"\#"), ("±", r"$\pm$"), ("–", "--"), ("_", r"\_")):
         text = text.replace(plain, tex) if "$" not in text or plain != "_" else text
     return text
