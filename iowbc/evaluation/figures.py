@@ -28,8 +28,9 @@ FAILURE_SPACING = 0.035
 
 
 def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
-    """Colour and marker of a variant, the same in every figure."""
-    place = VARIANTS.index(variant) if variant in VARIANTS else len(VARIANTS) + variants.index(variant)
+    """Colour and marker of a variant, the same in every figure; `variants`: all that are shown."""
+    known = [*VARIANTS, *(name for name in variants if name not in VARIANTS)]
+    place = known.index(variant)
     return COLOURS[place % len(COLOURS)], MARKERS[place % len(MARKERS)]
 
 
@@ -128,7 +129,7 @@ def _bars(axes: Axes, groups: dict[str, list[float]], names: list[str], text: st
     for place, (variant, values) in enumerate(groups.items()):
         positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
         bars = axes.bar(positions, values, width, color=style_of(variant, list(groups))[0], label=variant)
-        axes.bar_label(bars, ["–" if np.isnan(value) else text.format(value) for value in values], fontsize=8)
+        axes.bar_label(bars, [text.format(value) for value in values], fontsize=8)
     axes.set_xticks(range(len(names)), names, fontsize=8)
     axes.margins(y=0.15)
     axes.set_xlim(-0.6, len(names) - 0.4)

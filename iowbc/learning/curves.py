@@ -5,6 +5,13 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+OUTLIERS = (1.0, 99.0)
+"""Percentiles between which a panel's values always lie inside of it."""
+FLATTENED = 10.0
+"""A panel this many times as high as what lies between the percentiles is cut."""
+MARGIN = 0.5
+"""Room above and below in a panel that was cut, in heights of what lies between the percentiles."""
+
 
 class Curves:
     """Rows of named values by environment step; a resumed training drops the rows after its checkpoint."""
@@ -38,7 +45,8 @@ class Curves:
             writer.writerows(self.rows)
 
     def write_figure(self, path: Path, title: str, panels: Sequence[str]) -> None:
-        """One panel a name, those without values left out."""
+        """One panel a name, those without values left out; an outlier that would flatten the rest lies outside."""
+        import numpy as np
         from matplotlib.figure import Figure
 
         shown = [name for name in panels if any(name in row for row in self.rows)]
@@ -50,6 +58,9 @@ class Curves:
             axes = figure.add_subplot(lines, columns, position)
             points = [(row["step"] / 1e6, row[name]) for row in self.rows if name in row]
             axes.plot(*zip(*points, strict=True), linewidth=1)
+            low, high = np.percentile([value for _, value in points], OUTLIERS)
+            if np.ptp(axes.get_ylim()) > FLATTENED * (high - low) > 0.0:
+                axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
             axes.set_title(name, fontsize=9)
             axes.set_xlabel("million environment steps", fontsize=8)
             axes.grid(alpha=0.3)

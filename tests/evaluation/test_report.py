@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from iowbc.evaluation.aggregate import COSTS, aggregate, load_capacity, variants_of
+from iowbc.evaluation.figures import style_of
 from iowbc.evaluation.metrics import ERRORS
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
 from iowbc.evaluation.report import write_report
@@ -69,6 +70,21 @@ def test_variants_come_in_the_papers_order_and_unknown_ones_last() -> None:
     trials = pd.concat([trials_of(name, "lifting", {0.0: 5}) for name in names])
     assert variants_of(trials) == ["IO-WBC", "w/o RG", "mine"]
     assert list(aggregate(trials)["variant"]) == ["IO-WBC", "w/o RG", "mine"]
+
+
+def test_no_two_variants_look_alike() -> None:
+    variants = [*VARIANTS, "another", "one more"]
+    assert len({style_of(variant, variants) for variant in variants}) == len(variants)
+    assert style_of("one more", ["IO-WBC", "one more"]) != style_of("IO-WBC", ["IO-WBC", "one more"])
+
+
+def test_what_was_not_evaluated_is_told_from_what_failed() -> None:
+    summary = aggregate(
+        pd.concat([trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("w/o RG", "pushing", {30.0: 0})])
+    )
+    text = markdown(capacity_table(summary, 0.8))
+    assert "| IO-WBC | 4 kg | – |" in text
+    assert "| w/o RG | – | Fails |" in text
 
 
 def test_load_capacity_stops_at_the_first_mass_that_breaks() -> None:
