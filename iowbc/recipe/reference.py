@@ -181,15 +181,18 @@ class FeasibleRegion(Section):
     """Grid points over the height range, labelled with two arm postures."""
     pitches: int = Field(default=41, ge=3)
     """Grid points over the pitch range."""
-    steepest: Positive = 10.0
-    """Largest move of a joint per metre of height [rad/m]: near straight legs and joint limits the reference leaps."""
+    jump: Positive = 0.055
+    """Largest move of a joint for one step of height or pitch (`fit.smoothness`) that the network makes in the map [rad]:
+    near straight legs and at joint limits the reference leaps."""
     gentle_share: Share = 0.98
-    """A command needs this share of the labels around it to be less steep than that."""
-    bound_slope: Positive = 0.5
+    """Share of the arm postures for which that must hold at a command."""
+    arms: int = Field(default=200, ge=1)
+    """Arm postures of the dataset on which that is judged."""
+    bound_slope: Positive = 1.0
     """Steepest change of the map's bounds with pitch [m/rad]: a clamped height does not leap when the pitch moves."""
     kept_share: Share = 0.5
     """A command needs this share of the samples around it, with any arms, to have a label."""
-    window: tuple[Positive, Positive] = (0.01, 0.1)
+    window: tuple[Positive, Positive] = (0.02, 0.1)
     """Which samples are around a command: within this height [m] and pitch [rad]."""
     enough: int = Field(default=20, ge=1)
     """Samples that there must be for their share to count; fewer leave it to the two arm postures of the grid."""

@@ -41,8 +41,6 @@ class Dataset:
     """Distance of the centre of mass inside the support polygon, shape (n,) [m]."""
     reached: Array
     """Height reached, shape (n,) [m]."""
-    slope: Array
-    """Largest move of a joint per metre of height around the label, shape (n,) [rad/m]."""
     rejected_arm: Array
     rejected_command: Array
     rejected_payload: Array

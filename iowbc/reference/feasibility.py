@@ -58,24 +58,28 @@ class FeasibleMap:
         return found
 
 
-def build_map(pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope: float) -> FeasibleMap:
+def build_map(
+    pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope: float, nominal: tuple[float, float]
+) -> FeasibleMap:
     """The map of a grid of decisions (pitches, heights), with one run of heights at each pitch.
 
-    It grows from the pitch with the longest run to both sides, each time into the run that shares most heights with the
-    one before. Its bounds change with pitch by at most `slope` [m/rad]. Raises ValueError when no cell is feasible.
+    It grows from the `nominal` height [m] and pitch [rad] to both sides, each time into the run nearest to the nominal
+    height among those that overlap with the one before. Its bounds change with pitch by at most `slope` [m/rad]. Raises
+    ValueError when no cell is feasible.
     """
     runs = [_runs(row) for row in feasible]
-    longest = [max((last - first + 1 for first, last in row), default=0) for row in runs]
-    start = int(np.argmax(longest))
-    if not longest[start]:
+    filled = [row for row, found in enumerate(runs) if found]
+    if not filled:
         raise ValueError(
             f"the feasible set is empty: none of {feasible.size} commands with heights {heights[0]:.2f} to "
             f"{heights[-1]:.2f} m and pitches {pitches[0]:.2f} to {pitches[-1]:.2f} rad has a gentle label; "
             "widen rg.sampling.height and rg.sampling.pitch"
         )
-    first = max(runs[start], key=_length)
-    above = _grow(first, runs[start + 1 :])
-    below = _grow(first, runs[:start][::-1])[::-1]
+    start = min(filled, key=lambda row: abs(pitches[row] - nominal[1]))
+    place = float(np.interp(nominal[0], heights, np.arange(len(heights))))
+    first = min(runs[start], key=lambda run: _distance(run, place))
+    above = _grow(first, runs[start + 1 :], place)
+    below = _grow(first, runs[:start][::-1], place)[::-1]
     chosen = np.array([*below, first, *above])
     pitch = pitches[start - len(below) : start + len(above) + 1]
     low, high = heights[chosen[:, 0]], heights[chosen[:, 1]]
@@ -88,15 +92,14 @@ def build_map(pitches: Array, heights: Array, feasible: NDArray[np.bool_], slope
     return FeasibleMap(pitch[begin : end + 1], low[begin : end + 1], high[begin : end + 1])
 
 
-def _grow(run: Run, rows: list[list[Run]]) -> list[Run]:
-    """Follows a run through neighbouring rows for as long as there is one that overlaps."""
+def _grow(run: Run, rows: list[list[Run]], place: float) -> list[Run]:
+    """Follows a run through neighbouring rows for as long as one overlaps, keeping near to a place."""
     followed: list[Run] = []
     for row in rows:
         touching = [other for other in row if _overlap(run, other) > 0]
         if not touching:
             break
-        previous = run
-        run = max(touching, key=lambda other: (_overlap(previous, other), _length(other)))
+        run = min(touching, key=lambda other: _distance(other, place))
         followed.append(run)
     return followed
 
@@ -110,6 +113,10 @@ def _runs(row: NDArray[np.bool_]) -> list[Run]:
 
 def _length(run: Run) -> int:
     return run[1] - run[0] + 1
+
+
+def _distance(run: Run, place: float) -> float:
+    return max(run[0] - place, place - run[1], 0.0)
 
 
 def _overlap(a: Run, b: Run) -> int:

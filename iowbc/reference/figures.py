@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from iowbc.recipe.reference import FitGates
 from iowbc.reference.crosscheck import Check
 from iowbc.reference.dataset import Dataset
-from iowbc.reference.feasible_region import Region
+from iowbc.reference.feasibility import FeasibleMap
+from iowbc.reference.feasible_region import GentleRegion, Region
 from iowbc.reference.sampling import SamplePlan
 from iowbc.reference.smoothness import Jumps
 from iowbc.reference.task_error import TaskErrors
@@ -74,6 +75,20 @@ def error_figures(
     _write(figure, folder / "joints.png")
 
 
+def gentle_figure(folder: Path, plan: SamplePlan, region: GentleRegion, held: FeasibleMap) -> None:
+    """The feasible map over how far the reference moves for one step of the command."""
+    figure, (axes,) = _figure(1, 1, 6.0, 4.2)
+    top = 2.0 * plan.recipe.feasible.jump
+    shown = axes.pcolormesh(
+        plan.pitches, plan.heights, region.jump.T, cmap="Blues_r", vmin=0.0, vmax=top, shading="nearest"
+    )
+    figure.colorbar(shown, ax=axes, label="largest joint move for one step [rad]")
+    _outline(axes, plan, held, "has labels", "--")
+    _outline(axes, plan, region.map, "feasible map")
+    axes.legend(loc="lower left")
+    _write(figure, folder / "feasible_map.png")
+
+
 def learning_figure(folder: Path, training: Sequence[float], validation: Sequence[float]) -> None:
     """Loss by epoch."""
     figure, (axes,) = _figure(1, 1, 5.0, 3.4)
@@ -88,26 +103,27 @@ def learning_figure(folder: Path, training: Sequence[float], validation: Sequenc
 
 def _feasible_map(path: Path, plan: SamplePlan, region: Region) -> None:
     figure, (left, right) = _figure(1, 2, 10.0, 4.2)
-    extent = (plan.pitches[0], plan.pitches[-1], plan.heights[0], plan.heights[-1])
-    level = region.held.T.astype(float) + region.gentle.T
-    left.pcolormesh(plan.pitches, plan.heights, level, cmap="Blues", vmin=-0.6, vmax=3.0, shading="nearest")
-    left.set_title("dark: held; middle: held, but too steep; pale: not held")
+    left.pcolormesh(plan.pitches, plan.heights, region.held.T, cmap="Blues", vmin=-0.6, vmax=1.6, shading="nearest")
+    left.set_title("has a label with one of two arm postures")
     share = np.ma.masked_less(region.share.T, 0.0)
     shown = right.pcolormesh(plan.pitches, plan.heights, share, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
     right.set_title("share of all arm postures that have a label")
     figure.colorbar(shown, ax=right)
-    outline = region.map
     for axes in (left, right):
-        axes.plot(outline.pitch, outline.low, color=WARM, linewidth=2, label="feasible map")
-        axes.plot(outline.pitch, outline.high, color=WARM, linewidth=2)
-        axes.plot(outline.pitch[[0, 0]], [outline.low[0], outline.high[0]], color=WARM, linewidth=2)
-        axes.plot(outline.pitch[[-1, -1]], [outline.low[-1], outline.high[-1]], color=WARM, linewidth=2)
-        axes.set_xlim(extent[0], extent[1])
-        axes.set_ylim(extent[2], extent[3])
-        axes.set_xlabel("torso pitch [rad]")
-        axes.set_ylabel(f"{plan.recipe.height} height [m]")
+        _outline(axes, plan, region.map, "has labels")
     left.legend(loc="lower left")
     _write(figure, path)
+
+
+def _outline(axes: Any, plan: SamplePlan, outline: FeasibleMap, label: str, style: str = "-") -> None:
+    """Draws a map over the grid."""
+    pitch = np.concatenate([outline.pitch, outline.pitch[::-1], outline.pitch[:1]])
+    height = np.concatenate([outline.low, outline.high[::-1], outline.low[:1]])
+    axes.plot(pitch, height, color=WARM, linewidth=2, linestyle=style, label=label)
+    axes.set_xlim(plan.pitches[0], plan.pitches[-1])
+    axes.set_ylim(plan.heights[0], plan.heights[-1])
+    axes.set_xlabel("torso pitch [rad]")
+    axes.set_ylabel(f"{plan.recipe.height} height [m]")
 
 
 def _rejections(path: Path, kept: int, rejected: Mapping[str, int]) -> None:

@@ -27,6 +27,8 @@ class Prepared:
 
     train: FitData
     validation: FitData
+    training: NDArray[np.int64]
+    """Rows of the dataset that are trained on."""
     held_out: NDArray[np.int64]
     """Rows of the dataset kept for the gates."""
     samples: list[Sample]
@@ -68,7 +70,7 @@ def prepare(
             np.concatenate([learnt.outputs, image.outputs]),
             np.concatenate([learnt.jacobian, image.jacobian]),
         )
-    return Prepared(learnt, whole.take(validation), held_out, samples, kinematics)
+    return Prepared(learnt, whole.take(validation), train, held_out, samples, kinematics)
 
 
 def split_by_group(

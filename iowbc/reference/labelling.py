@@ -11,7 +11,6 @@ from iowbc.recipe.reference import ReferenceGenerator
 from iowbc.reference.gates import Judge
 from iowbc.reference.sample import Posture, Sample
 from iowbc.reference.sampling import SamplePlan
-from iowbc.reference.static import StaticMethod
 from iowbc.reference.support_model import SupportModel
 from iowbc.robot.description import load_robot
 
@@ -59,7 +58,6 @@ class Labeller:
         self.support = SupportModel(robot, recipe.problem)
         self.judge = Judge(self.support, recipe.gates, recipe.height)
         self.method = make_method(task.method, self.support, recipe)
-        self.steady = StaticMethod(self.support, recipe.height)
 
     def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
         """The samples of these numbers."""
@@ -78,13 +76,14 @@ class Labeller:
             "torque": evidence.torque,
             "margin": np.asarray(evidence.margin),
             "reached": np.asarray(evidence.height),
-            "slope": np.asarray(self.steady.slope(sample, posture)),
         }
 
 
 def make_method(name: Literal["static", "ocp"], support: SupportModel, recipe: ReferenceGenerator) -> Method:
     """The named way to find postures; crocoddyl is loaded only where it is used."""
     if name == "static":
+        from iowbc.reference.static import StaticMethod
+
         return StaticMethod(support, recipe.height)
     from iowbc.reference.optimal_control import OptimalControlMethod
 

@@ -42,6 +42,8 @@ class SamplePlan:
         self.mirror = interaction_mirror(robot)
         self.grid_arms = np.stack([np.tile(self.rest, (len(self.pitches), 1)), self._carrying()])
         self.grid_shape = (len(self.grid_arms), len(self.pitches), len(self.heights))
+        default = float(np.clip(robot.default_height, self.heights[0], self.heights[-1]))
+        self.nominal = default, float(np.clip(0.0, self.pitches[0], self.pitches[-1]))
         self.count = self.drawn + int(np.prod(self.grid_shape))
         dimensions = 6 + 6 + len(arms) + 2
         self.unit: Array = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(

@@ -4,7 +4,6 @@ Variables are the base pose, the support joints and the two sole wrenches; Gauss
 base's equilibrium as linearised equalities, and joint, torque and contact limits as inequalities.
 """
 
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,9 +18,6 @@ from iowbc.reference.support_model import SupportModel
 from iowbc.reference.wrench_cone import sole_limits
 
 Array = NDArray[Any]
-
-SLOPE_STEP = 0.005
-"""Height step by which a label's slope is measured [m]."""
 
 
 class StaticMethod:
@@ -69,24 +65,6 @@ class StaticMethod:
             if np.abs(step).max() < problem.tolerance:
                 return Posture(q, wrench)
         raise Rejected("not converged")
-
-    def slope(self, sample: Sample, posture: Posture) -> float:
-        """Largest move of a support joint per metre of commanded height around a label [rad/m], up or down.
-
-        It is how the first Gauss-Newton step changes with the command; a neighbour without equilibrium does not count.
-        The support model must be locked to the sample.
-        """
-        torso = pinocchio.SE3(sample.torso_rotation(), np.zeros(3))
-        here, _ = self._step(posture.configuration, posture.wrench, sample, torso)
-        steepest = 0.0
-        for rise in (-SLOPE_STEP, SLOPE_STEP):
-            neighbour = replace(sample, command=sample.command + np.array([rise, 0.0, 0.0, 0.0]))
-            try:
-                step, _ = self._step(posture.configuration, posture.wrench, neighbour, torso)
-            except Rejected:
-                continue
-            steepest = max(steepest, float(np.abs((step - here)[6:]).max()) / SLOPE_STEP)
-        return steepest
 
     def _step(self, q: Array, wrench: Array, sample: Sample, torso: Any) -> tuple[Array, Array]:
         """One Gauss-Newton step: tangent (21,) and change of the wrenches (2, 6)."""

@@ -115,7 +115,7 @@ def _percentile(values: object, percent: float) -> float:
 
 STAGE = Stage(
     name="rg-dataset",
-    version=1,
+    version=2,
     slice=(
         "seed",
         "rg.method",

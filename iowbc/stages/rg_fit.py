@@ -1,7 +1,6 @@
 """Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples."""
 
 import json
-import shutil
 from typing import Any
 
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
@@ -15,19 +14,21 @@ def run(job: Job) -> None:
 
     from iowbc.reference.dataset import Dataset
     from iowbc.reference.feasibility import FeasibleMap
-    from iowbc.reference.figures import error_figures, learning_figure
+    from iowbc.reference.feasible_region import measure_gentle_region
+    from iowbc.reference.figures import error_figures, gentle_figure, learning_figure
     from iowbc.reference.fit_gates import judge_fit
     from iowbc.reference.fit_preparation import prepare
     from iowbc.reference.fitting import FitStopped, fit
     from iowbc.reference.network import ReferenceNetwork
     from iowbc.reference.network_inputs import base_columns, input_names
+    from iowbc.reference.sampling import SamplePlan
     from iowbc.reference.smoothness import measure_jumps
     from iowbc.robot.description import load_robot
 
     rg, source = job.recipe.rg, job.inputs["rg-dataset"]
     robot = load_robot(job.robot)
     dataset = Dataset.load(source / "dataset.npz")
-    feasible = FeasibleMap.load(source / "feasible.npz")
+    held_map = FeasibleMap.load(source / "feasible.npz")
     prepared = prepare(dataset, robot, rg, job.recipe.seed, job.interrupted)
     if prepared is None:
         raise Interrupted
@@ -55,7 +56,14 @@ def run(job: Job) -> None:
     )
     network.save(job.out)
     network = ReferenceNetwork.load(job.out)
-    shutil.copyfile(source / "feasible.npz", job.out / "feasible.npz")
+    plan = SamplePlan(robot, rg, job.recipe.seed)
+    learnt = prepared.training[dataset.index[prepared.training] < plan.drawn]
+    try:
+        region = measure_gentle_region(plan, held_map, network, dataset.arm[learnt], dataset.payload[learnt])
+    except ValueError as error:
+        raise StageFailed(f"{error}; or raise rg.feasible.jump") from error
+    feasible = region.map
+    feasible.save(job.out / "feasible.npz")
 
     held = prepared.held_out
     base = base_columns(rg, dataset.command[held], dataset.payload[held])
@@ -76,6 +84,7 @@ def run(job: Job) -> None:
     figures = job.out / "figures"
     figures.mkdir(exist_ok=True)
     error_figures(figures, dataset.support[held], predicted, errors, jumps, rg.fit.gates, network.outputs)
+    gentle_figure(figures, plan, region, held_map)
     learning_figure(figures, fitted.training_loss, fitted.validation_loss)
     if verdict.failures:
         raise StageFailed(
@@ -88,8 +97,8 @@ def run(job: Job) -> None:
 
 STAGE = Stage(
     name="rg-fit",
-    version=1,
-    slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem"),
+    version=2,
+    slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem", "rg.feasible"),
     reads=lambda recipe: ("rg-dataset",),
     run=run,
     packages=("reference", "robot"),

@@ -14,7 +14,7 @@ from iowbc.stages.contract import Job
 
 SMALL: dict[str, Any] = {
     "sampling": {"samples": 400, "mirrored_share": 0.1},
-    "feasible": {"heights": 9, "pitches": 11, "steepest": 30.0},
+    "feasible": {"heights": 9, "pitches": 11, "jump": 0.3},
     "crosscheck": {"samples": 3},
     "fit": {
         "epochs": 60,

@@ -9,15 +9,16 @@ from iowbc.reference.feasibility import FeasibleMap, build_map
 
 PITCHES = np.array([0.0, 0.5, 1.0, 1.5])
 HEIGHTS = np.array([0.5, 0.6, 0.7, 0.8])
+NOMINAL = (0.7, 0.5)
 FEASIBLE = np.array([[0, 1, 1, 1], [1, 1, 1, 0], [1, 0, 1, 1], [0, 0, 0, 0]], dtype=bool)
 
 
 @pytest.fixture
 def region() -> FeasibleMap:
-    return build_map(PITCHES, HEIGHTS, FEASIBLE, slope=10.0)
+    return build_map(PITCHES, HEIGHTS, FEASIBLE, slope=10.0, nominal=NOMINAL)
 
 
-def test_the_longest_run_of_heights_counts(region: FeasibleMap) -> None:
+def test_the_run_around_the_nominal_height_counts(region: FeasibleMap) -> None:
     np.testing.assert_array_equal(region.pitch, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(region.low, [0.6, 0.5, 0.7])
     np.testing.assert_allclose(region.high, [0.8, 0.7, 0.8])
@@ -37,11 +38,21 @@ def test_clamping_is_idempotent_and_keeps_what_is_inside(region: FeasibleMap) ->
     assert not region.contains(np.array([0.55]), np.array([0.0]))[0]
 
 
+def test_a_longer_run_elsewhere_does_not_draw_the_map_from_the_nominal_command() -> None:
+    """An island of refused heights splits one pitch; the part with the nominal height goes on, however short."""
+    heights = np.linspace(0.5, 0.8, 7)
+    rows = np.ones((4, 7), dtype=bool)
+    rows[0, 4] = False
+    region = build_map(PITCHES, heights, rows, slope=10.0, nominal=(0.78, 0.5))
+    np.testing.assert_allclose(region.low, [0.75, 0.5, 0.5, 0.5])
+    np.testing.assert_allclose(region.high, 0.8)
+
+
 def test_bounds_change_no_faster_than_allowed() -> None:
     heights = np.linspace(0.5, 0.8, 7)
     rows = np.ones((4, 7), dtype=bool)
     rows[2, 4:] = False
-    region = build_map(PITCHES, heights, rows, slope=0.2)
+    region = build_map(PITCHES, heights, rows, slope=0.2, nominal=NOMINAL)
     assert (np.abs(np.diff(region.high)) <= 0.2 * np.diff(region.pitch) + 1e-12).all()
     assert region.high[2] == pytest.approx(0.65)
     assert (region.high <= 0.8).all()
@@ -51,7 +62,7 @@ def test_an_empty_feasible_set_is_an_error() -> None:
     with pytest.raises(
         ValueError, match=r"the feasible set is empty: none of 16 commands with heights 0\.50 to 0\.80 m"
     ):
-        build_map(PITCHES, HEIGHTS, np.zeros((4, 4), dtype=bool), slope=1.0)
+        build_map(PITCHES, HEIGHTS, np.zeros((4, 4), dtype=bool), slope=1.0, nominal=NOMINAL)
 
 
 def test_the_map_comes_back_from_disk(region: FeasibleMap, tmp_path: Path) -> None:
