@@ -210,22 +210,28 @@ def bench_simulation(
     environments: Annotated[int, typer.Option(help="Environments a worker.", min=1)] = 48,
     workers: BenchWorkers = None,
     others: Annotated[bool, typer.Option(help="Also measure the usual vector environments.")] = True,
+    runs: RunsFolder = None,
 ) -> None:
-    """Measure how fast the vector environment steps, against a bare loop of MuJoCo."""
+    """Measure how fast the vector environment steps, against a bare loop of MuJoCo; the figures go to MLflow."""
     given = _given(recipe)
     _check_scene(scene)
     from iowbc.benchmarks import simulation
+    from iowbc.pipeline.tracking import record_figures
 
-    simulation.main(given, scene=scene, environments=environments, workers=tuple(workers or ()), others=others)
+    figures = simulation.main(
+        given, scene=scene, environments=environments, workers=tuple(workers or ()), others=others
+    )
+    record_figures(_runs(runs), "bench-sim", figures)
 
 
 @bench.command("rg")
-def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None) -> None:
-    """Measure how fast the reference generator's samples are labelled, by each method."""
+def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: RunsFolder = None) -> None:
+    """Measure how fast the reference generator's samples are labelled, by each method; the figures go to MLflow."""
     given = _given(recipe)
     from iowbc.benchmarks import reference
+    from iowbc.pipeline.tracking import record_figures
 
-    reference.main(given, workers=tuple(workers or ()))
+    record_figures(_runs(runs), "bench-rg", reference.main(given, workers=tuple(workers or ())))
 
 
 def _given(recipe: Path | None) -> "Recipe | None":

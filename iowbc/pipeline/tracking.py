@@ -18,6 +18,7 @@ from iowbc.pipeline.layout import Runs
 from iowbc.pipeline.machine import boot, host
 from iowbc.pipeline.store import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.trees import flattened
+from iowbc.recipe.execution import Execution
 from iowbc.recipe.loading import LoadedRecipe
 from iowbc.recipe.writing import as_yaml
 
@@ -88,8 +89,7 @@ class Tracker:
 
     def metrics(self, name: str, values: Mapping[str, float], step: int) -> None:
         """Values of a stage at a step."""
-        cleaned = {re.sub(r"[^\w\-. :/]", "_", key): float(value) for key, value in values.items()}
-        self._journal.write("metrics", id=name, values=cleaned, step=step)
+        self._journal.write("metrics", id=name, values=cleaned(values), step=step)
 
     def end(self, name: str, status: str, message: str = "") -> None:
         """A stage that ran has ended with MLflow's status FAILED or KILLED."""
@@ -130,6 +130,24 @@ class Tracker:
         """See to it that a sender is at work; it outlives this process."""
         if self._sender is None or self._sender.poll() is not None:
             self._sender = start_sender(self.runs)
+
+
+def record_figures(runs: Runs, name: str, figures: Mapping[str, float]) -> None:
+    """Record a run that has no stages, such as a benchmark: its figures by name."""
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    with Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl") as journal:
+        journal.acquire(CHECKING_TIME)
+        experiment = Execution.model_fields["experiment"].default
+        journal.write("journal", uri=tracking_uri(runs), experiment=experiment, recipe=name, digest="")
+        journal.write("run", id=PARENT, parent=None, name=name, tags=_process_tags(), params={})
+        journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
+        journal.write("end", id=PARENT, status="FINISHED")
+    start_sender(runs)
+
+
+def cleaned(values: Mapping[str, float]) -> dict[str, float]:
+    """Values under names that MLflow accepts."""
+    return {re.sub(r"[^\w\-. :/]", "_", name): float(value) for name, value in values.items()}
 
 
 def parameters(resolved: Mapping[str, Any]) -> dict[str, str]:

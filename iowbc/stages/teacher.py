@@ -42,6 +42,7 @@ def run(job: Job) -> None:
         num_envs=settings.environments,
         workers=job.workers,
         seed=recipe.seed,
+        divergences=job.out / "divergences",
     )
     try:
         robot = load_robot(job.robot)
