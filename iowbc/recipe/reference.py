@@ -182,8 +182,8 @@ class FeasibleRegion(Section):
     pitches: int = Field(default=41, ge=3)
     """Grid points over the pitch range."""
     jump: Positive = 0.055
-    """Largest move of a joint for one step of height or pitch (`fit.smoothness`) that the network makes in the map [rad]:
-    near straight legs and at joint limits the reference leaps."""
+    """Largest move of a joint for one step of height or pitch (`fit.smoothness`) that the network makes in the map
+    [rad]: near straight legs and at joint limits the reference leaps."""
     gentle_share: Share = 0.98
     """Share of the arm postures for which that must hold at a command."""
     arms: int = Field(default=200, ge=1)
