@@ -21,7 +21,7 @@ LABELS = {
     "E_v": "$E_v$, velocity [m/s]",
     "E_psi": "$E_\\psi$, heading [rad]",
 }
-PAPER_NOTE = "hollow, dotted: the paper's numbers; × none survived"
+PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; × none survived"
 DPI = 150
 FAILURE_SPACING = 0.035
 """Distance of two variants' crosses, in heights of the panel."""
@@ -66,6 +66,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     _success_panel(success, summary)
     for axes, letter in zip((lifting, pushing, capacity, success), "abcd", strict=True):
         axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
+    figure.suptitle(PAPER_NOTE, fontsize=10)
     _legend(figure, next(axes for axes in figure.axes if axes.get_legend_handles_labels()[0]))
     return figure
 

@@ -48,7 +48,7 @@ def sweep_table(summary: pd.DataFrame, suite: str) -> Table:
     return Table(
         name=suite,
         caption=f"Command tracking errors under cooperative {suite} (paper's Table {number}): means over surviving "
-        "trials with their 95 % interval; right, what the paper reports.",
+        "trials with their 95 % interval; right, what the paper reports for its own commands.",
         head=(
             "Mass",
             "Algorithm",
