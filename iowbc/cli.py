@@ -179,7 +179,7 @@ def play(
         float, typer.Option(help="Part of the weight that a partner bears.", min=0.0, max=1.0)
     ] = 0.0,
     seed: Annotated[int, typer.Option(min=0)] = 0,
-    disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses, pushes and noise.")] = False,
+    disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses and pushes.")] = False,
     video: Annotated[Path | None, typer.Option(help="Make a film instead of opening a window.", metavar="MP4")] = None,
     runs: RunsFolder = None,
 ) -> None:

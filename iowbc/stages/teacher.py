@@ -42,7 +42,7 @@ def run(job: Job) -> None:
         num_envs=settings.environments,
         workers=job.workers,
         seed=recipe.seed,
-        divergences=job.out / "divergences",
+        divergences=job.work / "divergences",
     )
     try:
         robot = load_robot(job.robot)
@@ -102,6 +102,8 @@ def run(job: Job) -> None:
         about = {"layout": environment.layout.describe(), "curriculum": environment.curriculum()}
         save_network(network, architecture, job.out, "teacher", about)
         model.save(job.out / "teacher_sb3.zip")
+        if (job.work / "divergences").is_dir():
+            (job.work / "divergences").rename(job.out / "divergences")
         _write_curves(job, curves)
     finally:
         environment.close()
