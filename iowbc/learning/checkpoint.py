@@ -2,7 +2,8 @@
 
 import json
 import os
-from collections.abc import Mapping
+import zlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,26 +17,68 @@ from torch import nn
 Arrays = dict[str, NDArray[Any]]
 
 
+class _Damaged(Exception):
+    """A checkpoint's file that cannot be read, or does not hold what was written."""
+
+
 def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
-    """Replace the checkpoint at `path`; a crash at any moment leaves the old one or the new one."""
+    """Replace the checkpoint at `path` and keep the one before beside it; a crash at any moment leaves one of them."""
     fresh = path.with_suffix(".fresh")
     contiguous = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
-    save_file(contiguous, fresh, metadata={"key": key, "state": json.dumps(state)})
+    save_file(contiguous, fresh, metadata={"key": key, "state": json.dumps(state), "crc32": _checksum(contiguous)})
     with fresh.open("rb") as file:
         os.fsync(file.fileno())
+    if path.is_file():
+        os.replace(path, previous_checkpoint(path))
     os.replace(fresh, path)
 
 
-def load_checkpoint(path: Path, key: str) -> tuple[Arrays, dict[str, Any]] | None:
-    """Arrays and state of a checkpoint; None where there is none, it is damaged, or it belongs to another key."""
+def previous_checkpoint(path: Path) -> Path:
+    """Where the checkpoint before the one at `path` is kept."""
+    return path.with_suffix(".previous")
+
+
+def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> tuple[Arrays, dict[str, Any]] | None:
+    """Arrays and state of the newest whole checkpoint of this key, or None; `say` is told of damaged ones."""
+    damaged, found = [], None
+    for candidate in (path, previous_checkpoint(path)):
+        try:
+            found = _read(candidate, key)
+        except _Damaged:
+            damaged.append(candidate.name)
+        if found is not None:
+            break
+    if damaged:
+        names = " and ".join(damaged)
+        verb = "is" if len(damaged) == 1 else "are"
+        say(f"checkpoint {names} {verb} damaged: {'starts anew' if found is None else 'goes on from the previous one'}")
+    return found
+
+
+def _read(path: Path, key: str) -> tuple[Arrays, dict[str, Any]] | None:
+    """One file's arrays and state; None where there is none or it belongs to another key. Raises _Damaged."""
+    if not path.is_file():
+        return None
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = file.metadata() or {}
-            if metadata.get("key") != key:
+            if metadata["key"] != key:
                 return None
-            return {name: file.get_tensor(name) for name in file.keys()}, json.loads(metadata["state"])  # noqa: SIM118
-    except (FileNotFoundError, SafetensorError):
-        return None
+            arrays: Arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+            state = json.loads(metadata["state"])
+    except (OSError, SafetensorError, KeyError, ValueError) as reason:
+        raise _Damaged(path) from reason
+    if metadata.get("crc32") not in (None, _checksum(arrays)):
+        raise _Damaged(path)
+    return arrays, state
+
+
+def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """CRC-32 of the arrays' bytes, in order of their names."""
+    value = 0
+    for name in sorted(arrays):
+        value = zlib.crc32(np.ascontiguousarray(arrays[name]).tobytes(), value)
+    return f"{value:08x}"
 
 
 def prefixed(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:

@@ -69,7 +69,7 @@ def run(job: Job) -> None:
         finished = 0
 
         path = job.work / "checkpoint.safetensors"
-        found = checkpoint.load_checkpoint(path, job.key)
+        found = checkpoint.load_checkpoint(path, job.key, job.report.say)
         if found is not None:
             arrays, state = found
             finished = state["rounds"]

@@ -52,7 +52,7 @@ def run(job: Job) -> None:
         env = ppo.normalize(environment, settings, mirrors)
         model = ppo.make_ppo(settings, env, recipe.seed, mirrors)
         path = job.work / "checkpoint.safetensors"
-        found = checkpoint.load_checkpoint(path, job.key)
+        found = checkpoint.load_checkpoint(path, job.key, job.report.say)
         if found is not None:
             arrays, _ = found
             environment.restore(checkpoint.under("environment", arrays))

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def train(path: Path, stop_after: int | None = None) -> dict[str, np.ndarray]:
     env = PushToCentre()
     normalised = ppo.normalize(env, SETTINGS, ODD)
     model = ppo.make_ppo(SETTINGS, normalised, 3, ODD)
-    found = checkpoint.load_checkpoint(path, "key")
+    found = checkpoint.load_checkpoint(path, "key", print)
     if found:
         env.state = found[0]["environment/state"].copy()
         ppo.restore_ppo(model, normalised, found[0])
@@ -101,23 +102,53 @@ def test_the_network_that_is_kept_acts_as_the_trained_policy(tmp_path: Path) -> 
     torch.testing.assert_close(network(torch.from_numpy(raw)), expected, rtol=1e-5, atol=1e-6)
 
 
-def test_a_checkpoint_of_another_key_and_a_damaged_one_are_not_used(tmp_path: Path) -> None:
-    path = tmp_path / "checkpoint.safetensors"
+def test_a_checkpoint_of_another_key_is_not_used(tmp_path: Path) -> None:
+    path, said = tmp_path / "checkpoint.safetensors", list[str]()
     checkpoint.save_checkpoint(path, "one", {"x": np.arange(3)}, {"rounds": 4})
-    found = checkpoint.load_checkpoint(path, "one")
+    found = checkpoint.load_checkpoint(path, "one", said.append)
     assert found is not None
     assert found[1] == {"rounds": 4}
-    assert checkpoint.load_checkpoint(path, "two") is None
-    path.write_bytes(path.read_bytes()[:40])
-    assert checkpoint.load_checkpoint(path, "one") is None
-    assert checkpoint.load_checkpoint(tmp_path / "none", "one") is None
+    assert checkpoint.load_checkpoint(path, "two", said.append) is None
+    assert checkpoint.load_checkpoint(tmp_path / "none", "one", said.append) is None
+    assert said == []
+
+
+def truncated(content: bytes) -> bytes:
+    return content[:40]
+
+
+def flipped(content: bytes) -> bytes:
+    return content[:-1] + bytes([content[-1] ^ 1])
+
+
+@pytest.mark.parametrize("damage", [truncated, flipped, lambda content: b"", lambda content: bytes(len(content))])
+def test_a_damaged_checkpoint_is_named_and_the_previous_one_used(
+    damage: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
+    path, said = tmp_path / "checkpoint.safetensors", list[str]()
+    for rounds in (1, 2, 3):
+        checkpoint.save_checkpoint(path, "k", {"x": np.arange(rounds)}, {"rounds": rounds})
+    path.write_bytes(damage(path.read_bytes()))
+    found = checkpoint.load_checkpoint(path, "k", said.append)
+    assert found is not None
+    assert found[1] == {"rounds": 2}
+    assert len(found[0]["x"]) == 2
+    assert said == ["checkpoint checkpoint.safetensors is damaged: goes on from the previous one"]
+
+    checkpoint.previous_checkpoint(path).unlink()
+    said.clear()
+    assert checkpoint.load_checkpoint(path, "k", said.append) is None
+    assert said == ["checkpoint checkpoint.safetensors is damaged: starts anew"]
 
 
 def test_an_unfinished_write_leaves_the_old_checkpoint(tmp_path: Path) -> None:
-    path = tmp_path / "checkpoint.safetensors"
+    path, said = tmp_path / "checkpoint.safetensors", list[str]()
     checkpoint.save_checkpoint(path, "k", {"x": np.arange(3)}, {})
     (tmp_path / "checkpoint.fresh").write_bytes(b"half")
-    assert checkpoint.load_checkpoint(path, "k") is not None
+    assert checkpoint.load_checkpoint(path, "k", said.append) is not None
+    path.rename(checkpoint.previous_checkpoint(path))
+    assert checkpoint.load_checkpoint(path, "k", said.append) is not None
+    assert said == []
 
 
 def test_the_step_size_follows_the_kl_divergence_within_its_bounds() -> None:
