@@ -60,6 +60,7 @@ class OptimalControlMethod:
         running = self._action(self._costs(sample, terminal=False), contacts, self.ocp.step)
         terminal = self._action(self._costs(sample, terminal=True), contacts, 0.0)
         problem = crocoddyl.ShootingProblem(start, [running] * self.ocp.nodes, terminal)
+        problem.nthreads = 1  # the processes are the parallelism; its own threads would wait in loops for each other
         states = [start] * (self.ocp.nodes + 1)
         solver = crocoddyl.SolverBoxFDDP(problem)
         solver.th_stop = STOP
