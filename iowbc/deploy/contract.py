@@ -116,8 +116,9 @@ def write_contract(contract: Contract, folder: Path) -> None:
     (folder / CONTRACT).write_text(contract.model_dump_json(indent=1) + "\n")
 
 
-def read_contract(folder: Path) -> Contract:
+def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
+    folder = Path(folder)
     missing = [name for name in (CONTRACT, GRAPH, f"{ROBOT}/robot.yaml") if not (folder / name).is_file()]
     if missing:
         raise ContractBroken(

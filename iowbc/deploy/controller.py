@@ -1,6 +1,6 @@
 """The exported controller, as it runs on a robot: onnxruntime and NumPy, no torch and no simulator.
 
-controller = Controller.load(Path("exported"))
+controller = Controller.load("exported")
 targets = controller.step(Measured(...), command)     # every 1 / controller.frequency seconds
 """
 
@@ -109,8 +109,9 @@ class Controller:
         self.reset()
 
     @classmethod
-    def load(cls, folder: Path, robots: int = 1) -> Self:
+    def load(cls, folder: Path | str, robots: int = 1) -> Self:
         """The controller in an exported folder. Raises ContractBroken where it is not what its contract says."""
+        folder = Path(folder)
         contract = read_contract(folder)
         robot = load_robot(folder / ROBOT)
         if robot.joints != contract.joints:

@@ -1,10 +1,12 @@
 """The exported controller: what it refuses, what it keeps, and that it needs no torch."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from iowbc.deploy.controller import Controller, Measured
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 
+README = Path(__file__).parents[2] / "README.md"
 NOMINAL = np.array([0, 0, 0, 0.72, 0, 0, 0, 0, 0, 0, 0.0])
 
 
@@ -38,6 +41,18 @@ def test_a_step_gives_targets_for_every_joint_with_gains(exported: Path, robot: 
     assert np.array_equal(targets.kp, robot.kp)
     support = targets.support_reference + robot.action_scale * targets.action
     assert targets.position[:, robot.support] == pytest.approx(support, abs=1e-6)
+
+
+def test_the_readme_shows_a_step_that_works(exported: Path, robot: Robot) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
+    (snippet,) = [block for block in blocks if "Controller.load" in block]
+    place = "runs/store/export/<key>"
+    assert place in snippet
+    names: dict[str, Any] = {}
+    exec(snippet.replace(place, str(exported)), names)
+    assert names["command"].shape == (11,)
+    assert names["targets"].position.shape == (1, 29)
+    assert np.array_equal(names["targets"].position, Controller.load(exported).step(measured(robot), NOMINAL).position)
 
 
 def test_robots_side_by_side_do_not_touch_one_another(exported: Path, robot: Robot) -> None:
