@@ -88,8 +88,7 @@ class SceneRenderer:
         outward = BESIDE * state.base_rotation[env, :, 1] * np.array([[1.0], [-1.0]])
         if state.has_object[env]:
             self._arrow(self._simulation.partner_handle(env), state.partner_force[env], PARTNER)
-            impulse = state.external_force[env, :3] - state.partner_force[env]
-            self._arrow(state.object_position[env], impulse, PUSH)
+            self._arrow(state.object_position[env], self._simulation.impulse_force(env), PUSH)
             hands = self._simulation.hand_position(env)
             for hand in range(2):
                 self._arrow(hands[hand] + outward[hand], state.grip_force[env, hand], GRIP)

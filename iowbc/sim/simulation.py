@@ -279,6 +279,11 @@ class Simulation:
         """Where the partner takes hold, (3,) [m]."""
         return self._partner.handle(env)
 
+    def impulse_force(self, env: int) -> Array:
+        """The impulse that acts on the object in this control period, world frame, (3,) [N]."""
+        force: Array = self._impulses.force[env].copy()
+        return force
+
     def hand_position(self, env: int) -> Array:
         """Positions of the grips, (2, 3) [m]."""
         world, index = self._world_of(env)

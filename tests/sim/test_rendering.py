@@ -6,7 +6,7 @@ from conftest import run
 
 from iowbc.recipe.simulation import Simulation as Recipe
 from iowbc.sim import headless, look
-from iowbc.sim.rendering import GRIP, SceneRenderer
+from iowbc.sim.rendering import GRIP, PUSH, SMALLEST_FORCE, SceneRenderer
 
 
 @pytest.mark.parametrize("scene", ["free", "lift", "tyre", "push"])
@@ -40,8 +40,25 @@ def test_forces_are_drawn_as_arrows(start, monkeypatch):
     run(simulation, 30)
     with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
         renderer.frame()
-        colours = np.array([renderer._scene.geoms[index].rgba for index in range(renderer._scene.ngeom)])
-    assert np.sum(np.all(np.isclose(colours, GRIP), axis=1)) == 2
+        assert _arrows(renderer, GRIP) == 2
+
+
+def test_the_object_is_handed_over_without_an_arrow_of_a_disturbance(start, calm, monkeypatch):
+    monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
+    simulation = start(calm, ["lift"], object_mass=6.0)
+    simulation.step()
+    assert simulation.state.external_force[0, 2] > 10 * SMALLEST_FORCE
+    with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
+        renderer.frame()
+        assert _arrows(renderer, PUSH) == 0
+        simulation._impulses.force[0] = (40.0, 0.0, 0.0)
+        renderer.frame()
+        assert _arrows(renderer, PUSH) == 1
+
+
+def _arrows(renderer, colour):
+    colours = np.array([renderer._scene.geoms[index].rgba for index in range(renderer._scene.ngeom)])
+    return int(np.sum(np.all(np.isclose(colours, colour), axis=1)))
 
 
 def test_meshes_sit_on_the_links_of_the_robot_where_they_are_installed(robot):
