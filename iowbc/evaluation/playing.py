@@ -15,7 +15,7 @@ from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.film import EpisodeFilm
-from iowbc.evaluation.protocol import InBatch, ending, replayed
+from iowbc.evaluation.protocol import ending, in_batch, replayed
 from iowbc.evaluation.rollout import Acting, Played, Stopped, play_in
 from iowbc.evaluation.trials import UNDISTURBED, command_script, trials_at
 from iowbc.learning.acting import load_policy
@@ -123,7 +123,7 @@ def film_row(
     title = [f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"]
     try:
         with EpisodeFilm(environment, path, recipe.eval.video, title) as film:
-            return play_in(environment, recipe, InBatch(policy, row), interrupted, look=film.look)[0]
+            return play_in(environment, recipe, in_batch(policy, row), interrupted, look=film.look)[0]
     finally:
         environment.close()
 

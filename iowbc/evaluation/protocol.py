@@ -1,7 +1,8 @@
 """The whole evaluation: every sweep and heavy case, one row a trial, resumable batch by batch."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ class Protocol:
         work: Path,
         workers: int,
         interrupted: Callable[[], bool] = lambda: False,
-        progress: Callable[[int, int, str], None] = lambda done, total, note: None,
+        progress: Callable[[float, float, str], None] = lambda done, total, note: None,
     ) -> None:
         """`progress` is told trials done, trials known of, and the batch that is played."""
         self.recipe, self.robot, self.rg, self.policy = recipe, robot, rg, policy
@@ -44,36 +45,52 @@ class Protocol:
         sweeps = {"lifting": evaluation.lifting, "pushing": evaluation.pushing}
         heavy = heavy_trials(evaluation, commands)
         self.total = len(heavy) + sum(len(s.masses) * evaluation.trials for s in sweeps.values() if s is not None)
-        parts = []
+        tables: list[pd.DataFrame] = []
         for suite, sweep in sweeps.items():
             if sweep is None:
                 continue
-            parts.append(self._batch(suite, sweep_trials(evaluation, commands, suite, sweep, sweep.masses)))
+            tables.extend(self._batches(sweep_trials(evaluation, commands, suite, sweep, sweep.masses)))
             heaviest = sweep.masses[-1]
-            while _any_survivor(parts[-1], heaviest) and (following := heavier_mass(sweep, heaviest)) is not None:
+            while _any_survivor(tables[-1], heaviest) and (following := heavier_mass(sweep, heaviest)) is not None:
                 heaviest = following
                 trials = sweep_trials(evaluation, commands, suite, sweep, [heaviest])
                 self.total += len(trials)
-                parts.append(self._batch(f"{suite}-{heaviest:g}", trials))
-        if heavy:
-            parts.append(self._batch("heavy", heavy))
-        return pd.concat(parts, ignore_index=True)
+                tables.extend(self._batches(trials))
+        tables.extend(self._batches(heavy))
+        return pd.concat(tables, ignore_index=True)
 
-    def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
+    def _batches(self, trials: Sequence[Trial]) -> Iterator[pd.DataFrame]:
+        """The tables of some trials, a batch for each case and mass; the policy computes in the shape of them all."""
+        begin = 0
+        for (case, mass), group in groupby(trials, lambda trial: (trial.case, trial.mass)):
+            batch = list(group)
+            name = case if batch[0].suite == "heavy" else f"{case}-{mass:g}"
+            yield self._batch(name, batch, begin, len(trials))
+            begin += len(batch)
+
+    def _batch(self, name: str, trials: Sequence[Trial], begin: int, size: int) -> pd.DataFrame:
+        """Rows `begin` and on of `size`."""
         path = self.work / f"trials-{name}.parquet"
+        places = np.arange(begin, begin + len(trials))
         if not path.is_file():
+            longest = max(trial.episode.duration for trial in trials)
+
+            def progress(seconds: float) -> None:
+                reached = self.done + len(trials) * min(seconds / longest, 1.0)
+                self.progress(reached, self.total, f"{name}, {seconds:.0f} s")
+
             played = play_episodes(
                 self.recipe,
                 self.robot,
                 self.rg,
                 [trial.episode for trial in trials],
-                self.policy,
+                Placed(self.policy, size, places),
                 workers=self.workers,
                 interrupted=self.interrupted,
-                progress=lambda seconds: self.progress(self.done, self.total, f"{name}, {seconds:.0f} s"),
+                progress=progress,
             )
             rows = [trial_row(self.recipe, t, p) for t, p in zip(trials, played, strict=True)]
-            table = pd.DataFrame(rows).assign(batch_size=len(rows), batch_row=range(len(rows)))
+            table = pd.DataFrame(rows).assign(batch_size=size, batch_row=places)
             unfinished = path.with_suffix(".part")
             table.to_parquet(unfinished, index=False)
             unfinished.rename(path)
@@ -124,26 +141,32 @@ def replayed(row: "pd.Series[Any]") -> Episode:
     return Episode.from_json(json.loads(row["episode"]))
 
 
-class InBatch:
-    """A policy for one environment that computes in the shape of the batch in which a trial was played, at its place.
+class Placed:
+    """A policy for some environments that computes in the shape of a larger batch, with them at given places.
 
-    Matrix products round differently for other shapes; with this, a trial that is played again is the same bit for bit.
+    Matrix products round differently for other shapes; with this, a trial is the same bit for bit whichever trials of
+    its sweep it is played with.
     """
 
-    def __init__(self, policy: Acting, row: "pd.Series[Any]") -> None:
-        """`row`: the trial's row of the long table."""
-        self.policy, self.size, self.place = policy, int(row["batch_size"]), int(row["batch_row"])
+    def __init__(self, policy: Acting, size: int, places: NDArray[np.int64]) -> None:
+        """`places` (n,): the environments' rows in the batch of `size`."""
+        self.policy, self.size, self.places = policy, size, places
 
     def reset(self, which: NDArray[np.bool_]) -> None:
-        self.policy.reset(np.full(self.size, which[0]))
+        self.policy.reset(self._spread(which))
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        rows = (
-            np.zeros((self.size, observation.shape[1]), np.float32),
-            np.zeros((self.size, privileged.shape[1]), np.float32),
-        )
-        rows[0][self.place], rows[1][self.place] = observation[0], privileged[0]
-        return self.policy.act(*rows)[self.place : self.place + 1]
+        return self.policy.act(self._spread(observation), self._spread(privileged))[self.places]
+
+    def _spread(self, rows: NDArray[Any]) -> NDArray[Any]:
+        batch = np.zeros((self.size, *rows.shape[1:]), rows.dtype)
+        batch[self.places] = rows
+        return batch
+
+
+def in_batch(policy: Acting, row: "pd.Series[Any]") -> Placed:
+    """The policy as it acted in the trial of a row of the long table, for that trial alone."""
+    return Placed(policy, int(row["batch_size"]), np.array([int(row["batch_row"])]))
 
 
 def _plain(values: np.ndarray[Any, np.dtype[np.float64]]) -> float | list[float]:

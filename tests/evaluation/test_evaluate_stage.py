@@ -13,8 +13,9 @@ import torch
 
 from iowbc.evaluation.aggregate import COSTS
 from iowbc.evaluation.metrics import ERRORS
-from iowbc.evaluation.protocol import InBatch, Protocol, replayed
+from iowbc.evaluation.protocol import Protocol, in_batch, replayed
 from iowbc.evaluation.rollout import play_episodes
+from iowbc.evaluation.trials import sweep_trials
 from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network
@@ -153,7 +154,7 @@ def test_the_film_shows_the_trial(done: Job) -> None:
 
 def test_a_row_is_played_again_bit_for_bit(done: Job, recipe: Recipe, student: Path) -> None:
     row = pd.read_parquet(done.out / "trials.parquet").iloc[2]
-    policy = InBatch(load_policy(student), row)
+    policy = in_batch(load_policy(student), row)
     (again,) = play_episodes(recipe, done.robot, None, [replayed(row)], policy, workers=0)
     assert again.seconds == row["seconds"]
     assert again.trace.base_position.shape[0] * again.trace.dt == pytest.approx(row["seconds"])
@@ -166,15 +167,51 @@ def test_the_number_of_workers_changes_nothing(done: Job, recipe: Recipe, studen
     pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
 
 
-def test_finished_batches_are_not_played_again(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
+def test_a_sweep_goes_on_after_its_last_finished_mass(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
     stopping = job(recipe, student, tmp_path)
-    (stopping.work / "trials-lifting.parquet").write_bytes((done.work / "trials-lifting.parquet").read_bytes())
+    finished = "trials-lifting-0.parquet"
+    (stopping.work / finished).write_bytes((done.work / finished).read_bytes())
     asked: list[bool] = []
     stopping = replace(stopping, interrupted=lambda: bool(asked.append(True)) or len(asked) > 1)
     with pytest.raises(Interrupted, match="finished batches are kept"):
         evaluate.run(stopping)
-    assert {path.name for path in stopping.work.iterdir()} <= {"trials-lifting.parquet", "trials-pushing.parquet"}
+    left = {path.name for path in stopping.work.iterdir()}
+    assert finished in left
+    assert left <= {finished, "trials-lifting-4.parquet"}
     assert not (stopping.out / "trials.parquet").exists()
+    evaluate.run(replace(stopping, interrupted=lambda: False))
+    pd.testing.assert_frame_equal(
+        pd.read_parquet(stopping.out / "trials.parquet"), pd.read_parquet(done.out / "trials.parquet")
+    )
+
+
+def test_a_sweep_in_batches_gives_what_it_gives_at_once(recipe: Recipe, student: Path, done: Job) -> None:
+    evaluation, commands = recipe.eval, recipe.task.commands
+    assert evaluation.lifting is not None
+    trials = sweep_trials(evaluation, commands, "lifting", evaluation.lifting, evaluation.lifting.masses)
+    episodes = [trial.episode for trial in trials]
+    at_once = play_episodes(recipe, done.robot, None, episodes, load_policy(student), workers=0)
+    table = pd.read_parquet(done.out / "trials.parquet").query("suite == 'lifting'")
+    energy = [float(np.sum(played.trace.power) * played.trace.dt) for played in at_once]
+    assert table["energy"].tolist() == energy
+
+
+def test_progress_grows_within_a_batch(recipe: Recipe, student: Path, done: Job, tmp_path: Path) -> None:
+    asked = {**QUESTION["eval"], "sequence": [{"duration": 1.2, "ramp": 0.0}], "heavy": [], "pushing": None}  # type: ignore[dict-item]
+    longer = Recipe.model_validate({**QUESTION, "eval": asked | {"trials": 1, "lifting": {"masses": [0]}}})
+    told: list[float] = []
+    Protocol(
+        longer,
+        done.robot,
+        None,
+        load_policy(student),
+        work=tmp_path,
+        workers=0,
+        progress=lambda now, total, note: told.append(now / total),
+    ).run()
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert any(0 < share < 1 for share in told)
 
 
 def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None:
