@@ -128,12 +128,13 @@ def test_an_interrupted_step_leaves_a_usable_environment(make: Make) -> None:
 
 
 PARENT = """
-    import sys, time
+    import signal, sys, time
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
     from iowbc.task.vector_env import VectorEnv
     import numpy as np
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
     env = VectorEnv(Recipe(name="x"), robot_folder("g1"), rg=None, num_envs=4, workers=2, seed=0)
     env.reset()
     print(*env._crew.processes, flush=True)
@@ -156,6 +157,14 @@ def parent(then: str = "") -> tuple[subprocess.Popen[str], list[int]]:
     return process, [int(pid) for pid in process.stdout.readline().split()]
 
 
+def ending(process: subprocess.Popen[str]) -> str:
+    """What a process writes to its standard error until it ends; it is killed where it does not."""
+    try:
+        return process.communicate(timeout=20)[1]
+    finally:
+        process.kill()
+
+
 def shared_segments() -> set[str]:
     return {path.name for path in Path("/dev/shm").glob("*")}
 
@@ -170,7 +179,7 @@ def test_workers_go_with_a_parent_that_is_ended(blow: signal.Signals) -> None:
             os.killpg(process.pid, blow)
         else:
             process.send_signal(blow)
-        _, errors = process.communicate(timeout=20)
+        errors = ending(process)
     assert gone(workers)
     assert shared_segments() <= before
     if blow == signal.SIGINT:
@@ -181,7 +190,7 @@ def test_workers_go_with_a_parent_that_is_ended(blow: signal.Signals) -> None:
 def test_workers_go_with_a_parent_that_raises() -> None:
     process, workers = parent("raise RuntimeError('planned')")
     with process:
-        _, errors = process.communicate(timeout=20)
+        errors = ending(process)
     assert "planned" in errors
     assert gone(workers)
 
