@@ -259,7 +259,7 @@ class ReferenceGenerator(Section):
     """The reference generator: its dataset and its network."""
 
     method: Literal["static", "ocp"] = "static"
-    """How labels are made: `ocp` is the optimal control problem, `static` its steady state (100 times faster)."""
+    """How labels are made: `ocp` is the optimal control problem, `static` its steady state (15 times faster)."""
     height: Literal["pelvis", "com"] = "pelvis"
     """What the commanded height is: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass as the paper writes."""
     sampling: Sampling = Sampling()

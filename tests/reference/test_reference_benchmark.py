@@ -1,0 +1,15 @@
+"""`iowbc bench rg` measures both methods and names its figures."""
+
+import pytest
+
+from iowbc.benchmarks import reference
+
+
+def test_both_methods_are_measured_for_each_number_of_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reference, "COURSES", {"static": reference.Course(64, 8), "ocp": reference.Course(8, 1)})
+    lines: list[str] = []
+    figures = reference.main(workers=(1,), turns=1, say=lines.append)
+    assert set(figures) == {f"{method}{name}_1" for method in ("static", "ocp") for name in ("", "_a_core", "_scaling")}
+    assert figures["static_scaling_1"] == 1.0
+    assert figures["static_a_core_1"] > figures["ocp_a_core_1"] > 0.0
+    assert [line.split()[:2] for line in lines[2:]] == [["static", "1"], ["ocp", "1"]]
