@@ -1,4 +1,4 @@
-"""The paper's figures: errors against lifting mass, against pushing mass, and the comparison in four panels."""
+"""The paper's figures: errors against lifting mass, against pushing mass, and the comparison of variants."""
 
 from pathlib import Path
 
@@ -23,6 +23,10 @@ LABELS = {
 }
 PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; × none survived"
 DPI = 150
+PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
+"""Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
+HEADROOM = 0.15
+"""Room above the highest point, in parts of its height."""
 FAILURE_SPACING = 0.035
 """Distance of two variants' crosses, in heights of the panel."""
 
@@ -57,17 +61,25 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
 
 
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
-    """Four panels: error norm over lifting mass and over pushing mass, load capacity, success in the heavy tasks."""
-    figure = Figure(figsize=(15, 4.2), layout=ConstrainedLayoutEngine(wspace=0.06))
-    lifting, pushing, capacity, success = figure.subplots(1, 4)
-    for axes, suite in ((lifting, "lifting"), (pushing, "pushing")):
+    """Error norm over lifting mass and over pushing mass, load capacity, success in the heavy tasks.
+
+    A panel for each that was evaluated.
+    """
+    sweeps = [suite for suite in ("lifting", "pushing") if (summary["suite"] == suite).any()]
+    count = len(sweeps) + bool(sweeps) + 1
+    figure = Figure(
+        figsize=(max(PANEL_WIDTH * count, SMALLEST_WIDTH), 4.2), layout=ConstrainedLayoutEngine(wspace=0.06)
+    )
+    panels = list(figure.subplots(1, count, squeeze=False).flat)
+    for axes, suite in zip(panels, sweeps, strict=False):
         _norm_panel(axes, summary, suite)
-    _capacity_panel(capacity, summary, capacity_rate)
-    _success_panel(success, summary)
-    for axes, letter in zip((lifting, pushing, capacity, success), "abcd", strict=True):
+    if sweeps:
+        _capacity_panel(panels[-2], summary, sweeps, capacity_rate)
+    _success_panel(panels[-1], summary)
+    for axes, letter in zip(panels, "abcd", strict=False):
         axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
     figure.suptitle(PAPER_NOTE, fontsize=10)
-    _legend(figure, next(axes for axes in figure.axes if axes.get_legend_handles_labels()[0]))
+    _legend(figure, panels[0])
     return figure
 
 
@@ -78,9 +90,6 @@ def write_figure(figure: Figure, path: Path) -> None:
 
 def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
     axes.set_title(f"error norm, {suite}")
-    if not (summary["suite"] == suite).any():
-        _nothing(axes)
-        return
     for variant in variants_of(summary):
         rows = _rows(summary, suite, variant)
         colour, marker = style_of(variant, variants_of(summary))
@@ -92,12 +101,8 @@ def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
     _tidy(axes)
 
 
-def _capacity_panel(axes: Axes, summary: pd.DataFrame, rate: float) -> None:
+def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: float) -> None:
     axes.set_title(f"load capacity at {100 * rate:.0f} % success")
-    suites = [suite for suite in ("lifting", "pushing") if (summary["suite"] == suite).any()]
-    if not suites:
-        _nothing(axes)
-        return
     groups = {
         variant: [
             np.nan if _rows(summary, suite, variant).empty else load_capacity(summary, suite, variant, rate) or 0.0
@@ -132,7 +137,7 @@ def _bars(axes: Axes, groups: dict[str, list[float]], names: list[str], text: st
         bars = axes.bar(positions, values, width, color=style_of(variant, list(groups))[0], label=variant)
         axes.bar_label(bars, [text.format(value) for value in values], fontsize=8)
     axes.set_xticks(range(len(names)), names, fontsize=8)
-    axes.margins(y=0.15)
+    _from_zero(axes)
     axes.set_xlim(-0.6, len(names) - 0.4)
     axes.spines[["top", "right"]].set_visible(False)
 
@@ -175,12 +180,13 @@ def _legend(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, fontsize=9, ncols=len(labels), loc="outside lower center", frameon=False)
 
 
-def _nothing(axes: Axes) -> None:
-    axes.text(0.5, 0.5, "not evaluated", ha="center", va="center", transform=axes.transAxes, color="0.5")
-    axes.set_axis_off()
-
-
 def _tidy(axes: Axes) -> None:
-    axes.set_ylim(bottom=0)
+    _from_zero(axes)
     axes.grid(True, color="0.9")
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _from_zero(axes: Axes) -> None:
+    """The vertical axis from 0 to above the highest point, so that its marker, bar label and interval are whole."""
+    highest = axes.dataLim.ymax
+    axes.set_ylim(0.0, (1.0 + HEADROOM) * highest if np.isfinite(highest) and highest > 0 else 1.0)

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from iowbc.evaluation.aggregate import COSTS, aggregate, load_capacity, variants_of
-from iowbc.evaluation.figures import style_of
+from iowbc.evaluation.figures import comparison, errors_against_mass, style_of
 from iowbc.evaluation.metrics import ERRORS
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
 from iowbc.evaluation.report import write_report
@@ -130,6 +130,26 @@ def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_pat
         "figures/pushing_errors.png",
         "figures/comparison.png",
     }
+
+
+def test_the_comparison_has_a_panel_for_each_thing_that_was_evaluated() -> None:
+    lifting, heavy = trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("IO-WBC", "heavy", {18.0: 1}, "tyre")
+    for trials, titles in (
+        (lifting, ["(a) error norm, lifting", "(b) load capacity at 80 % success", "(c) success rate"]),
+        (heavy, ["(a) success rate"]),
+    ):
+        figure = comparison(aggregate(trials), 0.8)
+        assert [axes.get_title() for axes in figure.axes] == titles
+
+
+def test_every_point_and_bar_is_below_the_upper_edge_and_axes_begin_at_zero() -> None:
+    summary = aggregate(trials_of("IO-WBC", "lifting", {4.0: 5, 8.0: 0}))
+    nothing_carried = aggregate(trials_of("IO-WBC", "lifting", {4.0: 0}))
+    figures = [errors_against_mass(summary, "lifting"), comparison(summary, 0.8), comparison(nothing_carried, 0.8)]
+    for axes in (axes for figure in figures for axes in figure.axes):
+        low, high = axes.get_ylim()
+        assert low == 0
+        assert high > axes.dataLim.ymax * 1.05 or axes.dataLim.ymax <= 0
 
 
 def test_equal_trials_give_equal_files(tmp_path: Path) -> None:
