@@ -52,6 +52,20 @@ def test_a_ramp_longer_than_its_segment_is_refused() -> None:
         Segment(duration=1.0, ramp=2.0)
 
 
+@pytest.mark.parametrize("height", [0.1, 1.2])
+def test_a_height_out_of_reach_is_refused(height: float) -> None:
+    with pytest.raises(ValidationError, match=r"never reaches a height of .* give 0.3 to 1 m"):
+        Segment(duration=1.0, height=height)
+    assert Segment(duration=1.0, height=0.3).height == 0.3
+
+
+@pytest.mark.parametrize("offset", [0.6, -3.0])
+def test_wrists_out_of_reach_are_refused(offset: float) -> None:
+    with pytest.raises(ValidationError, match=r"never reach an offset of .* give -0.5 to 0.5 m"):
+        Segment(duration=1.0, wrists=(0, 0, 0, 0, offset, 0))
+    assert Segment(duration=1.0, wrists=(0, 0, 0, 0, 0, -0.5)).wrists[5] == -0.5
+
+
 def test_unknown_scenes_and_quantities_are_named_with_what_is_valid() -> None:
     with pytest.raises(ValidationError, match="no scene 'lft' with an object; valid: lift"):
         Sweep(scene="lft")
