@@ -105,10 +105,13 @@ def _feasible_map(path: Path, plan: SamplePlan, region: Region) -> None:
     figure, (left, right) = _figure(1, 2, 10.0, 4.2)
     left.pcolormesh(plan.pitches, plan.heights, region.held.T, cmap="Blues", vmin=-0.6, vmax=1.6, shading="nearest")
     left.set_title("has a label with one of two arm postures")
-    share = np.ma.masked_less(region.share.T, 0.0)
+    share = np.ma.masked_array(region.share.T, region.share.T < 0.0)
     shown = right.pcolormesh(plan.pitches, plan.heights, share, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
     right.set_title("share of all arm postures that have a label")
     figure.colorbar(shown, ax=right)
+    if share.mask.all():
+        text = f"no window of commands was tried {plan.recipe.feasible.enough} times"
+        right.text(0.5, 0.5, text, ha="center", va="center", transform=right.transAxes, color=INK)
     for axes in (left, right):
         _outline(axes, plan, region.map, "has labels")
     left.legend(loc="lower left")
