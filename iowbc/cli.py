@@ -118,6 +118,8 @@ def list_(
     """List the stored artifacts."""
     from iowbc.pipeline.listing import list_artifacts
 
+    if stage is not None:
+        _check_stage(stage)
     list_artifacts(_store(runs), _console(), stage)
 
 
@@ -238,6 +240,14 @@ def _given(recipe: Path | None) -> "Recipe | None":
     from iowbc.recipe.loading import load_recipe
 
     return load_recipe(recipe).recipe if recipe is not None else None
+
+
+def _check_stage(name: str) -> None:
+    from iowbc.recipe.problems import UsageError, nearest
+    from iowbc.recipe.recipe import PIPELINE
+
+    if name not in PIPELINE:
+        raise UsageError(f"{name}: no such stage; valid: {', '.join(PIPELINE)}{nearest(name, PIPELINE)}")
 
 
 def _check_scene(name: str) -> None:

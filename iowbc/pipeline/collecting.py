@@ -16,6 +16,7 @@ from iowbc.pipeline.results import shown_path
 from iowbc.pipeline.store import Store
 from iowbc.pipeline.wording import size
 from iowbc.pipeline.workspace import unfinished
+from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.problems import UsageError, nearest
 
 REMOVING = ".removing-"
@@ -47,6 +48,8 @@ def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None
             "gc removes only what it is told to: --unused (artifacts that no recipe used last), --recipe NAME, "
             "--work (unfinished stages), --damaged; --older-than DAYS narrows it, --dry-run only lists"
         )
+    if store.runs.root.exists() and not dry_run:
+        require_writable_runs(store.runs)
     total = 0
     for path in dict.fromkeys(_doomed(store, scope)):
         if time.time() - path.stat().st_mtime < scope.older_than * DAY:

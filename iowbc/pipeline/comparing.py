@@ -1,5 +1,6 @@
 """`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from rich.console import Console
 from iowbc.pipeline.naming import Named, named
 from iowbc.pipeline.results import shown_path
 from iowbc.pipeline.store import Store
+from iowbc.pipeline.writability import require_writable
 from iowbc.recipe.problems import UsageError
 
 TRIALS = "trials.parquet"
@@ -18,7 +20,7 @@ def compare(store: Store, console: Console, words: Sequence[str], output: Path) 
     found = [named(store, word) for word in words]
     if len(found) < 2:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
-    output.mkdir(parents=True, exist_ok=True)
+    require_writable(output, "--output")
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = [run for run in found if _trials(run).is_file()]
     if len(tried) > 1:
@@ -53,9 +55,11 @@ def _report(runs: Sequence[Named], output: Path) -> None:
     from iowbc.evaluation.report import write_report
 
     trials = [pd.read_parquet(_trials(run)) for run in runs]
-    labels = [label for table in trials for label in table["variant"].unique()]
-    if len(set(labels)) < len(labels):
-        trials = [table.assign(variant=run.word) for table, run in zip(trials, runs, strict=True)]
+    labels = Counter(label for table in trials for label in table["variant"].unique())
+    trials = [
+        table.assign(variant=run.word) if any(labels[label] > 1 for label in table["variant"].unique()) else table
+        for table, run in zip(trials, runs, strict=True)
+    ]
     rates = {run.artifacts["eval"].ingredients["recipe"]["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:
         raise UsageError(

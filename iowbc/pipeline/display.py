@@ -35,6 +35,8 @@ class StageView:
     def progress(self, done: float, total: float, note: str) -> None:
         """The stage is at `done` of `total`, in units of its own."""
         moment = time.monotonic()
+        if done < self.done or total != self.total:
+            self._marks.clear()
         self.done, self.total, self.note = done, total, note
         self._marks.append((moment, done))
         while len(self._marks) > 2 and moment - self._marks[0][0] > RATE_WINDOW:

@@ -1,18 +1,20 @@
-"""What each recipe used last: the artifacts that a plan compares with and `status` shows."""
+"""What each recipe used last: the artifacts that `status` and `show` tell of and `gc` keeps."""
 
 import json
+import shlex
 import time
+from pathlib import Path
 from typing import Any
 
 from iowbc.pipeline.layout import Runs, read_json, write_atomically
-from iowbc.pipeline.store import Artifact, Damaged, Store
 from iowbc.recipe.loading import LoadedRecipe
+from iowbc.recipe.problems import UsageError
 
 
 def remember(runs: Runs, loaded: LoadedRecipe, stage: str, key: str) -> None:
     """Record that a recipe's stage has this artifact now."""
-    path = runs.recipes / f"{loaded.recipe.name}.json"
-    record = recall(runs, loaded.recipe.name)
+    path = record_path(runs, loaded.recipe.name)
+    record = _record(path) or {}
     record["file"] = str(loaded.file)
     record["overrides"] = list(loaded.overrides)
     record["recipe"] = loaded.recipe.model_dump(mode="json")
@@ -21,21 +23,38 @@ def remember(runs: Runs, loaded: LoadedRecipe, stage: str, key: str) -> None:
 
 
 def recall(runs: Runs, recipe: str) -> dict[str, Any]:
-    """The record of a recipe by name; empty where it never finished a stage."""
-    record = read_json(runs.recipes / f"{recipe}.json")
-    return record if isinstance(record, dict) else {}
+    """The record of a recipe by name; empty where it never finished a stage. Raises `UsageError` where damaged."""
+    path = record_path(runs, recipe)
+    record = _record(path)
+    if record is None and path.exists():
+        raise UsageError(f"{path} is damaged; run the recipe again to remake it")
+    return record or {}
 
 
-def previous(store: Store, recipe: str, stage: str) -> Artifact | None:
-    """The artifact that this recipe used last for a stage; else the newest of that stage, whoever made it."""
-    key = recall(store.runs, recipe).get("stages", {}).get(stage, {}).get("key")
-    if key:
-        try:
-            artifact = store.find(stage, key)
-        except Damaged:
-            artifact = None
-        if artifact is not None:
-            return artifact
-    artifacts = store.artifacts(stage)
-    own = [artifact for artifact in artifacts if artifact.manifest.recipe == recipe]
-    return (own or artifacts or [None])[-1]  # type: ignore[list-item]
+def record_path(runs: Runs, recipe: str) -> Path:
+    """Where the record of a recipe stands."""
+    return runs.recipes / f"{recipe}.json"
+
+
+def remaking(runs: Runs, recipe: str) -> str:
+    """The command that brings about what a recipe lacks."""
+    record = _record(record_path(runs, recipe)) or {}
+    words = ["iowbc", "run", str(record.get("file", f"{recipe}.yaml"))]
+    for override in record.get("overrides", []):
+        words += ["--set", str(override)]
+    if runs.root != Path("runs"):
+        words += ["--runs", str(runs.root)]
+    return shlex.join(words)
+
+
+def _record(path: Path) -> dict[str, Any] | None:
+    """A record that is whole, or None."""
+    record = read_json(path)
+    if not isinstance(record, dict) or not isinstance(record.get("recipe"), dict):
+        return None
+    stages = record.get("stages")
+    if not isinstance(stages, dict) or not all(
+        isinstance(use, dict) and {"key", "time"} <= use.keys() for use in stages.values()
+    ):
+        return None
+    return record

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 
@@ -10,14 +11,20 @@ from rich.console import Console
 from iowbc.pipeline.delivery import client, set_up
 from iowbc.pipeline.layout import Runs
 from iowbc.pipeline.tracking import backlog, start_sender
+from iowbc.pipeline.writability import require_writable_runs
+from iowbc.recipe.problems import UsageError
 
 HOST = "127.0.0.1"
+LAST_PORT = 65_535
 
 
 def serve(runs: Runs, console: Console, port: int) -> int:
-    """Serve until interrupted; returns the server's exit code."""
+    """Serve until interrupted; returns the server's exit code. Raises `UsageError` where it cannot begin."""
+    require_writable_runs(runs)
+    if not _free(port):
+        other = next((other for other in range(port + 1, LAST_PORT + 1) if _free(other)), None)
+        raise UsageError(f"port {port} is taken; try --port {other or 'with another number'}")
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    runs.root.mkdir(parents=True, exist_ok=True)
     uri = f"sqlite:///{runs.database.absolute()}"
     with set_up(runs):
         client(uri).search_experiments(max_results=1)
@@ -32,3 +39,14 @@ def serve(runs: Runs, console: Console, port: int) -> int:
             return server.wait()
         finally:
             server.terminate()
+
+
+def _free(port: int) -> bool:
+    """Whether a server may listen on a port of this machine."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError:
+            return False
+    return True

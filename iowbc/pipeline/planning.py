@@ -1,13 +1,12 @@
 """What would run, and why."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import iowbc
 from iowbc.pipeline.fingerprint import code_digests, data_digest, folder_digest
-from iowbc.pipeline.history import previous
 from iowbc.pipeline.store import Artifact, Damaged, Store
 from iowbc.pipeline.trees import MISSING, differences, nested
 from iowbc.pipeline.workspace import Workspace
@@ -44,7 +43,7 @@ class Step:
     damage: str = ""
     """What is wrong with the stored artifact with this key."""
     expected: float | None = None
-    """Time that it took last [s]."""
+    """Time that it took with the same values, the seed aside [s]; None where it never ran with them."""
     code: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -81,6 +80,10 @@ class Planner:
                     text = f"key 'stages': {stage.name} reads {wanted}, which is not among them: {', '.join(names)}"
                     raise RecipeError([Problem(self.loaded.place("stages"), text)])
         last = names.index(self.options.until) if self.options.until else len(names) - 1
+        late = [name for name in names[last + 1 :] if name in self.options.force]
+        if late:
+            text = f"{', '.join(late)} comes after {self.options.until}, where --until ends the run; leave one out"
+            raise RecipeError([Problem(f"--force {late[0]}", text)])
         return stages[: last + 1]
 
     def plan(self) -> list[Step]:
@@ -88,7 +91,9 @@ class Planner:
         steps: dict[str, Step] = {}
         for stage in self.stages:
             inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
-            steps[stage.name] = self.decide(stage, inputs)
+            step = self.decide(stage, inputs)
+            unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
+            steps[stage.name] = replace(step, expected=None) if unknown else step
         return list(steps.values())
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
@@ -98,8 +103,6 @@ class Planner:
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> Step:
         """What is to be done for a stage whose inputs are these; None is an input that would be made anew."""
         code = stage_code(stage)
-        former = previous(self.store, self.loaded.recipe.name, stage.name)
-        expected = former.manifest.seconds if former else None
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {
             "stage": stage.name,
@@ -108,10 +111,10 @@ class Planner:
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
+        former = self._closest(stage.name, ingredients)
+        expected = former.manifest.seconds if former and _as_long(former.ingredients, ingredients) else None
         if unknown:
-            reasons = self._differences(ingredients, former)
-            if former is not None:
-                reasons += [f"{name} is made anew" for name in unknown]
+            reasons = self._reasons(ingredients, former, unknown)
             return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
         key = data_digest(ingredients)
         damage = ""
@@ -130,7 +133,7 @@ class Planner:
         if damage:
             found.append(f"damaged: {damage}")
         elif artifact is None:
-            found.extend(self._differences(ingredients, former) or ["nothing stored yet"])
+            found.extend(self._reasons(ingredients, former, ()))
         else:
             expected = artifact.manifest.seconds
             changed = changed_code(artifact.manifest.code, code)
@@ -150,26 +153,44 @@ class Planner:
             share = f", {100 * float(record.get('done', 0.0)) / total:.0f} %" if total else ""
             yield f"goes on from attempt {record.get('attempts', 1)}{share}"
 
-    def _differences(self, ingredients: Mapping[str, Any], former: Artifact | None) -> list[str]:
-        """How a key's ingredients differ from those of an earlier artifact, each with its place in the recipe."""
+    def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
+        """The stored artifact of a stage that differs least; of several this recipe's own, then the newest."""
+
+        def distance(artifact: Artifact) -> tuple[int, bool, float]:
+            count = len(list(self._differences(ingredients, artifact.ingredients)))
+            return count, artifact.manifest.recipe != self.loaded.recipe.name, -artifact.manifest.made
+
+        return min(self.store.artifacts(stage), key=distance, default=None)
+
+    def _reasons(self, ingredients: Mapping[str, Any], former: Artifact | None, unknown: Sequence[str]) -> list[str]:
+        """Why a stage is made: whose artifact it is compared with, inputs made anew, then all that differs."""
         if former is None:
             return ["nothing stored yet"]
-        old = former.ingredients
-        texts = []
+        found = list(self._differences(ingredients, former.ingredients))
+        texts = [f"{name} is made anew" for name in unknown] + found
+        if found and former.manifest.recipe != self.loaded.recipe.name:
+            texts.insert(0, f"compared with recipe {former.manifest.recipe}")
+        return texts or ["nothing stored yet"]
+
+    def _differences(self, ingredients: Mapping[str, Any], old: Mapping[str, Any]) -> Iterator[str]:
+        """How a key's ingredients differ from earlier ones, each with its place in the recipe."""
         for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
-            texts.append(f"{path} ({self.loaded.place(path)}): {_shown(before)} -> {_shown(after)}")
+            yield f"{path} ({self.loaded.place(path)}): {_shown(before)} -> {_shown(after)}"
         if old.get("version") != ingredients["version"]:
-            texts.append(f"stage version {old.get('version')} -> {ingredients['version']}")
+            yield f"stage version {old.get('version')} -> {ingredients['version']}"
         if old.get("robot") != ingredients["robot"]:
-            texts.append("the robot's files changed")
+            yield "the robot's files changed"
         old_inputs = old.get("inputs", {})
         for name, digest in ingredients["inputs"].items():
             if digest is not None and old_inputs.get(name) != digest:
-                texts.append(f"{name} changed" if name in old_inputs else f"{name} is read now")
-        texts.extend(f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
-        if texts and former.manifest.recipe != self.loaded.recipe.name:
-            texts.append(f"compared with that of recipe {former.manifest.recipe}")
-        return texts
+                yield f"{name} changed" if name in old_inputs else f"{name} is read now"
+        yield from (f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
+
+
+def _as_long(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Whether a stage takes about the time that it took with other ingredients: only the seed and contents differ."""
+    changed = differences(nested(old.get("recipe", {})), nested(new["recipe"]))
+    return old.get("version") == new["version"] and all(path == "seed" for path, _, _ in changed)
 
 
 def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:

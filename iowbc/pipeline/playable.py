@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from rich.console import Console
 
+from iowbc.pipeline.history import remaking
 from iowbc.pipeline.naming import named
-from iowbc.pipeline.store import RECIPE, Artifact, Store
+from iowbc.pipeline.store import RECIPE, Artifact, Damaged, Store
 from iowbc.recipe.problems import UsageError
 
 if TYPE_CHECKING:
@@ -24,6 +25,11 @@ def play_word(
 ) -> int:
     """Play what a word names; `settings` are those of `iowbc.evaluation.playing.play`. Returns the exit code."""
     artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
+    generator = None
+    if artifact is not None:
+        generator = _generator(store, artifact)
+        for read in filter(None, (artifact, generator)):
+            _check_whole(store, read)
 
     from iowbc.deploy.contract import ContractBroken
     from iowbc.evaluation.playing import NoDisplay, exported_source, play
@@ -34,7 +40,7 @@ def play_word(
         if artifact is None or artifact.manifest.stage == "export":
             source = exported_source(artifact.folder if artifact is not None else Path(word))
         else:
-            source = _source(store, artifact)
+            source = _source(artifact, generator)
         result = play(source, video=video, **settings)
     except (NoDisplay, NoRenderer, ContractBroken) as error:
         raise UsageError(str(error)) from error
@@ -59,19 +65,36 @@ def playable(store: Store, word: str, stage: str | None) -> Artifact:
     return found.artifacts[stage or ready[0]]
 
 
-def _source(store: Store, artifact: Artifact) -> "Source":
+def _check_whole(store: Store, artifact: Artifact) -> None:
+    """Raises `UsageError` where a file of an artifact is not what was published."""
+    try:
+        store.verify(artifact)
+    except Damaged as error:
+        raise UsageError(
+            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact.manifest.recipe)}"
+        ) from None
+
+
+def _generator(store: Store, artifact: Artifact) -> Artifact | None:
+    """The reference generator that a policy was trained on; None for an export, which holds its own, or without one."""
+    digest = artifact.ingredients.get("inputs", {}).get("rg-fit")
+    if artifact.manifest.stage == "export" or digest is None:
+        return None
+    generator = next((found for found in store.artifacts("rg-fit") if found.manifest.digest == digest), None)
+    if generator is None:
+        raise UsageError(
+            f"the reference generator (content {digest[:12]}) that {artifact.manifest.stage} "
+            f"{artifact.manifest.key[:12]} was trained on is no longer stored; run its recipe again"
+        )
+    return generator
+
+
+def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
     from iowbc.evaluation.playing import Source
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
 
     recipe = Recipe.model_validate(yaml.safe_load((artifact.folder / RECIPE).read_text(encoding="utf-8")))
-    digest = artifact.ingredients.get("inputs", {}).get("rg-fit")
-    generator = next((found for found in store.artifacts("rg-fit") if found.manifest.digest == digest), None)
-    if digest is not None and generator is None:
-        raise UsageError(
-            f"the reference generator (content {digest[:12]}) that {artifact.manifest.stage} "
-            f"{artifact.manifest.key[:12]} was trained on is no longer stored; run its recipe again"
-        )
     folder = robot_folder(recipe.robot)
     return Source(recipe, folder, generator.folder if generator is not None else None, artifact.folder)

@@ -113,6 +113,7 @@ class Runner:
         resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code))
         view.state, view.note = "runs", short(step.notes or step.reasons, 1)
         self.display.changed(view)
+        view.note = ""
         changed = changed_code(earlier, step.code)
         if resumed and changed:
             self.display.say(f"{stage.name}: code changed since its first attempt: {', '.join(changed)}")

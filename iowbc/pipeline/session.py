@@ -19,6 +19,7 @@ from iowbc.pipeline.stopping import StopRequest
 from iowbc.pipeline.store import Store
 from iowbc.pipeline.tracking import Tracker, backlog
 from iowbc.pipeline.wording import KEY_LENGTH, duration, short
+from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.problems import Problem, RecipeError
 from iowbc.stages.contract import Interrupted, Stage
@@ -58,6 +59,7 @@ class Request:
 
 def prepared(request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
     """The planner of a request and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
+    from iowbc.pipeline.suitability import check_against_robot
     from iowbc.robot.description import robot_folder
 
     loaded = load_recipe(request.file, request.overrides)
@@ -65,6 +67,7 @@ def prepared(request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, 
         robot = robot_folder(loaded.recipe.robot)
     except FileNotFoundError as error:
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
+    check_against_robot(loaded, robot)
     return Planner(loaded, registry, Store(request.runs), robot, request.options), robot
 
 
@@ -79,17 +82,20 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> i
         table.add_row(*_row(step))
     console.print(table)
     missing = [step for step in steps if not step.cached]
+    count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
     known = [step.expected for step in missing if step.expected is not None]
     if not missing:
         console.print("all stages are cached", highlight=False)
-    elif known:
-        rest = "" if len(known) == len(missing) else f", and {len(missing) - len(known)} stages of unknown length"
-        console.print(f"{len(missing)} stages would run: about {duration(sum(known))}{rest}", highlight=False)
+    else:
+        rest = len(missing) - len(known)
+        parts = [f"about {duration(sum(known))}"] if known else []
+        parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
+        console.print(f"{count}: {', and '.join(parts)}", highlight=False)
     return DONE
 
 
 def _row(step: Step) -> tuple[str | Text, ...]:
-    """Stage, what is planned for it, why, and the time it took last."""
+    """Stage, what is planned for it, why, and the time that it takes."""
     if step.cached:
         why = "\n".join(step.notes) or (step.key or "")[:KEY_LENGTH]
         return step.stage.name, Text("cached", style="cyan"), Text(why), ""
@@ -100,6 +106,7 @@ def _row(step: Step) -> tuple[str | Text, ...]:
 def run(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`."""
     planner, robot = prepared(request, registry)
+    require_writable_runs(request.runs)
     loaded = planner.loaded
     tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
     runner: Runner | None = None

@@ -1,8 +1,8 @@
 """On-policy distillation of the teacher into the student (paper eq. 7)."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field, PositiveInt
+from pydantic import Field, PositiveInt, model_validator
 
 from iowbc.recipe.section import Section
 
@@ -42,3 +42,9 @@ class Distillation(Section):
     """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales the error."""
     checkpoint_every: int = Field(default=50, ge=1)
     """Rounds between two checkpoints."""
+
+    @model_validator(mode="after")
+    def _batch_fits(self) -> Self:
+        if self.batch > self.buffer:
+            raise ValueError(f"batch ({self.batch}) is larger than buffer ({self.buffer})")
+        return self

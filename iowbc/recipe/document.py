@@ -67,7 +67,8 @@ def _read(text: str, place_of: PlaceOf, root: str) -> Located:
         node = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        raise RecipeError([Problem(place_of(mark) if mark else root, f"not valid YAML: {error.problem}")]) from None
+        reason = "a tab; indent with spaces" if mark and _is_tab(text, mark) else error.problem
+        raise RecipeError([Problem(place_of(mark) if mark else root, f"not valid YAML: {reason}")]) from None
     except yaml.YAMLError as error:
         raise RecipeError([Problem(root, f"not valid YAML: {error}")]) from None
     if node is None:
@@ -77,6 +78,12 @@ def _read(text: str, place_of: PlaceOf, root: str) -> Located:
     if builder.problems:
         raise RecipeError(builder.problems)
     return tree
+
+
+def _is_tab(text: str, mark: yaml.Mark) -> bool:
+    """Whether a mark of PyYAML's stands at a tab."""
+    lines = text.splitlines()
+    return mark.line < len(lines) and lines[mark.line][mark.column : mark.column + 1] == "\t"
 
 
 class _Builder:

@@ -55,7 +55,8 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
         raise RecipeError([Problem(place, f"recipes extend each other in a circle: {' -> '.join((*above, file))}")])
     tree = read_document(_text(file, place), file)
     if tree.value is None:
-        return Located({}, tree.place)
+        text = "is empty; write at least one line, for example `description: what this tries` or `extends: full.yaml`"
+        raise RecipeError([Problem(tree.place, text)])
     if not isinstance(tree.value, dict):
         raise RecipeError([Problem(tree.place, "a recipe is a mapping, `key: value` on each line")])
     entries = dict(tree.value)

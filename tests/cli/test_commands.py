@@ -54,6 +54,12 @@ def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
         (["show", "first/nothing"], "finished: rg-dataset, rg-fit"),
         (["diff", "first", "thrid"], "neither a recipe that has run"),
         (["compare", "first"], "two or more"),
+        (["run", "first.yaml", "--runs", "first.yaml"], "first.yaml cannot be written: it is not a folder"),
+        (["gc", "--unused", "--runs", "first.yaml"], "give another folder with --runs"),
+        (["compare", "first", "second", "--output", "first.yaml"], "give another folder with --output"),
+        (["ui", "--runs", "first.yaml"], "first.yaml cannot be written"),
+        (["run", "first.yaml", "--until", "rg-fit", "--force", "teacher"], "teacher comes after rg-fit"),
+        (["ls", "techer"], "did you mean 'teacher'?"),
         (["gc"], "--unused"),
         (["gc", "--recipe", "frist"], "did you mean 'first'?"),
         (["play", "first/eval"], "stages that leave one: export, distill, teacher"),
@@ -84,7 +90,7 @@ def test_a_dry_run_is_a_plan(folder: Path, command: Command) -> None:
     done = command("run", "first.yaml", "--dry-run", "--set", "eval.trials=9")
     assert done.returncode == 0
     assert "eval.trials (--set eval.trials=9): 5 -> 9" in " ".join(done.stdout.split())
-    assert "1 stages would run" in done.stdout
+    assert "1 stage would run" in done.stdout
     assert sorted(folder.rglob("*")) == before
 
 
@@ -183,3 +189,25 @@ def test_an_artifact_and_its_tables_are_opened_from_python(folder: Path) -> None
         artifact.table("nothing")
     with pytest.raises(UsageError, match="first/teacher"):
         open_artifact("first", folder / "runs")
+
+
+def test_a_damaged_record_of_a_recipe_is_named_and_keeps_gc_from_removing(folder: Path, command: Command) -> None:
+    record = folder / "runs" / "recipes" / "first.json"
+    record.write_text(record.read_text()[:40])
+    arguments = (["show", "first"], ["diff", "first", "second"], ["play", "first"], ["gc", "--unused"])
+    for done in (command(*words) for words in arguments):
+        assert done.returncode == 2
+        assert done.stderr == "runs/recipes/first.json is damaged; run the recipe again to remake it\n"
+    assert command("run", "first.yaml").stdout.count(": cached") == 6
+    assert command("gc", "--unused").stdout == "0 B in all\n"
+
+
+@pytest.mark.parametrize("stage", ["teacher", "rg-fit"])
+def test_a_damaged_policy_or_generator_is_not_played(folder: Path, command: Command, key: Key, stage: str) -> None:
+    damaged = folder / "runs" / "store" / stage / key("second", stage)
+    (damaged / "result.json").write_text('{"seed": 8, "started_at": 0}')
+    done = command("play", "second/teacher")
+    assert done.returncode == 2
+    assert f"{damaged.relative_to(folder)} is damaged: result.json differs from its digest" in done.stderr
+    assert "to make it anew: iowbc run " in done.stderr
+    assert "Traceback" not in done.stderr

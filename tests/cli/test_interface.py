@@ -19,6 +19,17 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+def test_a_taken_port_is_refused_with_a_free_one(tmp_path: Path) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = int(other.getsockname()[1])
+        words = [sys.executable, "-m", "iowbc.cli", "ui", "--port", str(port), "--runs", str(tmp_path / "runs")]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"port {port} is taken; try --port ")
+
+
 @pytest.mark.slow
 def test_the_interface_answers_and_ends(tmp_path: Path) -> None:
     port = free_port()

@@ -28,6 +28,18 @@ def test_rate_and_time_left_follow_the_progress(monkeypatch: pytest.MonkeyPatch)
     assert (view.rate, view.left, view.share) == (100.0, 6.0, 0.4)
 
 
+def test_a_new_phase_begins_a_new_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 2.0, 4.0, 6.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    view = StageView("rg-dataset")
+    for done in (0, 900):
+        view.progress(done, 1000, "labels")
+    view.progress(0, 50, "map")
+    assert view.rate is None
+    view.progress(10, 50, "map")
+    assert view.rate == 5.0
+
+
 def test_a_long_curve_is_thinned() -> None:
     view = StageView("teacher")
     for value in range(5 * CURVE_POINTS):

@@ -92,7 +92,11 @@ def test_changed_robot_files_rerun_everything(workplace: Workplace) -> None:
 def test_a_new_recipe_is_compared_with_its_own_kind_and_says_whose(workplace: Workplace) -> None:
     workplace.run()
     steps = workplace.plan("name=other", "seed=4")
-    assert steps["teacher"].reasons[:2] == ("seed (--set seed=4): 3 -> 4", "compared with that of recipe small")
+    assert steps["teacher"].reasons == (
+        "compared with recipe small",
+        "rg-fit is made anew",
+        "seed (--set seed=4): 3 -> 4",
+    )
     assert steps["eval"].reasons == ("distill is made anew",)
 
 
@@ -120,10 +124,45 @@ def test_a_stage_whose_input_the_recipe_leaves_out_is_named_with_its_line(workpl
         workplace.plan()
 
 
-def test_the_expected_time_is_that_of_the_last_run(workplace: Workplace) -> None:
+def test_it_is_compared_with_the_artifact_that_differs_least(workplace: Workplace) -> None:
+    workplace.run("name=near", "teacher.gamma=0.9", "teacher.steps=8192")
+    workplace.run()
+    near = workplace.plan("teacher.gamma=0.9", "teacher.steps=8192", "teacher.hidden=[8]")["teacher"].reasons
+    assert near[0] == "compared with recipe near"
+    assert [reason.split()[0] for reason in near[1:]] == ["teacher.hidden"]
+
+
+def test_of_two_equally_near_artifacts_the_recipes_own_is_taken(workplace: Workplace) -> None:
+    workplace.run()
+    workplace.run("name=other", "eval.trials=7")
+    assert workplace.plan("eval.trials=9")["eval"].reasons == ("eval.trials (--set eval.trials=9): 5 -> 9",)
+
+
+def test_what_is_made_anew_comes_before_a_long_list_of_changes(workplace: Workplace) -> None:
+    workplace.run()
+    reasons = workplace.plan("name=other", "seed=4", "distill.steps=9", "distill.rollout=8")["distill"].reasons
+    assert reasons[:3] == ("compared with recipe small", "rg-fit is made anew", "teacher is made anew")
+
+
+def test_the_expected_time_is_that_of_the_last_run_with_the_same_values(workplace: Workplace) -> None:
     made = workplace.run()
-    step = workplace.plan("eval.trials=9")["eval"]
-    assert step.expected == made["eval"].manifest.seconds
+    assert workplace.plan("seed=4")["teacher"].expected == made["teacher"].manifest.seconds
+
+
+def test_no_time_is_promised_for_other_values_nor_behind_them(workplace: Workplace) -> None:
+    workplace.run()
+    steps = workplace.plan("teacher.steps=8192")
+    assert {name for name, step in steps.items() if not step.cached and step.expected is None} == {
+        "teacher",
+        "distill",
+        "eval",
+        "export",
+    }
+
+
+def test_forcing_a_stage_behind_the_end_of_the_run_is_refused(workplace: Workplace) -> None:
+    with pytest.raises(RecipeError, match="teacher comes after rg-fit, where --until ends the run"):
+        workplace.plan(until="rg-fit", force=frozenset({"teacher"}))
 
 
 @pytest.fixture

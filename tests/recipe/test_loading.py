@@ -34,8 +34,23 @@ def test_a_shipped_recipe_is_valid(path: Path) -> None:
     assert load_recipe(path).recipe.name
 
 
-def test_an_empty_recipe_is_all_defaults_under_its_files_name(tmp_path: Path) -> None:
-    recipe = loaded(tmp_path, "").recipe
+def test_an_empty_recipe_is_refused(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "# nothing yet\n")
+    assert text.startswith("mine.yaml:1:1: is empty")
+
+
+def test_a_tab_is_named(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "teacher:\n\tsteps: 3\n")
+    assert text == "mine.yaml:2:1: not valid YAML: a tab; indent with spaces"
+
+
+def test_a_batch_that_the_buffer_never_holds_is_refused(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "distill: {batch: 64, buffer: 32}\n")
+    assert "batch (64) is larger than buffer (32)" in text
+
+
+def test_a_recipe_with_one_line_is_all_defaults_under_its_files_name(tmp_path: Path) -> None:
+    recipe = loaded(tmp_path, "description: none\n").recipe
     assert recipe.name == "mine"
     assert recipe.stages[0] == "rg-dataset"
 
@@ -109,7 +124,7 @@ def test_recipes_that_extend_each_other_in_a_circle_are_refused(tmp_path: Path) 
 
 
 def test_a_missing_file_lists_the_recipes_beside_it(tmp_path: Path) -> None:
-    write(tmp_path, "", "full.yaml")
+    write(tmp_path, "seed: 1\n", "full.yaml")
     with pytest.raises(RecipeError, match=r"no such file; recipes in .*: full.yaml; did you mean 'full.yaml'\?"):
         load_recipe(tmp_path / "ful.yaml")
 
@@ -121,16 +136,16 @@ def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -
 
 
 def test_an_override_reaches_into_a_list_that_is_a_default(tmp_path: Path) -> None:
-    before = loaded(tmp_path, "").recipe.eval.sequence
-    after = loaded(tmp_path, "", "eval.sequence.1.duration=1.25").recipe.eval.sequence
+    before = loaded(tmp_path, "seed: 1\n").recipe.eval.sequence
+    after = loaded(tmp_path, "seed: 1\n", "eval.sequence.1.duration=1.25").recipe.eval.sequence
     assert after[1].duration == 1.25
     assert after[:1] + after[2:] == before[:1] + before[2:]
 
 
 def test_a_wrong_override_is_told_like_a_wrong_line(tmp_path: Path) -> None:
-    (text,) = problems(tmp_path, "", "teacher.step=5")
+    (text,) = problems(tmp_path, "seed: 1\n", "teacher.step=5")
     assert text.startswith("--set teacher.step=5: key 'teacher.step' = 5: is not a key of 'teacher'")
-    (text,) = problems(tmp_path, "", "teacher.steps")
+    (text,) = problems(tmp_path, "seed: 1\n", "teacher.steps")
     assert "should read a.b.c=value" in text
     (text,) = problems(tmp_path, "stages: [teacher]\n", "stages.3=eval")
     assert text == "--set stages.3=eval: '3' is not an index of 'stages'; valid: 0 to 0"

@@ -1,0 +1,44 @@
+"""Whether a folder can be written, asked before work begins."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from iowbc.pipeline.layout import Runs
+from iowbc.recipe.problems import UsageError
+
+
+def require_writable_runs(runs: Runs) -> None:
+    """Make the folder of runs where it is missing. Raises `UsageError` where it, or a part of it, cannot be written."""
+    parts = (runs.store, *runs.store.glob("*"), runs.work, runs.damaged, runs.locks, runs.recipes, runs.tracking)
+    reason = _obstacle(runs.root) or next(filter(None, map(_closed, parts)), "")
+    if reason:
+        raise UsageError(f"{runs.root} cannot be written: {reason}; give another folder with --runs")
+
+
+def require_writable(folder: Path, option: str) -> None:
+    """Make a folder that an option names. Raises `UsageError` where it cannot be written."""
+    reason = _obstacle(folder)
+    if reason:
+        raise UsageError(f"{folder} cannot be written: {reason}; give another folder with {option}")
+
+
+def _obstacle(folder: Path) -> str:
+    """Why no file can be made in a folder, which is made where it is missing; empty where one can."""
+    if folder.exists() and not folder.is_dir():
+        return "it is not a folder"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=".writable-"):
+            return ""
+    except OSError as error:
+        return error.strerror or str(error)
+
+
+def _closed(part: Path) -> str:
+    """Why an existing part of the runs is closed to this user; empty where it is open or not there."""
+    if not part.exists():
+        return ""
+    if not part.is_dir():
+        return f"{part} is not a folder"
+    return "" if os.access(part, os.R_OK | os.W_OK | os.X_OK) else f"{part} belongs to another user or is read-only"

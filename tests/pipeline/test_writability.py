@@ -1,0 +1,32 @@
+"""A folder that cannot be written is refused before work begins, with the reason and the remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from iowbc.pipeline.layout import Runs
+from iowbc.pipeline.writability import require_writable_runs
+from iowbc.recipe.problems import UsageError
+
+
+def test_a_missing_folder_is_made_and_nothing_is_left_in_it(tmp_path: Path) -> None:
+    require_writable_runs(Runs(tmp_path / "new" / "runs"))
+    assert list((tmp_path / "new" / "runs").iterdir()) == []
+
+
+def test_a_file_in_its_place_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="file cannot be written: it is not a folder; give another folder with --runs"):
+        require_writable_runs(Runs(tmp_path / "file"))
+
+
+def test_a_file_above_it_or_in_place_of_a_part_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "store").write_text("")
+    for root in (tmp_path, tmp_path / "store" / "below"):
+        with pytest.raises(UsageError, match=r"cannot be written: .*ot a (folder|directory)"):
+            require_writable_runs(Runs(root))
+
+
+def test_a_folder_where_the_system_lets_nobody_write_is_refused() -> None:
+    with pytest.raises(UsageError, match="/proc/v1 cannot be written: "):
+        require_writable_runs(Runs(Path("/proc/v1")))
