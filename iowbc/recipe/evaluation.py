@@ -160,7 +160,7 @@ class Evaluation(Section):
     """Trials per mass; trial k of every mass and variant has the same seed."""
     seed: int = Field(default=1000, ge=0)
     """Seed of the first trial; apart from the seed of training, so that no trial was met there."""
-    sequence: tuple[Segment, ...] = Field(default=STAND_WALK_TURN, min_length=1)
+    sequence: tuple[Segment, ...] = STAND_WALK_TURN
     """Commands of a trial, in order; their durations add up to the trial's."""
     lifting: Sweep | None = Sweep()
     """Masses lifted (paper's Table II); empty leaves the sweep out."""
@@ -174,6 +174,12 @@ class Evaluation(Section):
     """When a trial counts as survived."""
     video: Video = Video()
     """Short films of trials."""
+
+    @model_validator(mode="after")
+    def _commands_something(self) -> Self:
+        if not self.sequence:
+            raise ValueError("sequence: is empty; give at least one segment, or leave the key out")
+        return self
 
     @model_validator(mode="after")
     def _cases_told_apart(self) -> Self:

@@ -47,6 +47,11 @@ def test_an_evaluation_of_nothing_is_refused() -> None:
     Evaluation(lifting=None, heavy=(HeavyCase(name="tyre", scene="tyre", mass=18.0),))
 
 
+def test_an_empty_sequence_is_refused() -> None:
+    with pytest.raises(ValidationError, match="give at least one segment"):
+        Evaluation(sequence=())
+
+
 def test_a_ramp_longer_than_its_segment_is_refused() -> None:
     with pytest.raises(ValidationError, match="longer than the segment"):
         Segment(duration=1.0, ramp=2.0)
