@@ -78,7 +78,8 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     _success_panel(panels[-1], summary)
     for axes, letter in zip(panels, "abcd", strict=False):
         axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
-    figure.suptitle(PAPER_NOTE, fontsize=10)
+    if sweeps:
+        figure.suptitle(PAPER_NOTE, fontsize=10)
     _legend(figure, panels[0])
     return figure
 
