@@ -1,21 +1,23 @@
 """Tables in the paper's own form (II and III), beside its numbers, as Markdown, LaTeX and CSV."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.aggregate import load_capacity, variants_of
 from iowbc.evaluation.metrics import ERRORS
-from iowbc.evaluation.paper import TYRE_SUCCESS, reported
+from iowbc.evaluation.paper import TYRE_SUCCESS, VARIANTS, reported
 
 HEADS = {"E_alpha": "E_α [rad]", "E_h": "E_h [m]", "E_v": "E_v [m/s]", "E_psi": "E_ψ [rad]"}
 LATEX_HEADS = {"E_alpha": r"$E_{\alpha}$", "E_h": "$E_{h}$", "E_v": "$E_{v}$", "E_psi": r"$E_{\psi}$"}
 FAILS = "Fails"
 ABSENT = "–"
 TYRE_MASS = 18.0
+NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -31,50 +33,57 @@ class Table:
     """The same figures as numbers, for the CSV."""
 
 
-def sweep_table(summary: pd.DataFrame, suite: str) -> Table:
-    """Table II ("lifting") or III ("pushing"): errors by mass and variant, with survival, beside the paper's."""
+def sweep_table(summary: pd.DataFrame, suite: str, labels: Mapping[str, str] = NO_LABELS) -> Table:
+    """Table II ("lifting") or III ("pushing"): errors by mass and variant, with survival, beside the paper's.
+
+    labels: the paper's name of variants that go by another one here; where it knows none, its columns are left out.
+    """
     chosen = summary[summary["suite"] == suite]
     rows = []
+    with_paper = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
     for _, row in chosen.iterrows():
         mass, variant = float(row["mass"]), str(row["variant"])
         own = [_with_half(row[name], row[f"{name}_half"]) for name in ERRORS]
-        paper = reported(suite, mass, variant)
-        if paper == "absent":
+        paper = reported(suite, mass, labels.get(variant, variant))
+        if not with_paper:
+            theirs = []
+        elif paper == "absent":
             theirs = [ABSENT] * len(ERRORS)
         else:
             theirs = [FAILS] * len(ERRORS) if paper is None else [f"{value:.3f}" for value in paper]
         rows.append((f"{mass:g} kg", variant, *own, f"{row['survived']}/{row['trials']}", *theirs))
     number = {"lifting": "II", "pushing": "III"}.get(suite, "")
+    beside = "; right, what the paper reports for its own commands" if with_paper else ""
     return Table(
         name=suite,
         caption=f"Command tracking errors under cooperative {suite} (paper's Table {number}): means over surviving "
-        "trials with their 95 % interval; right, what the paper reports for its own commands.",
+        f"trials with their 95 % interval{beside}.",
         head=(
             "Mass",
             "Algorithm",
             *HEADS.values(),
             "Survived",
-            *(f"paper {head.split()[0]}" for head in HEADS.values()),
+            *(f"paper {head.split()[0]}" for head in HEADS.values() if with_paper),
         ),
         latex_head=(
             "Mass",
             "Algorithm",
             *LATEX_HEADS.values(),
             "Survived",
-            *(f"paper {h}" for h in LATEX_HEADS.values()),
+            *(f"paper {h}" for h in LATEX_HEADS.values() if with_paper),
         ),
         rows=tuple(rows),
         numbers=chosen,
     )
 
 
-def success_table(summary: pd.DataFrame) -> Table:
+def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table:
     """The heavy tasks: how many trials survived, with Wilson's interval, beside the paper's rate."""
     chosen = summary[summary["suite"] == "heavy"]
     rows = []
     for _, row in chosen.iterrows():
         mass, variant = float(row["mass"]), str(row["variant"])
-        paper = TYRE_SUCCESS.get(variant) if mass == TYRE_MASS else None
+        paper = TYRE_SUCCESS.get(labels.get(variant, variant)) if mass == TYRE_MASS else None
         rows.append(
             (
                 f"{row['case']} ({mass:g} kg)",

@@ -55,14 +55,16 @@ def _report(runs: Sequence[Named], output: Path) -> None:
     from iowbc.evaluation.report import write_report
 
     trials = [pd.read_parquet(_trials(run)) for run in runs]
-    labels = Counter(label for table in trials for label in table["variant"].unique())
-    trials = [
-        table.assign(variant=run.word) if any(labels[label] > 1 for label in table["variant"].unique()) else table
-        for table, run in zip(trials, runs, strict=True)
-    ]
+    counts = Counter(label for table in trials for label in table["variant"].unique())
+    labels: dict[str, str] = {}
+    for index, (table, run) in enumerate(zip(trials, runs, strict=True)):
+        own = [str(label) for label in table["variant"].unique()]
+        if any(counts[label] > 1 for label in own):
+            labels[run.word] = own[0]
+            trials[index] = table.assign(variant=run.word)
     rates = {run.artifacts["eval"].ingredients["recipe"]["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:
         raise UsageError(
             f"the recipes count a mass as carried at different rates (eval.success.capacity_rate): {rates}"
         )
-    write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()))
+    write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)

@@ -57,6 +57,14 @@ def test_the_papers_numbers_stand_beside_ours() -> None:
     assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(sweep_table(summary, "pushing"))
 
 
+def test_the_papers_numbers_are_found_by_label_and_left_out_where_it_knows_none() -> None:
+    summary = aggregate(trials_of("full", "pushing", {30.0: 5}))
+    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(sweep_table(summary, "pushing", {"full": "IO-WBC"}))
+    without = sweep_table(summary, "pushing", {"full": "mine"})
+    assert "paper E_" not in markdown(without)
+    assert {len(row) for row in without.rows} == {len(without.head)} == {len(without.latex_head)}
+
+
 def test_the_papers_tables_are_complete() -> None:
     for table in (LIFTING, PUSHING):
         assert all(tuple(row) == VARIANTS for row in table.values())
