@@ -219,7 +219,9 @@ def bench_simulation(
     _check_scene(scene)
     from iowbc.benchmarks import simulation
     from iowbc.pipeline.tracking import record_figures
+    from iowbc.pipeline.writability import require_writable_runs
 
+    require_writable_runs(_runs(runs))
     figures = simulation.main(
         given, scene=scene, environments=environments, workers=tuple(workers or ()), others=others
     )
@@ -232,7 +234,9 @@ def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, ru
     given = _given(recipe)
     from iowbc.benchmarks import reference
     from iowbc.pipeline.tracking import record_figures
+    from iowbc.pipeline.writability import require_writable_runs
 
+    require_writable_runs(_runs(runs))
     record_figures(_runs(runs), "bench-rg", reference.main(given, workers=tuple(workers or ())))
 
 

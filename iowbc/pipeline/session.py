@@ -86,9 +86,11 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> i
     known = [step.expected for step in missing if step.expected is not None]
     if not missing:
         console.print("all stages are cached", highlight=False)
+    elif not known:
+        console.print(f"{count}; how long that takes is not known", highlight=False)
     else:
         rest = len(missing) - len(known)
-        parts = [f"about {duration(sum(known))}"] if known else []
+        parts = [f"about {duration(sum(known))}"]
         parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
         console.print(f"{count}: {', and '.join(parts)}", highlight=False)
     return DONE
