@@ -39,13 +39,17 @@ def previous_checkpoint(path: Path) -> Path:
 
 
 def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> tuple[Arrays, dict[str, Any]] | None:
-    """Arrays and state of the newest whole checkpoint of this key, or None; `say` is told of damaged ones."""
+    """Arrays and state of the newest whole checkpoint of this key, or None; `say` is told of damaged ones.
+
+    They are put aside as `<name>.damaged`, lest the next save keeps one of them as the previous checkpoint.
+    """
     damaged, found = [], None
     for candidate in (path, previous_checkpoint(path)):
         try:
             found = _read(candidate, key)
         except _Damaged:
             damaged.append(candidate.name)
+            os.replace(candidate, candidate.with_name(f"{candidate.name}.damaged"))
         if found is not None:
             break
     if damaged:

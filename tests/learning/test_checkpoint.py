@@ -135,7 +135,15 @@ def test_a_damaged_checkpoint_is_named_and_the_previous_one_used(
     assert len(found[0]["x"]) == 2
     assert said == ["checkpoint checkpoint.safetensors is damaged: goes on from the previous one"]
 
+    assert (tmp_path / "checkpoint.safetensors.damaged").is_file()
+    checkpoint.save_checkpoint(path, "k", {"x": np.arange(3)}, {"rounds": 3})
+    path.unlink()
+    found = checkpoint.load_checkpoint(path, "k", said.append)
+    assert found is not None
+    assert found[1] == {"rounds": 2}, "the previous one is still the whole one"
+
     checkpoint.previous_checkpoint(path).unlink()
+    path.write_bytes(b"damaged")
     said.clear()
     assert checkpoint.load_checkpoint(path, "k", said.append) is None
     assert said == ["checkpoint checkpoint.safetensors is damaged: starts anew"]
