@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.pipeline.layout import Runs, read_json, write_atomically
+from iowbc.pipeline.store import RECIPE, Artifact
 from iowbc.recipe.loading import LoadedRecipe
 from iowbc.recipe.problems import UsageError
 
@@ -36,12 +37,15 @@ def record_path(runs: Runs, recipe: str) -> Path:
     return runs.recipes / f"{recipe}.json"
 
 
-def remaking(runs: Runs, recipe: str) -> str:
-    """The command that brings about what a recipe lacks."""
-    record = _record(record_path(runs, recipe)) or {}
-    words = ["iowbc", "run", str(record.get("file", f"{recipe}.yaml"))]
-    for override in record.get("overrides", []):
-        words += ["--set", str(override)]
+def remaking(runs: Runs, artifact: Artifact) -> str:
+    """The command that makes an artifact anew: its recipe as it was asked for, or, where that changed, as kept."""
+    made = artifact.manifest
+    record = _record(record_path(runs, made.recipe)) or {}
+    words = ["iowbc", "run", str(artifact.folder / RECIPE)]
+    if record.get("stages", {}).get(made.stage, {}).get("key") == made.key:
+        words[-1] = str(record.get("file", words[-1]))
+        for override in record.get("overrides", []):
+            words += ["--set", str(override)]
     if runs.root != Path("runs"):
         words += ["--runs", str(runs.root)]
     return shlex.join(words)

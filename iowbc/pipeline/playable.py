@@ -71,7 +71,7 @@ def _check_whole(store: Store, artifact: Artifact) -> None:
         store.verify(artifact)
     except Damaged as error:
         raise UsageError(
-            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact.manifest.recipe)}"
+            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact)}"
         ) from None
 
 
