@@ -2,6 +2,7 @@
 
 import ctypes
 import faulthandler
+import gc
 import os
 import signal
 import sys
@@ -46,6 +47,7 @@ def _serve(connection: Connection, memory: int) -> None:
         text, first, last = connection.recv()
         setup = Setup.from_json(text)
         batch = setup.batch(first, last, attach_shared(memory, setup.buffer_fields(), setup.count).rows(first, last))
+        gc.freeze()  # what lives as long as the process need not be looked through at every collection
         connection.send((True, None))
         while True:
             request, arguments = connection.recv()
