@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -11,7 +12,7 @@ import time
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 from iowbc.task import worker
@@ -94,12 +95,17 @@ class Workers:
         fields = setup.buffer_fields()
         memory, self.buffers = create_shared(fields, setup.count)
         self._members: list[Member] = []
+        self._pipes: dict[int, int] = {}
+        self._poll = select.poll()
         self._ended = weakref.finalize(self, _end, self._members, os.getpid())
         self._asked: set[int] = set()
         self._answers: list[Any] = [None for _ in self.groups]
         try:
             for _ in self.groups:
-                self._members.append(_start(memory))
+                member = _start(memory)
+                self._pipes[member.connection.fileno()] = len(self._members)
+                self._poll.register(member.connection.fileno(), select.POLLIN)
+                self._members.append(member)
             for index, ((first, last), member) in enumerate(zip(self.groups, self._members, strict=True)):
                 member.connection.send((setup.as_json(), first, last))
                 self._asked.add(index)
@@ -139,10 +145,9 @@ class Workers:
     def _wait(self, patience: float) -> None:
         left = patience
         while self._asked:
-            ready = wait([self._members[index].connection for index in self._asked], timeout=SLICE)
-            for index in sorted(self._asked):
-                if self._members[index].connection in ready:
-                    self._receive(index)
+            ready = {self._pipes[pipe] for pipe, _ in self._poll.poll(1e3 * SLICE)}
+            for index in sorted(ready & self._asked):
+                self._receive(index)
             left -= 0.0 if ready else SLICE
             if left <= 0.0 and self._asked:
                 self._fail(min(self._asked), hung=patience)
