@@ -1,6 +1,5 @@
 """Stage `distill`: the student drives, the teacher says what it would have done, the student learns it (DAgger)."""
 
-import json
 import time
 
 from iowbc.stages.contract import Interrupted, Job, Stage
@@ -144,12 +143,7 @@ def run(job: Job) -> None:
         environment.close()
 
     save_network(student, architecture, job.out, "student", {"layout": layout.describe()})
-    (job.out / "tables").mkdir()
-    (job.out / "figures").mkdir()
-    curves.write_csv(job.out / "tables" / "learning_curves.csv")
-    curves.write_figure(job.out / "figures" / "learning_curves.png", f"{recipe.name}: student", PANELS)
-    metrics = {name: curves.rows[-1][name] for name in ("step", *PANELS, "steps_per_second")}
-    (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
+    curves.write_artifact(job.out, f"{recipe.name}: student", PANELS)
 
 
 STAGE = Stage(

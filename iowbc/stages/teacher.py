@@ -2,13 +2,9 @@
 
 import math
 import time
-from typing import TYPE_CHECKING
 
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
 from iowbc.stages.inputs import generator_stage
-
-if TYPE_CHECKING:
-    from iowbc.learning.curves import Curves
 
 PANELS = (
     "episode_seconds",
@@ -104,7 +100,8 @@ def run(job: Job) -> None:
         model.save(job.out / "teacher_sb3.zip")
         if (job.work / "divergences").is_dir():
             (job.work / "divergences").rename(job.out / "divergences")
-        _write_curves(job, curves)
+        terms = sorted({name for row in curves.rows for name in row if name.startswith("reward/")})
+        curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     finally:
         environment.close()
 
@@ -120,19 +117,6 @@ class _Clock:
         rate = (steps - self.steps) / (now - self.time)
         self.steps, self.time = steps, now
         return rate
-
-
-def _write_curves(job: Job, curves: "Curves") -> None:
-    import json
-
-    (job.out / "tables").mkdir()
-    (job.out / "figures").mkdir()
-    curves.write_csv(job.out / "tables" / "learning_curves.csv")
-    terms = sorted({name for row in curves.rows for name in row if name.startswith("reward/")})
-    curves.write_figure(job.out / "figures" / "learning_curves.png", f"{job.recipe.name}: teacher", [*PANELS, *terms])
-    last = curves.rows[-1]
-    metrics = {name: last[name] for name in ("step", *PANELS, "steps_per_second") if name in last}
-    (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
 
 
 STAGE = Stage(
