@@ -44,7 +44,7 @@ class ReferenceNetwork:
         x = (x - self.input_mean) / self.input_std
         for weight, bias in self.layers[:-1]:
             x = _rowwise(x, weight) + bias
-            x = np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0)))
+            x = np.maximum(x, np.expm1(np.minimum(x, 0.0)))
         weight, bias = self.layers[-1]
         output: Array = np.clip(
             (_rowwise(x, weight) + bias) * self.output_std + self.output_mean, self.lower, self.upper

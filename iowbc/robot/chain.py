@@ -16,13 +16,20 @@ Array = NDArray[Any]
 
 PLANES = (slice(1, 3), slice(2, None, -2), slice(0, 2))
 """Components that a turn about x, y and z mixes, in the order in which the first turns towards the second."""
-QUARTER = np.array([-1.0, 1.0])[:, None, None]
 
 
 def turn(vectors: Array, axis: int, angle: Array) -> None:
     """Turns vectors (3, k, ...) in place about a coordinate axis by angles (...) [rad]."""
-    sine = np.sin(angle)
-    mix(vectors, axis, np.cos(angle), np.stack([-sine, sine])[:, None])
+    cosine, sines = cosine_and_sines(angle[None])
+    mix(vectors, axis, cosine[0], sines[0])
+
+
+def cosine_and_sines(angle: Array) -> tuple[Array, Array]:
+    """What `mix` takes, for angles (m, ...) [rad]: cosines (m, ...), and -sines and sines, (m, 2, 1, ...)."""
+    sines = np.empty((len(angle), 2, 1, *angle.shape[1:]))
+    np.sin(angle, out=sines[:, 1, 0])
+    np.negative(sines[:, 1, 0], out=sines[:, 0, 0])
+    return np.cos(angle), sines
 
 
 def mix(vectors: Array, axis: int, cosine: Array, sines: Array) -> None:
@@ -57,6 +64,7 @@ class Chain:
             self._offset[j, :, :, 0] = np.stack([body.position for body in bodies], axis=-1)
             self._before.append(_unless_identity(np.swapaxes(aside, 1, 2)))
             self._after.append(_unless_identity(fixed @ aside))
+        self._quarter = np.stack([-self._sign, self._sign], axis=1)
 
     def carry(self, angle: Array, vectors: Array, columns: int = 0) -> None:
         """Takes vectors from the last bodies' frames to the bases', in place.
@@ -64,9 +72,8 @@ class Chain:
         `angle` (hinges, chains, n) [rad]; `vectors` (3, k, chains, n), of which the last is a point and the others are
         directions. The first `columns` of them, one a hinge, are filled with the point's Jacobian instead.
         """
-        angle = angle * self._sign
-        sine, cosine = np.sin(angle), np.cos(angle)
-        sines = np.stack([-sine, sine], axis=1)[:, :, None]
+        cosine, sines = cosine_and_sines(np.multiply(angle, self._sign, order="C"))
+        vectors[:, :columns] = 0.0
         for j in reversed(range(self.length)):
             axis, plane = self._axis[j], PLANES[self._axis[j]]
             first = min(columns, j + 1)
@@ -75,8 +82,7 @@ class Chain:
             mix(carried, axis, cosine[j], sines[j])
             if columns:
                 first = j
-                vectors[axis, j] = 0.0
-                np.multiply(vectors[plane, -1][::-1], QUARTER * self._sign[j], out=vectors[plane, j])
+                np.multiply(vectors[plane, -1][::-1], self._quarter[j], out=vectors[plane, j])
             _apply(self._after[j], vectors[:, first:])
             vectors[:, -1] += self._offset[j]
 

@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Places of the components that follow x, y and z in turn, and of those that follow these."""
+
+
 def cross(a: Array, b: Array) -> Array:
     """a × b, shapes (..., 3)."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=np.result_type(a, b))
-    out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    out: Array = a.take(NEXT, axis=-1) * b.take(LAST, axis=-1)
+    out -= a.take(LAST, axis=-1) * b.take(NEXT, axis=-1)
     return out
 
 

@@ -41,10 +41,11 @@ class Blows:
         self._count[which] = 0
         self._until[which] = 0
         self.force[which] = 0.0
-        self._next[which] = self._wait(key, self._count[which])
+        self._next[which] = self._wait(random.absorb(key, self._count[which]))
 
-    def _wait(self, key: Keys, count: Indices) -> Indices:
-        seconds = random.draw(random.absorb(key, count), f"{self._name}/interval", self._interval)[:, 0]
+    def _wait(self, blow: Keys) -> Indices:
+        """Steps to the next blow, (k,), by the keys of the last ones; before the first that of the count zero."""
+        seconds = random.draw(blow, f"{self._name}/interval", self._interval)[:, 0]
         return np.maximum(np.round(seconds / self._period), self._length).astype(np.int64)
 
     def advance(self, step: Indices, key: Keys, scale: Array) -> Array:
@@ -62,17 +63,17 @@ class Blows:
         return self.force
 
     def _strike(self, which: Indices, step: Indices, key: Keys, scale: Array) -> None:
+        self._count[which] += 1
         blow = random.absorb(key[which], self._count[which])
         size = random.draw(blow, f"{self._name}/size", self._size)[:, 0]
         direction = random.normal(blow, f"{self._name}/direction", 3)
         if self._level:
             direction[:, 2] = 0.0
-        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+        direction /= np.maximum(np.sqrt(np.vecdot(direction, direction)), 1e-9)[:, None]
         impulse = size * scale[which]
         self.force[which] = direction * (impulse / (self._length * self._period))[:, None]
         self._until[which] = step[which] + self._length
-        self._count[which] += 1
-        self._next[which] = step[which] + self._wait(key[which], self._count[which])
+        self._next[which] = step[which] + self._wait(blow)
 
     def arrays(self) -> dict[str, Array]:
         """The clocks, by name."""

@@ -84,7 +84,7 @@ class Sensing:
             return
         rows[:, ROBOT.stop :] += self._object_line.read()
         quaternion = self.measured.object_quaternion
-        quaternion /= np.sqrt(np.einsum("ni,ni->n", quaternion, quaternion))[:, None]
+        quaternion /= np.sqrt(np.vecdot(quaternion, quaternion))[:, None]
 
     def _sense(self, state: SimulationState) -> None:
         robot, thing = self._robot, self._object

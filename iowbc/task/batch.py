@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.sim import random
+from iowbc.sim.layout import as_slice
 from iowbc.sim.simulation import Simulation
 from iowbc.task import gait
 from iowbc.task.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE
@@ -22,7 +23,7 @@ from iowbc.task.observation import FullLayout, Sensed, observation_layout, obser
 from iowbc.task.privileged import privileged
 from iowbc.task.recorder import Ending, count_endings, count_step, write_signals
 from iowbc.task.references import ReferenceLayer, both_wrists
-from iowbc.task.rewards.total import Scored, Step, score
+from iowbc.task.rewards.total import RewardFunction, Scored, Step
 from iowbc.task.shared import Buffers
 from iowbc.task.snapshots import by_scene, by_world
 from iowbc.task.termination import dropped, fallen
@@ -80,6 +81,7 @@ class Batch:
             fixed=fixed_values(episodes or ()),
             control_frequency=task.control_frequency,
         )
+        self._support, self._arms = as_slice(self.robot.support), as_slice(self.robot.interaction)
         self._key = random.environment_key(seeds, streams)
         self._episode_key = self._key.copy()
         scripts = [episode.script for episode in episodes] if episodes is not None else [None] * n
@@ -87,6 +89,7 @@ class Batch:
         self.memory = Memory.blank(n, len(self.robot.interaction), len(self.robot.support))
         self.memory.level[:] = initial_level(task.curriculum, n) if episodes is None else task.curriculum.fixed_level
         self._trials, self._divergences = episodes, divergences
+        self._reward = RewardFunction(task.reward, self._support, self.period)
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         self._held = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
         self._scale = self.robot.action_scale if task.action.scale is None else task.action.scale
@@ -103,8 +106,8 @@ class Batch:
         """Joint targets of an action (n, 15) in the step to come, (n, 29) [rad]: θ_S_ref + scale·a, θ_I_ref."""
         bound = self.recipe.task.action.bound
         target = np.empty((self.n, len(self.robot.joints)))
-        target[:, self.robot.support] = self.memory.support + self._scale * np.clip(action, -bound, bound)
-        target[:, self.robot.interaction] = self.memory.arms
+        target[:, self._support] = self.memory.support + self._scale * np.clip(action, -bound, bound)
+        target[:, self._arms] = self.memory.arms
         return target
 
     def reset(self, seeds: NDArray[np.uint64] | None = None) -> None:
@@ -182,9 +185,7 @@ class Batch:
             object_place=place,
             ended=ending.failed,
         )
-        return score(
-            self.recipe.task.reward, self.robot.support, self.simulation.state, moved, step, self.period
-        ).without(ending.diverged)
+        return self._reward(self.simulation.state, moved, step).without(ending.diverged)
 
     def _advance(self) -> None:
         """Command, gait clock and references of the step to come."""
@@ -263,7 +264,7 @@ class Batch:
             values[which] = 0.0
         self._height_rate[which] = 0.0
         joints = np.empty((len(which), len(self.robot.joints)))
-        joints[:, self.robot.support], joints[:, self.robot.interaction] = posture, arms
+        joints[:, self._support], joints[:, self._arms] = posture, arms
         if trials is None:
             self._hold(which, scales)
         simulation.reset(which, joints, base_pitch=self.references.start_pitch(posture, command))
@@ -289,8 +290,8 @@ class Batch:
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
         """Writes the rows of s_t and s_priv of some environments."""
         memory, measured, layout = self.memory, self.simulation.measured, self.layout
-        self._joint_reference[:, self.robot.support] = memory.support
-        self._joint_reference[:, self.robot.interaction] = memory.arms
+        self._joint_reference[:, self._support] = memory.support
+        self._joint_reference[:, self._arms] = memory.arms
         sensed = Sensed(
             command=memory.command,
             projected_gravity=measured.projected_gravity,

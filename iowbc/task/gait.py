@@ -10,6 +10,7 @@ from iowbc.recipe.references import GaitPrior
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
 
+SUPPORT_JOINTS = 15
 LEFT_LEG_PITCH = (0, 3, 4)
 """Hip pitch, knee and ankle pitch among the support joints, left leg."""
 RIGHT_LEG_PITCH = (6, 9, 10)
@@ -61,13 +62,13 @@ def expected_stance(phase: Array, stepping: Mask, stance: float) -> Mask:
 
 def swing_prior(phase: Array, stepping: Mask, gait: GaitPrior) -> Array:
     """What the gait prior adds to θ_S_ref, (n, 15) [rad]: amplitude · sin(π·progress); zero while the clock rests."""
-    added = np.zeros((len(phase), 15))
     if not gait.enabled:
-        return added
+        return np.zeros((len(phase), SUPPORT_JOINTS))
     bump = np.sin(np.pi * swing_progress(phase, gait.stance)) * stepping[:, None]
+    amplitude = np.zeros((2, SUPPORT_JOINTS))
     for foot, joints in enumerate((LEFT_LEG_PITCH, RIGHT_LEG_PITCH)):
-        for joint, amplitude in zip(joints, (gait.hip_pitch, gait.knee, gait.ankle_pitch), strict=True):
-            added[:, joint] = amplitude * bump[:, foot]
+        amplitude[foot, joints] = gait.hip_pitch, gait.knee, gait.ankle_pitch
+    added: Array = bump @ amplitude
     return added
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.task.command import COMMAND
-from iowbc.task.rewards.total import TRACKING
+from iowbc.task.rewards.total import TERMS, TRACKED
 
 Array = NDArray[Any]
 
@@ -65,7 +65,7 @@ class Memory:
         return cls(
             **counters,
             **{name: np.zeros(n) for name in scalars},
-            tracking=np.zeros((n, len(TRACKING))),
+            tracking=np.zeros((n, len(TERMS[TRACKED]))),
             stepping=np.zeros(n, np.bool_),
             command=np.zeros((n, len(COMMAND))),
             goal=np.zeros((n, len(COMMAND))),

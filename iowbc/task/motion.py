@@ -65,7 +65,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
         heading=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]),
         system_velocity=vectors[:, 0],
         base_velocity=vectors[:, 1],
-        yaw_rate=np.einsum("ni,ni->n", rotation[:, 2], state.base_angular_velocity),
+        yaw_rate=np.vecdot(rotation[:, 2], state.base_angular_velocity),
         pelvis_height=base[:, 2],
         height=base[:, 2] if height == "pelvis" else state.com_position[:, 2],
         pelvis_tilt=np.arccos(np.clip(rotation[:, 2, 2], -1.0, 1.0)),

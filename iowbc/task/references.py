@@ -43,7 +43,7 @@ class ReferenceLayer:
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
             self.feasible = FeasibleMap.load(rg / "feasible.npz")
-        self.settling = (SETTLING,) * references.arms.settling + (REFINING,) * references.arms.refining
+        self._settling, self._refining = references.arms.settling, references.arms.refining
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
@@ -70,10 +70,12 @@ class ReferenceLayer:
         command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, 14), support (n, 15).
         """
         arms = np.tile(self.default_arms, (len(command), 1))
+        target = self.wrist_target(self.support(arms, command), command, grasp)
+        for _ in range(self._settling):
+            arms = self.arms.solve_step(arms, target, SETTLING)
         support = self.support(arms, command)
-        for dt in self.settling:
-            arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt)
-            support = self.support(arms, command)
+        for _ in range(self._refining):
+            arms, support = self.advance(arms, support, command, grasp, REFINING)
         return arms, support
 
     def advance(self, arms: Array, support: Array, command: Array, grasp: Array, dt: float) -> tuple[Array, Array]:

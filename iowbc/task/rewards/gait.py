@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.task.rewards.kernel import squared_norm
+from iowbc.task.rewards.kernel import kernel, squared_norm
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
@@ -13,14 +13,14 @@ Mask = NDArray[np.bool_]
 
 def contact_timing(contact: Mask, expected: Mask) -> Array:
     """Mean over the feet of +1 where contact is as the phase asks and −1 where not, (n,); feet (n, 2)."""
-    score: Array = 2.0 * (contact == expected).mean(axis=1) - 1.0
+    score: Array = (contact == expected).sum(axis=1) * (2.0 / contact.shape[1]) - 1.0
     return score
 
 
 def swing_height(sole_height: Array, progress: Array, swinging: Mask, clearance: float, width: float) -> Array:
     """Σ over swinging feet of exp(−(z − clearance·sin(π s))²/width²), (n,); sole height z [m], progress s, (n, 2)."""
     profile = clearance * np.sin(np.pi * progress)
-    score: Array = (np.exp(-np.square((sole_height - profile) / width)) * swinging).sum(axis=1)
+    score: Array = (kernel(np.square(sole_height - profile), width) * swinging).sum(axis=1)
     return score
 
 

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 
-def kernel(squared_error: Array, width: float) -> Array:
-    """exp(−e²/width²), (n,): 1 without error, 0.37 at an error of `width`."""
-    score: Array = np.exp(-squared_error / width**2)
+def kernel(squared_error: Array, width: float | Array) -> Array:
+    """exp(−e²/width²), (n,) or (n, k): 1 without error, 0.37 at an error of `width`, one or (k,)."""
+    score: Array = np.exp(squared_error / -np.square(width))
     return score
 
 
 def squared_norm(values: Array) -> Array:
     """Sum of squares over all axes but the first, (n, ...) to (n,)."""
     flat = values.reshape(len(values), -1)
-    total: Array = np.square(flat).sum(axis=1)
+    total: Array = np.vecdot(flat, flat)
     return total

@@ -23,7 +23,7 @@ def action_rate(action: Array, previous: Array) -> Array:
 
 def power(torque: Array, velocity: Array) -> Array:
     """Σ |τ·q̇|, (n,) [W]; joints (n, 29). Braking costs as much as driving: the motors do not recover it."""
-    total: Array = np.abs(torque * velocity).sum(axis=1)
+    total: Array = np.vecdot(np.abs(torque), np.abs(velocity))
     return total
 
 
@@ -40,4 +40,5 @@ def vertical_velocity(base_velocity: Array, commanded: Array) -> Array:
 
 def saturation(saturated: Mask) -> Array:
     """Fraction of joints at their torque limit, (n,); joints (n, k)."""
-    return np.asarray(saturated.mean(axis=1), np.float64)
+    fraction: Array = saturated.sum(axis=1) / saturated.shape[1]
+    return fraction

@@ -1,40 +1,43 @@
-"""r_sync: coupled motion consistency (eq. 7), and the tracking of the rest of the command."""
+"""r_sync: coupled motion consistency (eq. 7), and the tracking of the rest of the command.
+
+Squared errors; all but the roll are scored by `kernel`.
+"""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.task.rewards.kernel import kernel, squared_norm
+from iowbc.task.rewards.kernel import squared_norm
 
 Array = NDArray[np.floating[Any]]
 
 
-def support_reference(support_position: Array, support_reference: Array, width: float) -> Array:
-    """exp(−‖θ_S − θ_S_ref‖²/width²); joints (n, 15) [rad]. The paper's first term of eq. 7."""
-    return kernel(squared_norm(support_position - support_reference), width)
+def support_reference(support_position: Array, support_reference: Array) -> Array:
+    """‖θ_S − θ_S_ref‖², (n,) [rad²]; joints (n, 15). The paper's first term of eq. 7."""
+    return squared_norm(support_position - support_reference)
 
 
-def system_velocity(velocity: Array, command: Array, width: float) -> Array:
-    """exp(−‖v_sys − v_coll‖²/width²) in the plane; (n, 2) [m/s], heading frame. The paper's second term of eq. 7."""
-    return kernel(squared_norm(velocity - command), width)
+def system_velocity(velocity: Array, command: Array) -> Array:
+    """‖v_sys − v_coll‖² in the plane, (n,) [m²/s²]; (n, 2), heading frame. The paper's second term of eq. 7."""
+    return squared_norm(velocity - command)
 
 
-def yaw_rate(rate: Array, command: Array, width: float) -> Array:
-    """exp(−(ω − ω_yaw)²/width²); filtered rate (n,) [rad/s]."""
-    return kernel(np.square(rate - command), width)
+def yaw_rate(rate: Array, command: Array) -> Array:
+    """(ω − ω_yaw)², (n,) [rad²/s²]; filtered rate (n,)."""
+    return np.square(rate - command)
 
 
-def height(pelvis_height: Array, command: Array, width: float) -> Array:
-    """exp(−(h − H)²/width²); (n,) [m]."""
-    return kernel(np.square(pelvis_height - command), width)
+def height(pelvis_height: Array, command: Array) -> Array:
+    """(h − H)², (n,) [m²]."""
+    return np.square(pelvis_height - command)
 
 
-def torso_pitch(pitch: Array, command: Array, width: float) -> Array:
-    """exp(−(α − α_pitch)²/width²); (n,) [rad]."""
-    return kernel(np.square(pitch - command), width)
+def torso_pitch(pitch: Array, command: Array) -> Array:
+    """(α − α_pitch)², (n,) [rad²]."""
+    return np.square(pitch - command)
 
 
 def torso_roll(roll: Array) -> Array:
-    """roll²; (n,) [rad²]. The command asks for none."""
+    """roll², (n,) [rad²]. The command asks for none."""
     return np.square(roll)

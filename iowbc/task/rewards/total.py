@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.reward import Reward
+from iowbc.recipe.reward import Kernel, Reward
 from iowbc.sim.state import SimulationState
-from iowbc.task.command import HEIGHT, PITCH
+from iowbc.task.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.task.motion import Motion
 from iowbc.task.rewards import gait, smooth, sync
 from iowbc.task.rewards import object as equilibrium
+from iowbc.task.rewards.kernel import kernel
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
@@ -40,8 +41,10 @@ TERMS = (
     "termination",
 )
 """Names of the terms, in the order of the columns of `Scored.terms`."""
-TRACKING = ("system_velocity", "yaw_rate", "height", "torso_pitch")
-"""The scores that say how well an environment tracks."""
+SCORED = slice(0, 5)
+"""Columns of the terms that a kernel scores; the swinging feet have a kernel each."""
+TRACKED = slice(1, 5)
+"""Columns whose scores say how well an environment tracks."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,7 @@ class Scored:
     terms: Array
     """Each term's part of the reward, (n, len(TERMS))."""
     tracking: Array
-    """The scores of `TRACKING`, between 0 and 1, (n, 4)."""
+    """The scores of the columns `TRACKED`, between 0 and 1, (n, 4)."""
 
     def without(self, which: Mask) -> "Scored":
         """The same with nothing for some environments, (n,): what they did cannot be judged."""
@@ -95,48 +98,61 @@ class Scored:
         return Scored(reward=np.where(kept, self.reward, 0.0), terms=terms, tracking=tracking)
 
 
-def score(
-    reward: Reward, support: NDArray[np.intp], state: SimulationState, motion: Motion, step: Step, dt: float
-) -> Scored:
-    """Reward of one control step of `dt` [s]; `support`: indices of the support joints."""
-    r_sync, r_object, r_smooth, r_gait = reward.sync, reward.object, reward.smooth, reward.gait
-    scores = {
-        "support_reference": sync.support_reference(
-            state.joint_position[:, support], step.support_reference, r_sync.support_reference.width
-        ),
-        "system_velocity": sync.system_velocity(
-            step.filtered_velocity, step.command[:, :2], r_sync.system_velocity.width
-        ),
-        "yaw_rate": sync.yaw_rate(step.filtered_yaw_rate, step.command[:, 2], r_sync.yaw_rate.width),
-        "height": sync.height(motion.height, step.command[:, HEIGHT], r_sync.height.width),
-        "torso_pitch": sync.torso_pitch(motion.torso_pitch, step.command[:, PITCH], r_sync.torso_pitch.width),
-    }
-    swing = r_gait.swing_height
-    parts = (
-        *(getattr(r_sync, name).weight * value for name, value in scores.items()),
-        r_sync.torso_roll * sync.torso_roll(motion.torso_roll),
-        r_object.position * equilibrium.position(motion.object_offset, step.object_place, step.held),
-        r_object.orientation * equilibrium.orientation(state.object_quaternion, step.held),
-        r_object.vertical_velocity
-        * equilibrium.vertical_velocity(state.object_linear_velocity, step.height_rate, step.held),
-        r_smooth.joint_acceleration * smooth.joint_acceleration(state.joint_acceleration),
-        r_smooth.action_rate * smooth.action_rate(step.action, step.previous_action),
-        r_smooth.power * smooth.power(state.joint_torque, state.joint_velocity),
-        r_smooth.base_rates * smooth.base_rates(state.base_angular_velocity),
-        r_smooth.vertical_velocity * smooth.vertical_velocity(motion.base_velocity, step.height_rate),
-        r_smooth.saturation * smooth.saturation(state.saturation[:, support]),
-        r_gait.contact_timing * gait.contact_timing(state.foot_contact, step.stance),
-        swing.weight
-        * gait.swing_height(
-            state.foot_position[:, :, 2], step.swing_progress, ~step.stance, r_gait.swing_clearance, swing.width
-        ),
-        r_gait.foot_slip * gait.foot_slip(state.foot_velocity, state.foot_contact),
-        r_gait.foot_distance * gait.foot_distance(motion.foot_position, r_gait.smallest_foot_distance),
-        np.full(len(step.command), reward.alive),
-    )
-    terms = np.empty((len(step.command), len(TERMS)))
-    for column, part in enumerate(parts):
-        np.multiply(part, dt, out=terms[:, column])
-    terms[:, -1] = reward.termination * step.ended
-    tracking = np.stack([scores[name] for name in TRACKING], axis=1)
-    return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
+class RewardFunction:
+    """The reward of a recipe."""
+
+    def __init__(self, reward: Reward, support: slice | NDArray[np.intp], dt: float) -> None:
+        """`support`: places of the support joints; `dt`: control period [s]."""
+        self._gait, self._support = reward.gait, support
+        settings = [_setting(reward, name) for name in TERMS]
+        self._weights = np.array([setting.weight if isinstance(setting, Kernel) else setting for setting in settings])
+        self._weights[:-1] *= dt
+        self._widths = np.array([setting.width for setting in settings[SCORED] if isinstance(setting, Kernel)])
+
+    def __call__(self, state: SimulationState, motion: Motion, step: Step) -> Scored:
+        """Reward of one control step."""
+        gait_settings, support, command = self._gait, self._support, step.command
+        parts = (
+            sync.support_reference(state.joint_position[:, support], step.support_reference),
+            sync.system_velocity(step.filtered_velocity, command[:, :2]),
+            sync.yaw_rate(step.filtered_yaw_rate, command[:, YAW_RATE]),
+            sync.height(motion.height, command[:, HEIGHT]),
+            sync.torso_pitch(motion.torso_pitch, command[:, PITCH]),
+            sync.torso_roll(motion.torso_roll),
+            equilibrium.position(motion.object_offset, step.object_place, step.held),
+            equilibrium.orientation(state.object_quaternion, step.held),
+            equilibrium.vertical_velocity(state.object_linear_velocity, step.height_rate, step.held),
+            smooth.joint_acceleration(state.joint_acceleration),
+            smooth.action_rate(step.action, step.previous_action),
+            smooth.power(state.joint_torque, state.joint_velocity),
+            smooth.base_rates(state.base_angular_velocity),
+            smooth.vertical_velocity(motion.base_velocity, step.height_rate),
+            smooth.saturation(state.saturation[:, support]),
+            gait.contact_timing(state.foot_contact, step.stance),
+            gait.swing_height(
+                state.foot_position[:, :, 2],
+                step.swing_progress,
+                ~step.stance,
+                gait_settings.swing_clearance,
+                gait_settings.swing_height.width,
+            ),
+            gait.foot_slip(state.foot_velocity, state.foot_contact),
+            gait.foot_distance(motion.foot_position, gait_settings.smallest_foot_distance),
+            1.0,
+            step.ended,
+        )
+        terms = np.empty((len(command), len(TERMS)))
+        for column, part in enumerate(parts):
+            terms[:, column] = part
+        terms[:, SCORED] = kernel(terms[:, SCORED], self._widths)
+        tracking = terms[:, TRACKED].copy()
+        terms *= self._weights
+        return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
+
+
+def _setting(reward: Reward, term: str) -> Any:
+    """What the recipe says of a term: its weight, or weight and width."""
+    setting: Any = reward
+    for name in term.split("/"):
+        setting = getattr(setting, name)
+    return setting
