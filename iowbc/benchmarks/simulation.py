@@ -1,6 +1,7 @@
 """`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against usual vector environments."""
 
 import os
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -13,9 +14,10 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from iowbc.benchmarks.bare_loop import BareLoops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
+from iowbc.benchmarks.standing_generator import write_standing_generator
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task import SceneShares
-from iowbc.robot.description import robot_folder
+from iowbc.robot.description import load_robot, robot_folder
 from iowbc.task.crew import Workers
 from iowbc.task.environment import Environment
 from iowbc.task.setup import Setup
@@ -43,6 +45,7 @@ def main(
 
     `environments` a worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
     the vector environment take turns, and the best turn of each counts: the one that other programs disturbed least.
+    `rg`: folder of a fitted reference generator; without one a stand-in that costs as much.
     `others`: also measure stable-baselines3's and gymnasium's vector environments.
     """
     recipe = recipe or Recipe(name="bench")
@@ -52,6 +55,24 @@ def main(
     only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
     recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
     say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
+    with tempfile.TemporaryDirectory() as place:
+        if rg is None:
+            rg = Path(place)
+            write_standing_generator(rg, load_robot(folder), recipe.rg)
+        return _measure(recipe, folder, rg, scene, environments, counts, turns, others, say)
+
+
+def _measure(
+    recipe: Recipe,
+    folder: Path,
+    rg: Path,
+    scene: str,
+    environments: int,
+    counts: Sequence[int],
+    turns: int,
+    others: bool,
+    say: Callable[[str], None],
+) -> dict[str, float]:
     parts = step_breakdown(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns)
     say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
     figures: dict[str, float] = {}

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import select
 import signal
 import socket
@@ -107,7 +108,7 @@ class Workers:
                 self._poll.register(member.connection.fileno(), select.POLLIN)
                 self._members.append(member)
             for index, ((first, last), member) in enumerate(zip(self.groups, self._members, strict=True)):
-                member.connection.send((setup.as_json(), first, last))
+                member.connection.send_bytes(pickle.dumps((setup.as_json(), first, last)))
                 self._asked.add(index)
             self._wait(STARTING)
         except BaseException:
@@ -126,9 +127,11 @@ class Workers:
         if not self._ended.alive:
             raise WorkerFailed("the worker processes have ended; make a new vector environment")
         self._wait(self._patience)
-        for index, member in enumerate(self._members):
+        given = arguments or [()] * len(self._members)
+        messages = [pickle.dumps((request, own)) for own in given]
+        for index, (member, message) in enumerate(zip(self._members, messages, strict=True)):
             try:
-                member.connection.send((request, arguments[index] if arguments else ()))
+                member.connection.send_bytes(message)
             except (BrokenPipeError, ConnectionResetError):
                 self._fail(index)
             self._asked.add(index)

@@ -1,9 +1,11 @@
 """A worker process: builds its environments, then does what it is asked until its parent is gone."""
 
+import contextlib
 import ctypes
 import faulthandler
 import gc
 import os
+import pickle
 import signal
 import sys
 import traceback
@@ -26,6 +28,8 @@ def main() -> None:
         ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         return
+    with contextlib.suppress(OSError):  # a worker that wakes must not keep its parent from waking the others
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     file = os.fdopen(log, "w")
     faulthandler.enable(file=file)
     faulthandler.register(signal.SIGUSR1, file=file)
@@ -51,7 +55,7 @@ def _serve(connection: Connection, memory: int) -> None:
         connection.send((True, None))
         while True:
             request, arguments = connection.recv()
-            connection.send((True, getattr(batch, request)(*arguments)))
+            connection.send_bytes(pickle.dumps((True, getattr(batch, request)(*arguments))))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
     except BaseException:

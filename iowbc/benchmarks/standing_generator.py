@@ -1,0 +1,37 @@
+"""A reference generator that answers every command with the default posture, at the cost of a fitted one."""
+
+from pathlib import Path
+
+import numpy as np
+
+from iowbc.recipe.reference import ReferenceGenerator
+from iowbc.reference.feasibility import FeasibleMap
+from iowbc.reference.network import ReferenceNetwork
+from iowbc.reference.network_inputs import input_names
+from iowbc.robot.description import Robot
+
+
+def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenerator) -> None:
+    """Writes an artifact like that of `rg-fit`: a network of the recipe's size whose last layer is zero, and a feasible
+    map of that one posture."""
+    names, support = input_names(robot, recipe), robot.support
+    sizes = (len(names), *recipe.fit.hidden, len(support))
+    rng = np.random.default_rng(0)
+    weights = [
+        rng.normal(scale=size**-0.5, size=(after, size)).astype(np.float32)
+        for size, after in zip(sizes, sizes[1:], strict=False)
+    ]
+    weights[-1][:] = 0.0
+    ReferenceNetwork(
+        inputs=names,
+        outputs=tuple(robot.joints[index] for index in support),
+        layers=tuple((weight, np.zeros(len(weight), np.float32)) for weight in weights),
+        input_mean=np.zeros(len(names), np.float32),
+        input_std=np.ones(len(names), np.float32),
+        output_mean=robot.default_position[support].astype(np.float32),
+        output_std=np.ones(len(support), np.float32),
+        lower=robot.lower[support].astype(np.float32),
+        upper=robot.upper[support].astype(np.float32),
+    ).save(folder)
+    upright, height = np.array([-1e-6, 1e-6]), np.full(2, robot.default_height)
+    FeasibleMap(upright, height, height).save(folder / "feasible.npz")
