@@ -36,7 +36,7 @@ class ReferenceNetwork:
 
     def __call__(self, arm_reference: Array, base_command: Array) -> Array:
         """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2 or more), as in `inputs`."""
-        x: Array = np.concatenate([arm_reference, base_command], axis=1).astype(np.float32)
+        x: Array = np.concatenate([arm_reference, base_command], axis=1, dtype=np.float32)
         if x.shape[1] != len(self.inputs):
             raise ValueError(
                 f"the reference generator takes {len(self.inputs)} inputs ({', '.join(self.inputs)}), got {x.shape[1]}"

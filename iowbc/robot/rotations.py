@@ -109,25 +109,15 @@ def yaw_of(quaternion: Array) -> Array:
     return yaw
 
 
-def pitch_of(quaternion: Array) -> Array:
-    """Pitch of Rz Ry Rx: positive when the x axis points down (leaning forward); shape (...) [rad]."""
-    w, x, y, z = quaternion[..., 0], quaternion[..., 1], quaternion[..., 2], quaternion[..., 3]
-    pitch: Array = np.arcsin(np.clip(2.0 * (w * y - x * z), -1.0, 1.0))
-    return pitch
-
-
-def lean_of(quaternion: Array) -> Array:
-    """Lean against gravity, atan2(-R₂₀, R₂₂): as `pitch_of` without roll, but not folded at π/2; shape (...) [rad]."""
-    w, x, y, z = quaternion[..., 0], quaternion[..., 1], quaternion[..., 2], quaternion[..., 3]
-    forward, upward = 2.0 * (w * y - x * z), 1.0 - 2.0 * (x * x + y * y)
-    lean: Array = np.arctan2(forward, upward)
+def lean_of(rotation: Array) -> Array:
+    """Lean against gravity, positive forward: atan2(-R₂₀, R₂₂) of matrices (..., 3, 3), shape (...) [rad]."""
+    lean: Array = np.arctan2(-rotation[..., 2, 0], rotation[..., 2, 2])
     return lean
 
 
-def roll_of(quaternion: Array) -> Array:
-    """Roll of Rz Ry Rx; shape (...) [rad]."""
-    w, x, y, z = quaternion[..., 0], quaternion[..., 1], quaternion[..., 2], quaternion[..., 3]
-    roll: Array = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+def roll_of(rotation: Array) -> Array:
+    """Roll of Rz Ry Rx, positive to the right: atan2(R₂₁, R₂₂) of matrices (..., 3, 3), shape (...) [rad]."""
+    roll: Array = np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2])
     return roll
 
 

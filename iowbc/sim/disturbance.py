@@ -66,14 +66,18 @@ class Blows:
         self._count[which] += 1
         blow = random.absorb(key[which], self._count[which])
         size = random.draw(blow, f"{self._name}/size", self._size)[:, 0]
-        direction = random.normal(blow, f"{self._name}/direction", 3)
-        if self._level:
-            direction[:, 2] = 0.0
-        direction /= np.maximum(np.sqrt(np.vecdot(direction, direction)), 1e-9)[:, None]
         impulse = size * scale[which]
-        self.force[which] = direction * (impulse / (self._length * self._period))[:, None]
+        self.force[which] = self._direction(blow) * (impulse / (self._length * self._period))[:, None]
         self._until[which] = step[which] + self._length
         self._next[which] = step[which] + self._wait(blow)
+
+    def _direction(self, blow: Keys) -> Array:
+        """Unit vectors (k, 3), evenly over the circle or the sphere, whose zones of equal height have equal areas."""
+        chance = random.uniform(blow, f"{self._name}/direction", 2)
+        turn = 2.0 * np.pi * chance[:, 0]
+        rise = np.zeros(len(blow)) if self._level else 2.0 * chance[:, 1] - 1.0
+        across = np.sqrt(1.0 - rise * rise)
+        return np.stack([across * np.cos(turn), across * np.sin(turn), rise], axis=1)
 
     def arrays(self) -> dict[str, Array]:
         """The clocks, by name."""

@@ -47,8 +47,8 @@ class SimulationState(_Arrays):
     """Torque of the motors, (n, joints) [N·m]."""
     saturation: Mask
     """Motors at their torque limit, (n, joints)."""
-    torso_quaternion: Array
-    """(n, 4)."""
+    torso_rotation: Array
+    """Rotation matrix of the torso, (n, 3, 3)."""
     com_position: Array
     """The robot's own centre of mass, (n, 3) [m]."""
     system_velocity: Array
@@ -106,7 +106,7 @@ class SimulationState(_Arrays):
             "joint_torque": (JOINTS,),
             "base_quaternion": (4,),
             "base_rotation": (3, 3),
-            "torso_quaternion": (4,),
+            "torso_rotation": (3, 3),
             "object_quaternion": (4,),
             "foot_position": (2, 3),
             "foot_velocity": (2, 3),

@@ -193,7 +193,7 @@ class World:
         state.joint_acceleration[place] = self._acceleration[:, layout.joint_speeds]
         state.joint_torque[place] = self._torque
         state.saturation[place] = np.abs(self._torque) >= self._limit
-        state.torso_quaternion[place] = self._body_quaternion[:, layout.torso]
+        state.torso_rotation[place] = self._body_rotation[:, layout.torso].reshape(-1, 3, 3)
         com = self._subtree_com[:, layout.base]
         state.com_position[place] = com
         sole = self._sites[:, layout.soles]

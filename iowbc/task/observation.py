@@ -59,7 +59,7 @@ class ObservationLayout:
         """Names of the parts, in order."""
         return tuple(name for name, _ in self.parts)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of a row."""
         return sum(size for _, size in self.parts)
@@ -100,17 +100,17 @@ class FullLayout:
     state: ObservationLayout
     extra: ObservationLayout
 
-    @property
+    @cached_property
     def observation(self) -> slice:
         """Place of s_t."""
         return slice(0, self.state.size)
 
-    @property
+    @cached_property
     def privileged(self) -> slice:
         """Place of s_priv."""
         return slice(self.state.size, self.size)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of the row."""
         return self.state.size + self.extra.size

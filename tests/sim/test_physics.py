@@ -203,7 +203,7 @@ def test_state_after_a_step_is_that_of_the_new_position_and_velocity(start):
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, model.body("object").id, velocity, 0)
         assert np.allclose(state.object_angular_velocity[env], velocity[:3], atol=1e-9)
         assert np.allclose(state.object_linear_velocity[env], velocity[3:], atol=1e-9)
-        assert np.allclose(state.torso_quaternion[env], data.body("torso_link").xquat, atol=1e-12)
+        assert np.allclose(state.torso_rotation[env].ravel(), data.body("torso_link").xmat, atol=1e-12)
 
 
 def test_forces_on_feet_and_hands_are_the_contact_forces(start, calm, hold_base):
