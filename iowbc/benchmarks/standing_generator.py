@@ -1,5 +1,6 @@
 """A reference generator that answers every command with the default posture, at the cost of a fitted one."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,7 @@ def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenera
     sizes = (len(names), *recipe.fit.hidden, len(support))
     rng = np.random.default_rng(0)
     weights = [
-        rng.normal(scale=size**-0.5, size=(after, size)).astype(np.float32)
-        for size, after in zip(sizes, sizes[1:], strict=False)
+        rng.normal(scale=size**-0.5, size=(after, size)).astype(np.float32) for size, after in itertools.pairwise(sizes)
     ]
     weights[-1][:] = 0.0
     ReferenceNetwork(

@@ -78,8 +78,8 @@ class SamplePlan:
         wrist, _ = self.kinematics.forward(self.rest[None])
         upright, origin = self.kinematics.torso_in_heading(np.zeros((1, 3)), np.zeros(1))
         place = np.einsum("nij,nsj->nsi", upright, wrist) + origin[:, None]
-        rotation, position = self.kinematics.torso_in_heading(np.zeros((len(self.pitches), 3)), self.pitches)
-        target = np.einsum("nji,nsj->nsi", rotation, place - position[:, None])
+        everywhere = np.repeat(place, len(self.pitches), axis=0)
+        target = self.kinematics.into_torso(np.zeros((len(self.pitches), 3)), self.pitches, everywhere)
         arms: Array = self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
         return arms
 
@@ -119,8 +119,7 @@ class SamplePlan:
         shift = region.asymmetry * (2.0 * place[:, 3:] - 1.0)
         target = np.stack([corner + shift, corner - shift], axis=1) * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]])
         waist = np.zeros((len(unit), 3))
-        rotation, position = self.kinematics.torso_in_heading(waist, command[:, 1])
-        leaning = np.einsum("nji,nsj->nsi", rotation, target - position[:, None])
+        leaning = self.kinematics.into_torso(waist, command[:, 1], target)
         target = np.where(heading[:, None, None], leaning, target)
         start = np.clip(self.rest + region.redundancy * (2.0 * turn - 1.0), self.lower, self.upper)
         if by_wrist.any():

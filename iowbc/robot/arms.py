@@ -68,7 +68,7 @@ class ArmKinematics:
         wrist, jacobian = self.forward(arm_position)
         transposed = np.swapaxes(jacobian, -1, -2)
         error = target - wrist
-        distance = np.sqrt((error * error).sum(axis=-1))
+        distance = np.sqrt(np.vecdot(error, error))
         near = np.minimum(distance, LONGEST)
         error *= (LONGEST / np.maximum(distance, LONGEST))[..., None]
         damping = self.damping**2 + REACH * near
@@ -86,6 +86,14 @@ class ArmKinematics:
         for _ in range(steps):
             arm_position = self.solve_step(arm_position, target, dt)
         return arm_position
+
+    def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
+        """Points (n, k, 3) [m] of the heading frame at the base, as the torso frame sees them; the rest as below."""
+        moved = points.transpose(2, 1, 0)[:, :, None].copy()
+        turn(moved, Y, -pelvis_pitch[None])
+        self._waist.fetch(waist.T[:, None], moved)
+        seen: Array = moved[:, :, 0].transpose(2, 1, 0)
+        return seen
 
     def torso_in_heading(
         self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None = None

@@ -86,6 +86,19 @@ class Chain:
             _apply(self._after[j], vectors[:, first:])
             vectors[:, -1] += self._offset[j]
 
+    def fetch(self, angle: Array, points: Array) -> None:
+        """Takes points (3, k, chains, n) from the bases' frames to the last bodies', in place; inverse of `carry`."""
+        cosine, sines = cosine_and_sines(np.multiply(angle, -self._sign, order="C"))
+        for j in range(self.length):
+            points -= self._offset[j][:, None]
+            _apply(_inverse(self._after[j]), points)
+            mix(points, self._axis[j], cosine[j], sines[j])
+            _apply(_inverse(self._before[j]), points)
+
+
+def _inverse(rotation: Array | None) -> Array | None:
+    return None if rotation is None else rotation.swapaxes(0, 1)
+
 
 def _apply(rotation: Array | None, vectors: Array) -> None:
     """Multiplies vectors (3, k, chains, n) in place by matrices (3, 3, chains)."""

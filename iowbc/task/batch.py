@@ -93,7 +93,7 @@ class Batch:
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         self._held = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
         self._scale = self.robot.action_scale if task.action.scale is None else task.action.scale
-        self._height_rate = np.zeros(n)
+        self._height_rate, self._velocity = np.zeros(n), np.zeros((n, 3))
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self._scales = {name: np.ones(n) for name in ("load_scale", "impulse_scale", "push_scale")}
 
@@ -158,10 +158,9 @@ class Batch:
         """Filters what was measured, and turns the heading reference by the commanded yaw rate."""
         memory, time_constant = self.memory, self.recipe.task.reward.sync.filter_time
         memory.heading_reference += memory.command[:, YAW_RATE] * self.period
-        memory.filtered_velocity[:] = low_pass(
-            memory.filtered_velocity, moved.system_velocity[:, :2], time_constant, self.period
-        )
-        memory.filtered_yaw_rate[:] = low_pass(memory.filtered_yaw_rate, moved.yaw_rate, time_constant, self.period)
+        self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
+        self._velocity[:, YAW_RATE] = moved.yaw_rate
+        memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self.period)
 
     def _object_place(self) -> Array:
         """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
@@ -176,7 +175,6 @@ class Batch:
             height_rate=self._height_rate,
             support_reference=memory.support,
             filtered_velocity=memory.filtered_velocity,
-            filtered_yaw_rate=memory.filtered_yaw_rate,
             action=action,
             previous_action=memory.action,
             swing_progress=gait.swing_progress(memory.phase, stance),
@@ -257,7 +255,6 @@ class Batch:
         for values in (
             memory.action,
             memory.filtered_velocity,
-            memory.filtered_yaw_rate,
             memory.tracking,
             memory.total,
         ):

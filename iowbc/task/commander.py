@@ -29,6 +29,7 @@ class Commander:
         self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
         self._largest_step = rate_limits(commands.rates) * period
         self.scripted = np.array([script is not None for script in scripts])
+        self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
         self._times, self._values = _knots(scripts)
 
     def start(self, which: Indices, memory: Memory, key: random.Keys) -> None:
@@ -45,10 +46,10 @@ class Commander:
 
     def advance(self, memory: Memory, key: random.Keys) -> None:
         """Goals and commands of the next control step; `key` of the episodes, (n,)."""
-        due = np.flatnonzero((memory.steps >= memory.goal_until) & ~self.scripted)
+        due = np.flatnonzero((memory.steps >= memory.goal_until) & self._drawn)
         if len(due):
             self._draw(due, memory, key[due])
-        if self.scripted.any():
+        if self._any_script:
             memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
         memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
 

@@ -45,9 +45,7 @@ class Memory:
     action: Array
     """a_{t−1}, (n, 15)."""
     filtered_velocity: Array
-    """Low-passed v_sys in the plane, heading frame, (n, 2) [m/s]."""
-    filtered_yaw_rate: Array
-    """(n,) [rad/s]."""
+    """Low-passed v_sys in the plane, heading frame [m/s], and yaw rate [rad/s], (n, 3)."""
     heading_reference: Array
     """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
     object_place: Array
@@ -61,7 +59,7 @@ class Memory:
     def blank(cls, n: int, arms: int, support: int) -> Self:
         """All zero."""
         counters = {name: np.zeros(n, np.int64) for name in ("episode", "draws", "steps", "limit", "goal_until")}
-        scalars = ("level", "phase", "filtered_yaw_rate", "heading_reference", "total")
+        scalars = ("level", "phase", "heading_reference", "total")
         return cls(
             **counters,
             **{name: np.zeros(n) for name in scalars},
@@ -73,7 +71,7 @@ class Memory:
             posture=np.zeros((n, support)),
             support=np.zeros((n, support)),
             action=np.zeros((n, support)),
-            filtered_velocity=np.zeros((n, 2)),
+            filtered_velocity=np.zeros((n, 3)),
             object_place=np.zeros((n, 3)),
         )
 

@@ -106,5 +106,4 @@ class ReferenceLayer:
         The torso stands where the references put it, not where it is measured: the arms do not answer to swaying.
         """
         wrists = grasp + command[:, OFFSET].reshape(-1, 2, 3)
-        rotation, position = self.arms.torso_in_heading(support[:, WAIST], self.pelvis_pitch(support, command))
-        return np.asarray((wrists - position[:, None]) @ rotation)
+        return self.arms.into_torso(support[:, WAIST], self.pelvis_pitch(support, command), wrists)

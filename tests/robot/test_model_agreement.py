@@ -130,6 +130,9 @@ def test_arm_and_waist_kinematics_agree_with_pinocchio(robot: Robot, pinocchio_m
     roll = np.linspace(0.3, -0.3, len(joints))
     waist = joints[:, robot.support[12:]]
     rotation, position = arms.torso_in_heading(waist, pitch, roll)
+    level, at = arms.torso_in_heading(waist, pitch)
+    back = arms.into_torso(waist, pitch, wrists @ np.swapaxes(level, 1, 2) + at[:, None])
+    np.testing.assert_allclose(back, wrists, atol=SAME_FILE)
     columns = 6 + robot.interaction.reshape(2, 7)
     for row in range(len(joints)):
         quaternion = pinocchio.Quaternion(pinocchio.rpy.rpyToMatrix(roll[row], pitch[row], 0.0)).coeffs()

@@ -58,9 +58,7 @@ class Step:
     support_reference: Array
     """θ_S_ref in force during the step, gait prior included, (n, 15) [rad]."""
     filtered_velocity: Array
-    """Low-passed v_sys, heading frame, (n, 2) [m/s]."""
-    filtered_yaw_rate: Array
-    """(n,) [rad/s]."""
+    """Low-passed v_sys, heading frame [m/s], and yaw rate [rad/s], (n, 3)."""
     action: Array
     """a_t, (n, 15)."""
     previous_action: Array
@@ -114,8 +112,8 @@ class RewardFunction:
         gait_settings, support, command = self._gait, self._support, step.command
         parts = (
             sync.support_reference(state.joint_position[:, support], step.support_reference),
-            sync.system_velocity(step.filtered_velocity, command[:, :2]),
-            sync.yaw_rate(step.filtered_yaw_rate, command[:, YAW_RATE]),
+            sync.system_velocity(step.filtered_velocity[:, :YAW_RATE], command[:, :YAW_RATE]),
+            sync.yaw_rate(step.filtered_velocity[:, YAW_RATE], command[:, YAW_RATE]),
             sync.height(motion.height, command[:, HEIGHT]),
             sync.torso_pitch(motion.torso_pitch, command[:, PITCH]),
             sync.torso_roll(motion.torso_roll),
@@ -138,7 +136,7 @@ class RewardFunction:
             ),
             gait.foot_slip(state.foot_velocity, state.foot_contact),
             gait.foot_distance(motion.foot_position, gait_settings.smallest_foot_distance),
-            1.0,
+            np.ones(len(command)),
             step.ended,
         )
         terms = np.empty((len(command), len(TERMS)))
