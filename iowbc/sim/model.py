@@ -16,6 +16,9 @@ ARENA = 2 << 20
 NO_ISLANDS = mujoco.mjtDisableBit.mjDSBL_ISLAND.value
 """Robot and object are one constrained system, and looking for separate ones takes 5 % of a step."""
 
+HOLDING = ("wrist", "elbow")
+"""Parts of the names of bodies that hold an object."""
+
 INTEGRATORS = {"implicit": mujoco.mjtIntegrator.mjINT_IMPLICITFAST, "explicit": mujoco.mjtIntegrator.mjINT_EULER}
 """MuJoCo's implicit integrator takes the motors' velocity feedback into its step; under Euler it is a force of the
 state before the step, as that of a controller on the robot is."""
@@ -49,9 +52,10 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
     )
     _add_motors(spec, robot)
     if scene.object is not None:
-        add_object(spec, robot, scene, ground_bit=GROUND_BIT if scene.kind == "lift" else 0, look=look)
         if physics.body_contact:
-            _let_links_touch_object(spec, robot)
+            _let_links_touch_object(spec)
+        ground_bit = GROUND_BIT if scene.kind == "lift" else 0
+        add_object(spec, robot, scene, ground_bit=ground_bit, touched=physics.body_contact, look=look)
     spec.add_sensor(
         name="contact_forces",
         type=mujoco.mjtSensor.mjSENS_FORCE,
@@ -83,12 +87,9 @@ def _add_motors(spec: Any, robot: Robot) -> None:
         )
 
 
-def _let_links_touch_object(spec: Any, robot: Robot) -> None:
-    """All links but the hands and forearms, which hold it, touch the object."""
+def _let_links_touch_object(spec: Any) -> None:
+    """All links but hands and forearms, which hold it, touch the object."""
     for geom in spec.geoms:
-        if geom.contype and geom.name not in ("ground", "object"):
-            geom.conaffinity |= OBJECT_BIT
-    for side in ("left", "right"):
-        for body in spec.bodies:
-            if body.name.startswith(f"{side}_wrist") or body.name == f"{side}_elbow_link":
-                spec.add_exclude(bodyname1=body.name, bodyname2="object")
+        if geom.contype:
+            holds = any(part in geom.parent.name for part in HOLDING)
+            geom.conaffinity = geom.conaffinity & ~OBJECT_BIT if holds else geom.conaffinity | OBJECT_BIT

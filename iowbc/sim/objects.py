@@ -26,8 +26,11 @@ RUBBER = (0.13, 0.13, 0.14, 1.0)
 WOOD = (0.62, 0.47, 0.30, 1.0)
 
 
-def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, look: bool) -> None:
-    """Body `object` with the scene's nominal mass, its joints, its grips or the palms that touch it."""
+def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, touched: bool, look: bool) -> None:
+    """Body `object` with the scene's nominal mass, its joints, its grips or the palms that touch it.
+
+    `touched`: links other than the palms may touch it too.
+    """
     thing = scene.object
     if thing is None:
         raise ValueError("a scene without an object has none to add")
@@ -43,7 +46,7 @@ def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, look: 
         name="object",
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=half,
-        contype=OBJECT_BIT if by_contact else 0,
+        contype=OBJECT_BIT if by_contact or touched else 0,
         conaffinity=ground_bit,
         group=3 if ring else 2,
         rgba=WOOD if scene.kind == "push" else CARDBOARD,

@@ -90,9 +90,10 @@ def test_crate_starts_to_move_at_the_rolling_resistance(start, calm):
         assert moved == (pytest.approx(expected, rel=0.1) if moves else pytest.approx(0.0, abs=0.01))
 
 
-def test_hands_push_the_crate_with_what_it_resists(start, calm, hold_base, robot):
+@pytest.mark.parametrize("body_contact", [False, True])
+def test_hands_push_the_crate_with_what_it_resists(start, calm, hold_base, robot, body_contact):
     hold_base()
-    recipe = changed(calm, "scenes.push.gap", 0.0)
+    recipe = changed(changed(calm, "scenes.push.gap", 0.0), "physics.body_contact", body_contact)
     simulation = start(recipe, ["push"], object_mass=60.0, object_ground_friction=0.05)
     elbows = [index for index, name in enumerate(robot.joints) if "shoulder_pitch" in name]
     before = simulation.state.object_position[0, 0]
@@ -153,6 +154,23 @@ def test_squeezed_box_is_held_up_to_what_friction_bears(start, calm, hold_base):
     assert np.array_equal(simulation.state.grasped.all(axis=1), [True, True, False])
     weight = -simulation.state.grip_force[:2, :, 2].sum(axis=1)
     assert np.allclose(weight, masses[:2] * GRAVITY, rtol=0.03)
+
+
+def test_body_contact_keeps_a_box_out_of_the_torso(start, calm, hold_base, monkeypatch):
+    hold_base()
+    nearest = []
+    for body_contact in (False, True):
+        simulation = start(changed(calm, "physics.body_contact", body_contact), ["lift"], object_mass=4.0)
+
+        def push_back(commanded, gust, state, out):
+            out[:] = 0.0
+            out[:, 0] = -80.0
+
+        monkeypatch.setattr(simulation._partner, "wrench", push_back)
+        run(simulation, 100)
+        nearest.append(simulation.state.object_position[0, 0] - simulation.state.base_position[0, 0] - 0.15)
+    assert nearest[0] < 0.05
+    assert nearest[1] > 0.07
 
 
 def test_explicit_and_implicit_joint_control_agree_where_both_are_stable(start, calm, hold_base):
