@@ -103,6 +103,7 @@ class BareLoops:
             ours, theirs = context.Pipe()
             process = context.Process(target=_serve, args=(theirs, setup, first, last, periods), daemon=True)
             process.start()
+            theirs.close()
             self._pipes.append(ours)
             self._processes.append(process)
         for pipe in self._pipes:

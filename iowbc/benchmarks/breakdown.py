@@ -46,6 +46,13 @@ class _Timed:
         return getattr(self._batch, name)
 
 
+def watch_physics(batch: Any, watch: Stopwatch) -> None:
+    """Times MuJoCo in the environments of a batch, as `physics`."""
+    for world in batch.simulation._worlds:
+        world.batch = _Timed(world.batch)
+        watch.watch(world.batch, "step", "physics")
+
+
 def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     """Time of each part of a step of `setup.count` environments in this process [ms]: medians over rounds from a reset.
 
@@ -54,9 +61,7 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     crew = Alone(setup)
     batch, watch = crew.batch, Stopwatch()
     watch.watch(batch, "step", "step")
-    for world in batch.simulation._worlds:
-        world.batch = _Timed(world.batch)
-        watch.watch(world.batch, "step", "physics")
+    watch_physics(batch, watch)
     watch.watch(batch.simulation, "step", "simulation")
     watch.watch(batch, "_advance", "references")
     for name in ("_motion", "_follow", "_score"):

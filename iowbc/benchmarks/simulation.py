@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 from iowbc.benchmarks.bare_loop import BareLoops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.standing_generator import write_standing_generator
+from iowbc.benchmarks.variants import compare
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task import SceneShares
 from iowbc.robot.description import load_robot, robot_folder
@@ -87,6 +88,8 @@ def _measure(
     for name in (*PARTS, "transfer"):
         say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
     say(f"  an episode's end adds {parts['reset']:.2f} ms")
+    compared = compare(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns // 2 + 1, say)
+    figures |= {f"variant_{name}": value for name, value in compared.items()}
     return figures | {f"step_{name}_ms": value for name, value in parts.items()}
 
 

@@ -52,6 +52,9 @@ class Commands(Section):
     """Part of the walking commands without yaw rate and lateral velocity."""
     nominal_share: float = Field(default=0.4, ge=0.0, le=1.0)
     """Part of the commands with nominal height, pitch and wrists."""
+    holding_start: float = Field(default=0.3, ge=0.0, le=1.0)
+    """Part of a drawn posture's distance from the nominal one at which an episode with a held object begins; at 1 a
+    third of the objects would begin inside thighs or torso. The command then approaches the drawn posture."""
     smallest_speed: float = Field(default=0.15, ge=0.0)
     """Planar speed [m/s] under which a drawn walking velocity is lengthened, so that walking is worth a step."""
     resampling: Range = (3.0, 7.0)

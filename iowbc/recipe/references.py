@@ -12,12 +12,12 @@ Vector = tuple[float, float, float]
 class Grasps(Section):
     """Base grasp of each scene: left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
 
-    free: Vector = (0.30, 0.16, 0.10)
+    free: Vector = (0.30, 0.16, 0.12)
     """Forearms before the body, as when carrying."""
-    lift: Vector = (0.30, 0.16, 0.10)
+    lift: Vector = (0.30, 0.16, 0.12)
     """Beside the object, as near to the body as leaves its near side 5 cm before thighs and torso: there shoulder and
     waist pitch hold most."""
-    squeeze: Vector = (0.30, 0.16, 0.10)
+    squeeze: Vector = (0.30, 0.16, 0.12)
     """As in `lift`."""
     tyre: Vector = (0.30, 0.27, 0.12)
     """At the widest place of the tyre; lower, arms this far apart do not reach."""

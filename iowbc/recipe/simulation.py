@@ -28,8 +28,9 @@ class Physics(Section):
     stops when it has converged; at five, joints are off by 0.1 rad after half a second."""
     line_search_iterations: int = Field(default=20, ge=1)
     """Line search iterations at most; as above."""
-    body_contact: bool = False
-    """Whether links touch one another, the ground and the object; without, only soles and palms touch anything."""
+    body_contact: Literal["nothing", "object", "everything"] = "object"
+    """What links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs and
+    torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` tells what each costs."""
     contact_force: float = Field(default=1.0, gt=0.0)
     """Vertical force above which a foot counts as being on the ground [N]."""
     fastest: float = Field(default=200.0, gt=0.0)

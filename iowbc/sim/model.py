@@ -42,8 +42,8 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
     for geom in list(spec.geoms):
         if geom in foot_points:
             geom.priority = 1
-        elif not physics.body_contact:
-            geom.contype = geom.conaffinity = 0
+        else:
+            geom.contype, geom.conaffinity = _touches(geom, physics.body_contact)
     if not look:
         for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
             spec.delete(geom)
@@ -52,10 +52,9 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
     )
     _add_motors(spec, robot)
     if scene.object is not None:
-        if physics.body_contact:
-            _let_links_touch_object(spec)
         ground_bit = GROUND_BIT if scene.kind == "lift" else 0
-        add_object(spec, robot, scene, ground_bit=ground_bit, touched=physics.body_contact, look=look)
+        touched = physics.body_contact != "nothing"
+        add_object(spec, robot, scene, ground_bit=ground_bit, touched=touched, look=look)
     spec.add_sensor(
         name="contact_forces",
         type=mujoco.mjtSensor.mjSENS_FORCE,
@@ -87,9 +86,9 @@ def _add_motors(spec: Any, robot: Robot) -> None:
         )
 
 
-def _let_links_touch_object(spec: Any) -> None:
-    """All links but hands and forearms, which hold it, touch the object."""
-    for geom in spec.geoms:
-        if geom.contype:
-            holds = any(part in geom.parent.name for part in HOLDING)
-            geom.conaffinity = geom.conaffinity & ~OBJECT_BIT if holds else geom.conaffinity | OBJECT_BIT
+def _touches(geom: Any, body_contact: str) -> tuple[int, int]:
+    """Contact bits of a link's geom: what it is and what it touches. Hands and forearms hold the object with palms or
+    grips, and do not touch it themselves."""
+    links = (geom.contype, geom.conaffinity & ~OBJECT_BIT) if body_contact == "everything" else (0, 0)
+    solid = geom.contype and body_contact != "nothing" and not any(part in geom.parent.name for part in HOLDING)
+    return links[0], links[1] | (OBJECT_BIT if solid else 0)

@@ -85,13 +85,13 @@ class Batch:
         self._key = random.environment_key(seeds, streams)
         self._episode_key = self._key.copy()
         scripts = [episode.script for episode in episodes] if episodes is not None else [None] * n
-        self._commander = Commander(task, self.references, scripts, self.period)
+        self._held = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
+        self._commander = Commander(task, self.references, scripts, self._held, self.period)
         self.memory = Memory.blank(n, len(self.robot.interaction), len(self.robot.support))
         self.memory.level[:] = initial_level(task.curriculum, n) if episodes is None else task.curriculum.fixed_level
         self._trials, self._divergences = episodes, divergences
         self._reward = RewardFunction(task.reward, self._support, self.period)
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
-        self._held = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
         self._scale = self.robot.action_scale if task.action.scale is None else task.action.scale
         self._height_rate, self._velocity = np.zeros(n), np.zeros((n, 3))
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))

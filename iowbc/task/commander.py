@@ -12,20 +12,28 @@ from iowbc.task.command import COMMAND, VELOCITY, approach, rate_limits
 from iowbc.task.curriculum import difficulty
 from iowbc.task.memory import Memory
 from iowbc.task.references import ReferenceLayer
-from iowbc.task.sampling import draw_goals, draw_holding_time, interpolate
+from iowbc.task.sampling import draw_goals, draw_holding_time, interpolate, nominal_command
 from iowbc.task.script import CommandScript
 
 Array = NDArray[np.floating[Any]]
 Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
 
 class Commander:
     """Sets goal and command of n environments, in their memory."""
 
     def __init__(
-        self, task: Task, references: ReferenceLayer, scripts: Sequence[CommandScript | None], period: float
+        self,
+        task: Task,
+        references: ReferenceLayer,
+        scripts: Sequence[CommandScript | None],
+        holding: Mask,
+        period: float,
     ) -> None:
+        """`holding`: environments that begin with an object in the hands, (n,)."""
         commands = task.commands
+        self._nominal, self._start = nominal_command(commands), np.where(holding, commands.holding_start, 1.0)[:, None]
         self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
         self._largest_step = rate_limits(commands.rates) * period
         self.scripted = np.array([script is not None for script in scripts])
@@ -33,10 +41,11 @@ class Commander:
         self._times, self._values = _knots(scripts)
 
     def start(self, which: Indices, memory: Memory, key: random.Keys) -> None:
-        """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can."""
+        """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
+        or with an object in the hands on the way to it."""
         memory.draws[which] = 0
         self._draw(which, memory, key)
-        command = self._references.startable(memory.goal[which])
+        command = self._references.startable(self._nominal + self._start[which] * (memory.goal[which] - self._nominal))
         command[:, VELOCITY] = 0.0
         scripted = self.scripted[which]
         if scripted.any():

@@ -23,10 +23,10 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="session")
 def carrying(robot: Robot) -> Any:
-    """Joint positions of the default posture, grips 0.3 m ahead of the pelvis, 0.32 m apart and 0.1 m above it."""
+    """Joint positions of the default posture, grips 0.3 m ahead of the pelvis, 0.32 m apart and 0.12 m above it."""
     arms = ArmKinematics(robot)
     rotation, position = arms.torso_in_heading(np.zeros((1, 3)), np.zeros(1))
-    wrists = np.array([[[0.30, 0.16, 0.10], [0.30, -0.16, 0.10]]])
+    wrists = np.array([[[0.30, 0.16, 0.12], [0.30, -0.16, 0.12]]])
     target = np.einsum("nji,nsj->nsi", rotation, wrists - position[:, None])
     posture = robot.default_position.copy()
     posture[robot.interaction] = arms.solve(posture[None, robot.interaction], target)[0]
@@ -45,6 +45,13 @@ def calm() -> Recipe:
     recipe = Recipe()
     for path in ("randomization", "partner", "impulses", "pushes", "sensing"):
         recipe = changed(recipe, f"{path}.enabled", False)
+    return recipe
+
+
+@pytest.fixture(scope="session")
+def by_hands(calm: Recipe) -> Recipe:
+    """The same where an object touches the hands alone, which then bear all of it."""
+    recipe: Recipe = changed(calm, "physics.body_contact", "nothing")
     return recipe
 
 

@@ -35,9 +35,9 @@ def _robot_velocity(model, data):
 
 
 @pytest.mark.parametrize("mass", [1.0, 4.0, 8.0])
-def test_weight_of_robot_and_held_object_arrives_at_the_feet(start, calm, hold_base, mass):
+def test_weight_of_robot_and_held_object_arrives_at_the_feet(start, by_hands, hold_base, mass):
     hold_base(vertical_free=True)
-    simulation = start(calm, ["lift"], object_mass=mass)
+    simulation = start(by_hands, ["lift"], object_mass=mass)
     run(simulation, 200)
     model, _ = simulation.physics_model(0)
     state = simulation.state
@@ -90,7 +90,7 @@ def test_crate_starts_to_move_at_the_rolling_resistance(start, calm):
         assert moved == (pytest.approx(expected, rel=0.1) if moves else pytest.approx(0.0, abs=0.01))
 
 
-@pytest.mark.parametrize("body_contact", [False, True])
+@pytest.mark.parametrize("body_contact", ["nothing", "object", "everything"])
 def test_hands_push_the_crate_with_what_it_resists(start, calm, hold_base, robot, body_contact):
     hold_base()
     recipe = changed(changed(calm, "scenes.push.gap", 0.0), "physics.body_contact", body_contact)
@@ -107,9 +107,9 @@ def test_hands_push_the_crate_with_what_it_resists(start, calm, hold_base, robot
     assert np.mean(forces) == pytest.approx(0.05 * 60.0 * GRAVITY, rel=0.25)
 
 
-def test_partner_that_bears_half_halves_the_load_on_the_wrists(start, calm, hold_base):
+def test_partner_that_bears_half_halves_the_load_on_the_wrists(start, by_hands, hold_base):
     hold_base()
-    recipe = changed(calm, "partner.enabled", True)
+    recipe = changed(by_hands, "partner.enabled", True)
     simulation = start(recipe, ["lift"] * 2, object_mass=8.0, partner_share=[0.0, 0.5], partner_noise=0.0)
     run(simulation, 200)
     load = np.linalg.norm(simulation.state.grip_force, axis=2).sum(axis=1)
@@ -142,10 +142,10 @@ def test_hands_slip_at_the_slip_force_and_not_below(start, calm, hold_base, monk
     assert simulation.state.object_position[0, 2] < 0.3
 
 
-def test_squeezed_box_is_held_up_to_what_friction_bears(start, calm, hold_base):
+def test_squeezed_box_is_held_up_to_what_friction_bears(start, by_hands, hold_base):
     hold_base()
     masses = np.array([2.0, 7.0, 16.0])
-    simulation = start(calm, ["squeeze"] * 3, object_mass=masses, surface_friction=1.0)
+    simulation = start(by_hands, ["squeeze"] * 3, object_mass=masses, surface_friction=1.0)
     run(simulation, 60)
     height = simulation.state.object_position[:, 2].copy()
     run(simulation, 100)
@@ -159,7 +159,7 @@ def test_squeezed_box_is_held_up_to_what_friction_bears(start, calm, hold_base):
 def test_body_contact_keeps_a_box_out_of_the_torso(start, calm, hold_base, monkeypatch):
     hold_base()
     nearest = []
-    for body_contact in (False, True):
+    for body_contact in ("nothing", "object"):
         simulation = start(changed(calm, "physics.body_contact", body_contact), ["lift"], object_mass=4.0)
 
         def push_back(commanded, gust, state, out):

@@ -64,7 +64,7 @@ def wrists(layer: ReferenceLayer, arms: Any, support: Any, asked: Any) -> Any:
 def test_an_episode_starts_with_the_wrists_at_the_base_grasp_and_the_offset(
     layer: ReferenceLayer, pitch: float
 ) -> None:
-    asked = command(pitch=pitch, offset=(0.02, 0.01, 0.03, 0.02, 0.01, -0.03))
+    asked = command(pitch=pitch, offset=(0.02, 0.01, 0.03, 0.0, 0.01, -0.03))
     arms, support = layer.start(asked, GRASP)
     expected = GRASP[0] + asked[0, OFFSET].reshape(2, 3)
     assert wrists(layer, arms, support, asked) == pytest.approx(expected, abs=2e-3)
