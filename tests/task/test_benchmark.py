@@ -1,5 +1,6 @@
 """The benchmark measures what it says: the bare loop steps the very states of the vector environment."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -8,9 +9,14 @@ import pytest
 from task_worlds import with_changes
 
 from iowbc.benchmarks import simulation
-from iowbc.benchmarks.bare_loop import STATE, record
+from iowbc.benchmarks.bare_loop import STATE, BareLoops, record
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown
+from iowbc.benchmarks.standing_generator import write_standing_generator
+from iowbc.benchmarks.variants import VARIANTS, compare
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+from iowbc.task.command import COMMAND, HEIGHT, PITCH
+from iowbc.task.references import ReferenceLayer
 from iowbc.task.setup import Setup
 
 
@@ -36,6 +42,34 @@ def test_the_parts_of_a_step_add_up(setup: Setup) -> None:
     parts = step_breakdown(setup, periods=5, rounds=1)
     assert parts.keys() == {*PARTS, "reset"}
     assert all(value > 0.0 for value in parts.values())
+
+
+def test_other_physics_are_compared_with_the_recipes(setup: Setup) -> None:
+    lines: list[str] = []
+    figures = compare(setup, periods=8, turns=1, say=lines.append)
+    assert figures["iterations_joint"] < 1e-3 < figures["cone_joint"] < 0.1
+    assert figures["timestep_cost"] > 1.5
+    assert "touch_nothing_cost" in figures
+    assert "touch_object_cost" not in figures, "that is the recipe's own"
+    assert len(lines) == 1 + len(VARIANTS)
+
+
+def test_the_stand_in_for_a_fitted_generator_keeps_the_default_posture(
+    recipe: Recipe, robot: Robot, tmp_path: Path
+) -> None:
+    write_standing_generator(tmp_path, robot, recipe.rg)
+    layer = ReferenceLayer(robot, recipe.task.references, tmp_path)
+    rng = np.random.default_rng(0)
+    command = layer.clamp(rng.normal(size=(5, len(COMMAND))))
+    assert command[:, HEIGHT] == pytest.approx(robot.default_height)
+    assert command[:, PITCH] == pytest.approx(0.0, abs=1e-5)
+    support = layer.support(rng.normal(size=(5, 14)), command)
+    assert support == pytest.approx(np.tile(robot.default_position[robot.support], (5, 1)), abs=1e-6)
+
+
+def test_a_process_that_fails_ends_the_benchmark_instead_of_blocking_it(setup: Setup, tmp_path: Path) -> None:
+    with pytest.raises(EOFError):
+        BareLoops(replace(setup, rg=tmp_path / "nothing"), [(0, 3)], periods=2)
 
 
 @pytest.mark.slow

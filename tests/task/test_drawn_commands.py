@@ -131,3 +131,12 @@ def test_a_command_has_eleven_entries_in_the_papers_order() -> None:
     assert len(COMMAND) == 11
     assert COMMAND[:5] == ("v_x", "v_y", "yaw_rate", "height", "pitch")
     assert (COMMAND[HEIGHT], COMMAND[PITCH], COMMAND[OFFSET][0]) == ("height", "pitch", "left_x")
+
+
+def test_an_episode_with_a_held_object_begins_on_the_way_to_its_posture(make: Make) -> None:
+    env = make(num_envs=40, changes={"task.commands.nominal_share": 0.0, "task.commands.holding_start": 0.4})
+    env.reset()
+    memory, holding = env.batch.memory, env.batch.scenes == "lift"
+    part = memory.command[:, OFFSET] / memory.goal[:, OFFSET]
+    assert part[holding] == pytest.approx(0.4)
+    assert part[~holding] == pytest.approx(1.0)
