@@ -38,7 +38,7 @@ def main(
     scene: str = "lift",
     environments: int = 48,
     workers: Sequence[int] = (),
-    turns: int = 7,
+    turns: int = 15,
     others: bool = True,
     say: Callable[[str], None] = print,
 ) -> dict[str, float]:
@@ -74,7 +74,7 @@ def _measure(
     others: bool,
     say: Callable[[str], None],
 ) -> dict[str, float]:
-    parts = step_breakdown(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns)
+    parts = step_breakdown(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns // 2 + 1)
     say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
     figures: dict[str, float] = {}
     for count in counts:
@@ -88,7 +88,7 @@ def _measure(
     for name in (*PARTS, "transfer"):
         say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
     say(f"  an episode's end adds {parts['reset']:.2f} ms")
-    compared = compare(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns // 2 + 1, say)
+    compared = compare(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
     figures |= {f"variant_{name}": value for name, value in compared.items()}
     return figures | {f"step_{name}_ms": value for name, value in parts.items()}
 

@@ -25,9 +25,9 @@ class FeasibleMap:
 
     def clamp(self, height: Array, pitch: Array) -> tuple[Array, Array]:
         """The command brought into the region, first the pitch, then the height at it; shapes (n,) [m], [rad]."""
-        kept = np.clip(pitch, self.pitch[0], self.pitch[-1])
+        kept = pitch.clip(self.pitch[0], self.pitch[-1])
         low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
-        return np.clip(height, low, high), kept
+        return height.clip(low, high), kept
 
     def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
         """Whether commands are inside, shape (n,)."""

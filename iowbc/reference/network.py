@@ -46,10 +46,8 @@ class ReferenceNetwork:
             x = _rowwise(x, weight) + bias
             x = np.maximum(x, np.expm1(np.minimum(x, 0.0)))
         weight, bias = self.layers[-1]
-        output: Array = np.clip(
-            (_rowwise(x, weight) + bias) * self.output_std + self.output_mean, self.lower, self.upper
-        )
-        return output
+        output: Array = (_rowwise(x, weight) + bias) * self.output_std + self.output_mean
+        return output.clip(self.lower, self.upper)
 
     def save(self, folder: Path) -> None:
         """Writes `rg.safetensors` and `rg.json`."""

@@ -77,8 +77,8 @@ class ArmKinematics:
         wanted = error - np.einsum("nsij,nsj->nsi", jacobian, posture)
         step = posture + np.einsum("nsji,nsj->nsi", jacobian, np.linalg.solve(gram, wanted[..., None])[..., 0])
         bound = self.speed * dt
-        moved = arm_position + np.clip(step.reshape(count, -1), -bound, bound)
-        kept: Array = np.clip(moved, self.lower, self.upper)
+        moved = arm_position + step.reshape(count, -1).clip(-bound, bound)
+        kept: Array = moved.clip(self.lower, self.upper)
         return kept
 
     def solve(self, arm_position: Array, target: Array, *, steps: int = 60, dt: float = 0.1) -> Array:

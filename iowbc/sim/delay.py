@@ -19,9 +19,10 @@ class DelayLine:
         self._newest = np.zeros(1, np.int64)
         self._whole = np.zeros(n, np.int64)
         self._part = np.zeros((n, 1))
-        self._rows = np.arange(n)
         self._flat = self._values.reshape(-1, width)
         self._seen, self._earlier = np.zeros((n, width)), np.zeros((n, width))
+        self._places = np.zeros((2, self._length, n), np.intp)
+        self._point(np.arange(n))
 
     def set_latency(self, which: Indices, latency: Array) -> None:
         """Latencies of some environments, (k,) [periods]."""
@@ -33,6 +34,15 @@ class DelayLine:
             )
         self._whole[which] = np.floor(latency).astype(np.int64)
         self._part[which, 0] = latency - np.floor(latency)
+        self._point(which)
+
+    def _point(self, which: Indices) -> None:
+        """Writes down, for every place of the newest value, where some environments read: the value seen, and the one
+        before it."""
+        seen = (np.arange(self._length)[:, None] - self._whole[which]) % self._length
+        n = len(self._whole)
+        self._places[0][:, which] = seen * n + which
+        self._places[1][:, which] = (seen - 1) % self._length * n + which
 
     def fill(self, which: Indices, value: Array) -> None:
         """Makes `value` (k, width) the whole past of some environments."""
@@ -48,17 +58,17 @@ class DelayLine:
 
         The array is overwritten by the next call.
         """
-        n = len(self._rows)
-        place = self._newest[0] - self._whole
-        place %= self._length
-        seen = self._flat.take(place * n + self._rows, axis=0, out=self._seen, mode="clip")
-        place += self._length - 1
-        place %= self._length
-        earlier = self._flat.take(place * n + self._rows, axis=0, out=self._earlier, mode="clip")
+        newest = self._newest[0]
+        seen = self._flat.take(self._places[0, newest], axis=0, out=self._seen, mode="clip")
+        earlier = self._flat.take(self._places[1, newest], axis=0, out=self._earlier, mode="clip")
         earlier -= seen
         earlier *= self._part
         seen += earlier
         return self._seen
+
+    def restored(self) -> None:
+        """To be called after the memory was written from outside."""
+        self._point(np.arange(len(self._whole)))
 
     def arrays(self) -> dict[str, Array]:
         """The line's memory, by name."""

@@ -150,6 +150,7 @@ class Partner:
     def restored(self) -> None:
         """To be called after the memory was written from outside."""
         self._any = bool(self._present.any())
+        self._line.restored()
 
 
 def _planar(vectors: Array) -> Array:

@@ -111,6 +111,11 @@ class Sensing:
         if not self._all_see:
             thing[~state.has_object] = NOT_SEEN
 
+    def restored(self) -> None:
+        """To be called after the memory was written from outside."""
+        for line in (self._robot_line, self._object_line):
+            line.restored()
+
     def arrays(self) -> dict[str, Array]:
         """The sensors' memory, by name."""
         own = {"bias": self._bias, "deviation": self._deviation, "rows": self.rows}

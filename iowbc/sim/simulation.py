@@ -256,7 +256,8 @@ class Simulation:
         for index, world in enumerate(self._worlds):
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
-        self._partner.restored()
+        for part in (self._partner, self._sensing, self._targets):
+            part.restored()
 
     def _world_of(self, env: int) -> tuple[World, int]:
         for world in self._worlds:

@@ -106,7 +106,7 @@ class Batch:
         """Joint targets of an action (n, 15) in the step to come, (n, 29) [rad]: θ_S_ref + scale·a, θ_I_ref."""
         bound = self.recipe.task.action.bound
         target = np.empty((self.n, len(self.robot.joints)))
-        target[:, self._support] = self.memory.support + self._scale * np.clip(action, -bound, bound)
+        target[:, self._support] = self.memory.support + self._scale * action.clip(-bound, bound)
         target[:, self._arms] = self.memory.arms
         return target
 
@@ -130,7 +130,7 @@ class Batch:
         """One control step of every environment; those that end begin anew."""
         memory, simulation, termination = self.memory, self.simulation, self.recipe.task.termination
         bound = self.recipe.task.action.bound
-        action = np.clip(self.buffers["action"].astype(np.float64), -bound, bound)
+        action = self.buffers["action"].astype(np.float64).clip(-bound, bound)
         simulation.target[:] = self.targets(action)
         simulation.feed[:] = memory.command[:, VELOCITY]
         simulation.step()
@@ -170,6 +170,7 @@ class Batch:
 
     def _score(self, moved: Motion, action: Array, place: Array, ending: Ending) -> Scored:
         memory, stance = self.memory, self.recipe.task.references.gait.stance
+        foot_phase = gait.foot_phase(memory.phase)
         step = Step(
             command=memory.command,
             height_rate=self._height_rate,
@@ -177,8 +178,8 @@ class Batch:
             filtered_velocity=memory.filtered_velocity,
             action=action,
             previous_action=memory.action,
-            swing_progress=gait.swing_progress(memory.phase, stance),
-            stance=gait.expected_stance(memory.phase, memory.stepping, stance),
+            swing_progress=gait.swing_progress(foot_phase, stance),
+            stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._held & self.simulation.state.grasped.any(axis=1),
             object_place=place,
             ended=ending.failed,
@@ -306,7 +307,7 @@ class Batch:
         )
         extra = privileged(moved, self.simulation.drawn)
         rows = np.empty((len(moved.heading[which]), layout.size), np.float32)
-        observe(layout.state, sensed.rows(which), rows[:, layout.observation])
+        observe(layout.state, sensed if which is EVERY else sensed.rows(which), rows[:, layout.observation])
         layout.extra.gather({name: values[which] for name, values in extra.items()}, rows[:, layout.privileged])
         self.buffers["observation"][which] = rows
 

@@ -48,15 +48,15 @@ def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: flo
     return new, ~rests
 
 
-def swing_progress(phase: Array, stance: float) -> Array:
-    """How far each foot is through its swing, 0 on the ground and 1 at touch-down; (n,) to (n, 2)."""
-    progress: Array = np.clip((foot_phase(phase) - stance) / (1.0 - stance), 0.0, 1.0)
+def swing_progress(foot_phase: Array, stance: float) -> Array:
+    """How far each foot is through its swing, 0 on the ground and 1 at touch-down; (n, 2) to (n, 2)."""
+    progress: Array = ((foot_phase - stance) / (1.0 - stance)).clip(0.0, 1.0)
     return progress
 
 
-def expected_stance(phase: Array, stepping: Mask, stance: float) -> Mask:
+def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
     """Which feet should be on the ground, (n, 2); both while the clock rests."""
-    down: Mask = (foot_phase(phase) < stance) | ~stepping[:, None]
+    down: Mask = (foot_phase < stance) | ~stepping[:, None]
     return down
 
 
@@ -64,7 +64,7 @@ def swing_prior(phase: Array, stepping: Mask, gait: GaitPrior) -> Array:
     """What the gait prior adds to θ_S_ref, (n, 15) [rad]: amplitude · sin(π·progress); zero while the clock rests."""
     if not gait.enabled:
         return np.zeros((len(phase), SUPPORT_JOINTS))
-    bump = np.sin(np.pi * swing_progress(phase, gait.stance)) * stepping[:, None]
+    bump = np.sin(np.pi * swing_progress(foot_phase(phase), gait.stance)) * stepping[:, None]
     amplitude = np.zeros((2, SUPPORT_JOINTS))
     for foot, joints in enumerate((LEFT_LEG_PITCH, RIGHT_LEG_PITCH)):
         amplitude[foot, joints] = gait.hip_pitch, gait.knee, gait.ankle_pitch

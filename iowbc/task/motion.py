@@ -68,7 +68,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
         yaw_rate=np.vecdot(rotation[:, 2], state.base_angular_velocity),
         pelvis_height=base[:, 2],
         height=base[:, 2] if height == "pelvis" else state.com_position[:, 2],
-        pelvis_tilt=np.arccos(np.clip(rotation[:, 2, 2], -1.0, 1.0)),
+        pelvis_tilt=np.arccos(rotation[:, 2, 2].clip(-1.0, 1.0)),
         torso_pitch=rotations.lean_of(state.torso_rotation),
         torso_roll=rotations.roll_of(state.torso_rotation),
         foot_position=vectors[:, 2:4],
