@@ -45,7 +45,8 @@ def main(
     """Measures, prints the tables, returns every figure by name (rates in environment steps a second, times in ms).
 
     `environments` a worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
-    the vector environment take turns, and the best turn of each counts: the one that other programs disturbed least.
+    the vector environment take turns. Rates are those of the best turn, which other programs disturbed least; the ratio
+    is the median over turns, each of the environment's against the bare loop's before it.
     `rg`: folder of a fitted reference generator; without one a stand-in that costs as much.
     `others`: also measure stable-baselines3's and gymnasium's vector environments.
     """
@@ -108,7 +109,7 @@ def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Call
     finally:
         env.close()
     rates = pairs.max(axis=0)
-    ratio = float(rates[1] / rates[0])
+    ratio = float(np.median(pairs[:, 1] / pairs[:, 0]))
     a_step = 1e-3 * resets / (EPISODE * setup.recipe.task.control_frequency)
     spread = 1.0 / (1.0 + a_step * rates[1] / setup.count)
     say(f"{f'bare mj_step loop, {count} process(es)':34}{rates[0]:10.0f}{1.0:10.2f}")
