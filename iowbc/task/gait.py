@@ -1,5 +1,6 @@
 """The gait clock φ_t: when it runs, which foot should be on the ground, and the swing it adds to the reference."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -65,11 +66,17 @@ def swing_prior(phase: Array, stepping: Mask, gait: GaitPrior) -> Array:
     if not gait.enabled:
         return np.zeros((len(phase), SUPPORT_JOINTS))
     bump = np.sin(np.pi * swing_progress(foot_phase(phase), gait.stance)) * stepping[:, None]
+    added: Array = bump @ _amplitudes(gait.hip_pitch, gait.knee, gait.ankle_pitch)
+    return added
+
+
+@cache
+def _amplitudes(hip_pitch: float, knee: float, ankle_pitch: float) -> Array:
+    """What the swing of each foot adds at most to each support joint, (2, 15) [rad]."""
     amplitude = np.zeros((2, SUPPORT_JOINTS))
     for foot, joints in enumerate((LEFT_LEG_PITCH, RIGHT_LEG_PITCH)):
-        amplitude[foot, joints] = gait.hip_pitch, gait.knee, gait.ankle_pitch
-    added: Array = bump @ amplitude
-    return added
+        amplitude[foot, joints] = hip_pitch, knee, ankle_pitch
+    return amplitude
 
 
 def phase_signal(phase: Array, stepping: Mask) -> Array:
