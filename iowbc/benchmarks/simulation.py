@@ -3,7 +3,8 @@
 import os
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -57,41 +58,35 @@ def main(
     only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
     recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
     say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
+    with _generator(rg, folder, recipe) as generator:
+        parts = step_breakdown(Setup(recipe, folder, generator, environments, recipe.seed), PERIODS, turns // 2 + 1)
+        say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
+        figures: dict[str, float] = {}
+        for count in counts:
+            setup = Setup(recipe, folder, generator, count * environments, recipe.seed)
+            figures |= _against_bare(setup, count, turns, environments * parts["reset"], say)
+            if others:
+                figures |= _others(recipe, folder, generator, scene, count, figures[f"vector_env_{count}"], say)
+        parts["transfer"] = figures[f"transfer_ms_{counts[-1]}"]
+        total = sum(parts[name] for name in (*PARTS, "transfer"))
+        say(f"a step of {environments} environments: {total:.2f} ms")
+        for name in (*PARTS, "transfer"):
+            say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
+        say(f"  an episode's end adds {parts['reset']:.2f} ms")
+        compared = compare(Setup(recipe, folder, generator, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
+        figures |= {f"variant_{name}": value for name, value in compared.items()}
+        return figures | {f"step_{name}_ms": value for name, value in parts.items()}
+
+
+@contextmanager
+def _generator(rg: Path | None, robot: Path, recipe: Recipe) -> Iterator[Path]:
+    """The folder of a fitted reference generator, or while needed that of a stand-in."""
+    if rg is not None:
+        yield rg
+        return
     with tempfile.TemporaryDirectory() as place:
-        if rg is None:
-            rg = Path(place)
-            write_standing_generator(rg, load_robot(folder), recipe.rg)
-        return _measure(recipe, folder, rg, scene, environments, counts, turns, others, say)
-
-
-def _measure(
-    recipe: Recipe,
-    folder: Path,
-    rg: Path,
-    scene: str,
-    environments: int,
-    counts: Sequence[int],
-    turns: int,
-    others: bool,
-    say: Callable[[str], None],
-) -> dict[str, float]:
-    parts = step_breakdown(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns // 2 + 1)
-    say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
-    figures: dict[str, float] = {}
-    for count in counts:
-        setup = Setup(recipe, folder, rg, count * environments, recipe.seed)
-        figures |= _against_bare(setup, count, turns, environments * parts["reset"], say)
-        if others:
-            figures |= _others(recipe, folder, rg, scene, count, figures[f"vector_env_{count}"], say)
-    parts["transfer"] = figures[f"transfer_ms_{counts[-1]}"]
-    total = sum(parts[name] for name in (*PARTS, "transfer"))
-    say(f"a step of {environments} environments: {total:.2f} ms")
-    for name in (*PARTS, "transfer"):
-        say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
-    say(f"  an episode's end adds {parts['reset']:.2f} ms")
-    compared = compare(Setup(recipe, folder, rg, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
-    figures |= {f"variant_{name}": value for name, value in compared.items()}
-    return figures | {f"step_{name}_ms": value for name, value in parts.items()}
+        write_standing_generator(Path(place), load_robot(robot), recipe.rg)
+        yield Path(place)
 
 
 def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Callable[[str], None]) -> dict[str, float]:

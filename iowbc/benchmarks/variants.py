@@ -83,18 +83,17 @@ def apart(one: Course, other: Course) -> tuple[float, float]:
 def compare(setup: Setup, periods: int, turns: int, say: Callable[[str], None]) -> dict[str, float]:
     """Prints and returns for each variant its cost and how far its trajectories are from the recipe's."""
     physics = setup.recipe.simulation.physics
-    setups = [_with_physics(setup, variant.physics) for variant in VARIANTS]
-    plain = play(setup, periods)
-    courses = [play(one, periods) for one in setups]
-    fastest = np.array([[play(one, periods).time for one in (setup, *setups)] for _ in range(turns)]).min(axis=0)
+    others = [v for v in VARIANTS if any(getattr(physics, name) != value for name, value in v.physics.items())]
+    setups = [setup, *(_with_physics(setup, variant.physics) for variant in others)]
+    played = [[play(one, periods) for one in setups] for _ in range(turns)]
+    fastest = [min(course.time for course in courses) for courses in zip(*played, strict=True)]
+    plain = played[0][0]
     seconds = periods / setup.recipe.task.control_frequency
     say(f"{f'other physics, trajectories of {seconds:g} s':34}{'cost':>10}{'joint [rad]':>14}{'base [mm]':>12}")
     figures: dict[str, float] = {}
-    for index, (one, course) in enumerate(zip(VARIANTS, courses, strict=True)):
-        if all(getattr(physics, name) == value for name, value in one.physics.items()):
-            continue
+    for one, course, time in zip(others, played[0][1:], fastest[1:], strict=True):
         joint, base = apart(plain, course)
-        cost = float(fastest[1 + index] / fastest[0])
+        cost = time / fastest[0]
         say(f"  {one.label:32}{cost:10.2f}{joint:14.4f}{1e3 * base:12.1f}")
         figures |= {f"{one.name}_cost": cost, f"{one.name}_joint": joint, f"{one.name}_base": base}
     joint, base = apart(plain, play(setup, periods, LARGER))

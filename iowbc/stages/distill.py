@@ -3,7 +3,7 @@
 import time
 
 from iowbc.stages.contract import Interrupted, Job, Stage
-from iowbc.stages.inputs import generator_stage
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 
 PANELS = ("kl", "action_rmse", "action_agreement", "episode_seconds", "teacher_share", "reward")
 """Shown in the figure of the learning curves."""
@@ -152,5 +152,5 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), "teacher"),
     run=run,
-    packages=("stages.distill", "learning", "task", "sim", "reference.network", "reference.feasibility", "robot"),
+    packages=("stages.distill", "learning", *ENVIRONMENTS),
 )

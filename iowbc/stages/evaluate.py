@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
-from iowbc.stages.inputs import generator_stage, policy_stage
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,15 +88,5 @@ STAGE = Stage(
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
-    packages=(
-        "stages.evaluate",
-        "evaluation",
-        "deploy",
-        "learning",
-        "task",
-        "sim",
-        "reference.network",
-        "reference.feasibility",
-        "robot",
-    ),
+    packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
 )

@@ -3,7 +3,7 @@
 import json
 
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
-from iowbc.stages.inputs import generator_stage, policy_stage
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
 
 
 def run(job: Job) -> None:
@@ -109,15 +109,5 @@ STAGE = Stage(
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
-    packages=(
-        "stages.export",
-        "deploy",
-        "evaluation",
-        "learning",
-        "task",
-        "sim",
-        "reference.network",
-        "reference.feasibility",
-        "robot",
-    ),
+    packages=("stages.export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
 )

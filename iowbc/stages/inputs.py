@@ -1,6 +1,9 @@
-"""Which artifacts the stages behind the reference generator read."""
+"""What the stages behind the reference generator share: the artifacts they read, the code of the environments."""
 
 from iowbc.recipe.recipe import Recipe
+
+ENVIRONMENTS = ("task", "sim", "reference.network", "reference.feasibility", "robot")
+"""Packages that decide how an environment steps."""
 
 
 def generator_stage(recipe: Recipe) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ import math
 import time
 
 from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
-from iowbc.stages.inputs import generator_stage
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 
 PANELS = (
     "episode_seconds",
@@ -125,5 +125,5 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher"),
     reads=generator_stage,
     run=run,
-    packages=("stages.teacher", "learning", "task", "sim", "reference.network", "reference.feasibility", "robot"),
+    packages=("stages.teacher", "learning", *ENVIRONMENTS),
 )

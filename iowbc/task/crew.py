@@ -108,7 +108,7 @@ class Workers:
                 self._poll.register(member.connection.fileno(), select.POLLIN)
                 self._members.append(member)
             for index, ((first, last), member) in enumerate(zip(self.groups, self._members, strict=True)):
-                member.connection.send_bytes(pickle.dumps((setup.as_json(), first, last)))
+                member.connection.send((setup.as_json(), first, last))
                 self._asked.add(index)
             self._wait(STARTING)
         except BaseException:

@@ -10,6 +10,7 @@ from iowbc.sim.state import SimulationState
 from iowbc.task.command import HEIGHT, PITCH, VELOCITY
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
+from iowbc.task.rewards import smooth
 from iowbc.task.rewards.total import TERMS, Scored
 from iowbc.task.shared import Buffers
 from iowbc.task.signals import COUNTERS, REASONS
@@ -71,12 +72,12 @@ def write_signals(
         "torso_pitch_command": command[:, PITCH],
         "pelvis_height": moved.height,
         "height_command": command[:, HEIGHT],
-        "saturation": state.saturation.mean(axis=1),
+        "saturation": smooth.saturation(state.saturation),
         "slipped": (state.has_object[:, None] & ~state.grasped).any(axis=1),
         "fallen": ending.fallen,
         "dropped": ending.dropped,
         "diverged": ending.diverged,
-        "power": np.abs(state.joint_torque * state.joint_velocity).sum(axis=1),
+        "power": smooth.power(state.joint_torque, state.joint_velocity),
         "phase": memory.phase,
         "level": memory.level,
         "time": memory.steps * period,
