@@ -15,8 +15,8 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from iowbc.benchmarks.bare_loop import BareLoops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
+from iowbc.benchmarks.other_physics import compare
 from iowbc.benchmarks.standing_generator import write_standing_generator
-from iowbc.benchmarks.variants import compare
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task import SceneShares
 from iowbc.robot.description import load_robot, robot_folder

@@ -11,8 +11,8 @@ from task_worlds import with_changes
 from iowbc.benchmarks import simulation
 from iowbc.benchmarks.bare_loop import STATE, BareLoops, record
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown
+from iowbc.benchmarks.other_physics import VARIANTS, compare
 from iowbc.benchmarks.standing_generator import write_standing_generator
-from iowbc.benchmarks.variants import VARIANTS, compare
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.command import COMMAND, HEIGHT, PITCH
