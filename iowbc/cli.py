@@ -11,8 +11,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from iowbc.pipeline.layout import Runs
-    from iowbc.pipeline.store import Store
+    from iowbc.pipeline.store.runs import Runs
+    from iowbc.pipeline.store.store import Store
     from iowbc.recipe.recipe import Recipe
 
 app = typer.Typer(
@@ -92,8 +92,8 @@ def _run_or_plan(
     runs: Path | None,
     only_plan: bool,
 ) -> None:
-    from iowbc.pipeline import session
-    from iowbc.pipeline.planning import Options
+    from iowbc.commands import run as session
+    from iowbc.pipeline.planner import Options
     from iowbc.stages import registry
 
     options = Options(until, frozenset(force or ()), on_code_change, workers)
@@ -105,7 +105,7 @@ def _run_or_plan(
 @app.command()
 def status(runs: RunsFolder = None) -> None:
     """Show what runs, what was left unfinished, and what each recipe has."""
-    from iowbc.pipeline.listing import print_status
+    from iowbc.commands.listing import print_status
 
     print_status(_store(runs), _console())
 
@@ -116,7 +116,7 @@ def list_(
     runs: RunsFolder = None,
 ) -> None:
     """List the stored artifacts."""
-    from iowbc.pipeline.listing import list_artifacts
+    from iowbc.commands.listing import list_artifacts
 
     if stage is not None:
         _check_stage(stage)
@@ -126,7 +126,7 @@ def list_(
 @app.command()
 def show(what: Named, runs: RunsFolder = None) -> None:
     """Show an artifact in detail, or the stages and metrics of a recipe."""
-    from iowbc.pipeline.listing import show as print_artifact
+    from iowbc.commands.listing import show as print_artifact
 
     print_artifact(_store(runs), _console(), what)
 
@@ -134,7 +134,7 @@ def show(what: Named, runs: RunsFolder = None) -> None:
 @app.command()
 def diff(first: Named, second: Named, runs: RunsFolder = None) -> None:
     """Show how two recipes or artifacts differ: recipe, keys, versions, code, metrics."""
-    from iowbc.pipeline.differences import diff as print_differences
+    from iowbc.commands.diff import diff as print_differences
 
     print_differences(_store(runs), _console(), first, second)
 
@@ -146,7 +146,7 @@ def compare(
     runs: RunsFolder = None,
 ) -> None:
     """Write tables and figures over several runs."""
-    from iowbc.pipeline.comparing import compare as write_comparison
+    from iowbc.commands.compare import compare as write_comparison
 
     store = _store(runs)
     write_comparison(store, _console(), recipes, output or store.runs.root / "compare")
@@ -165,7 +165,7 @@ def gc(
     runs: RunsFolder = None,
 ) -> None:
     """Remove artifacts and checkpoints; refuses without a scope."""
-    from iowbc.pipeline.collecting import Scope, collect
+    from iowbc.commands.gc import Scope, collect
 
     scope = Scope(unused, tuple(recipe or ()), work, damaged, older_than)
     collect(_store(runs), _console(), scope, dry_run)
@@ -187,7 +187,7 @@ def play(
 ) -> None:
     """Watch a trained policy in the viewer, or make a film of it."""
     _check_scene(scene)
-    from iowbc.pipeline.playable import play_word
+    from iowbc.commands.play import play_word
 
     raise typer.Exit(
         play_word(
@@ -218,7 +218,7 @@ def bench_simulation(
     given = _given(recipe)
     _check_scene(scene)
     from iowbc.benchmarks import simulation
-    from iowbc.pipeline.tracking import record_figures
+    from iowbc.pipeline.tracking.tracker import record_figures
     from iowbc.pipeline.writability import require_writable_runs
 
     require_writable_runs(_runs(runs))
@@ -233,7 +233,7 @@ def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, ru
     """Measure how fast the reference generator's samples are labelled, by each method; the figures go to MLflow."""
     given = _given(recipe)
     from iowbc.benchmarks import reference
-    from iowbc.pipeline.tracking import record_figures
+    from iowbc.pipeline.tracking.tracker import record_figures
     from iowbc.pipeline.writability import require_writable_runs
 
     require_writable_runs(_runs(runs))
@@ -241,13 +241,13 @@ def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, ru
 
 
 def _given(recipe: Path | None) -> "Recipe | None":
-    from iowbc.recipe.loading import load_recipe
+    from iowbc.recipe.reading.loading import load_recipe
 
     return load_recipe(recipe).recipe if recipe is not None else None
 
 
 def _check_stage(name: str) -> None:
-    from iowbc.recipe.problems import UsageError, nearest
+    from iowbc.errors import UsageError, nearest
     from iowbc.recipe.recipe import PIPELINE
 
     if name not in PIPELINE:
@@ -255,8 +255,8 @@ def _check_stage(name: str) -> None:
 
 
 def _check_scene(name: str) -> None:
-    from iowbc.recipe.problems import UsageError, nearest
-    from iowbc.recipe.task import SceneShares
+    from iowbc.errors import UsageError, nearest
+    from iowbc.recipe.task.task import SceneShares
 
     known = list(SceneShares.model_fields)
     if name not in known:
@@ -268,7 +268,7 @@ def ui(
     port: Annotated[int, typer.Option(help="Port on this machine.", min=1, max=65535)] = 5000, runs: RunsFolder = None
 ) -> None:
     """Open MLflow's web interface on the runs, for this machine alone."""
-    from iowbc.pipeline.interface import serve
+    from iowbc.commands.ui import serve
 
     raise typer.Exit(serve(_runs(runs), _console(), port))
 
@@ -278,7 +278,7 @@ def schema(output: Annotated[Path | None, typer.Option(help="File to write to, i
     """Write the JSON Schema of recipes, for editors."""
     import json
 
-    from iowbc.recipe.schema import recipe_schema
+    from iowbc.commands.schema import recipe_schema
 
     text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None:
@@ -290,7 +290,7 @@ def schema(output: Annotated[Path | None, typer.Option(help="File to write to, i
 @app.command()
 def doctor(runs: RunsFolder = None) -> None:
     """Check versions, binaries, rendering, cores, memory and disk."""
-    from iowbc.pipeline.doctor import examine
+    from iowbc.commands.doctor import examine
 
     raise typer.Exit(examine(_runs(runs), _console()))
 
@@ -302,13 +302,13 @@ def _console() -> "Console":
 
 
 def _store(folder: Path | None) -> "Store":
-    from iowbc.pipeline.store import Store
+    from iowbc.pipeline.store.store import Store
 
     return Store(_runs(folder))
 
 
 def _runs(folder: Path | None) -> "Runs":
-    from iowbc.pipeline.layout import Runs
+    from iowbc.pipeline.store.runs import Runs
 
     return Runs(folder or Path("runs"))
 
@@ -325,7 +325,7 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         app(arguments, prog_name="iowbc")
     except Exception as error:
-        from iowbc.recipe.problems import UsageError
+        from iowbc.errors import UsageError
 
         if not isinstance(error, UsageError):
             raise

@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.task.crew import QUIET_THREADS
-from iowbc.task.setup import Setup
-from iowbc.task.shared import private_buffers
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.shared import private_buffers
+from iowbc.task.vector.workers import QUIET_THREADS
 
 Array = NDArray[Any]
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from iowbc.benchmarks.bare_loop import wander
-from iowbc.task.crew import Alone, Workers
-from iowbc.task.setup import Setup
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.workers import Alone, Workers
 
 PARTS = ("physics", "simulation", "references", "reward", "observation", "rest")
 """mj_step; partner, delays, sensors and gathering; commands and references; motion, reward and terminations; writing

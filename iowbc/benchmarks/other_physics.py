@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from iowbc.benchmarks.bare_loop import wander
 from iowbc.benchmarks.breakdown import Stopwatch, watch_physics
-from iowbc.task.setup import Setup
-from iowbc.task.shared import private_buffers
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.shared import private_buffers
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.reference.labelling import LabelTask
-from iowbc.reference.labelling_pool import label_all
-from iowbc.reference.sampling import SamplePlan
+from iowbc.reference.labels.labelling import LabelTask
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.pool import label_all
 from iowbc.robot.description import load_robot, robot_folder
 
 

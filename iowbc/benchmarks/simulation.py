@@ -18,12 +18,12 @@ from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.other_physics import compare
 from iowbc.benchmarks.standing_generator import write_standing_generator
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task import SceneShares
+from iowbc.recipe.task.task import SceneShares
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.task.crew import Workers
-from iowbc.task.environment import Environment
-from iowbc.task.setup import Setup
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.gym.environment import Environment
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.vector.workers import Workers
 
 PERIODS = 40
 """Control steps from a reset that are measured: nobody has fallen yet, so that both loops step the same states."""

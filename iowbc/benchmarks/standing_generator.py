@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.reference.feasibility import FeasibleMap
-from iowbc.reference.network import ReferenceNetwork
-from iowbc.reference.network_inputs import input_names
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.fit.network_inputs import input_names
 from iowbc.robot.description import Robot
 
 

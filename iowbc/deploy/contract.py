@@ -6,9 +6,10 @@ from typing import Literal
 
 from pydantic import ValidationError
 
-from iowbc.recipe.commands import Commands
-from iowbc.recipe.references import References
+from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
+from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.task.joint_references import References
 
 CONTRACT = "contract.json"
 GRAPH = "policy.onnx"
@@ -21,10 +22,6 @@ GENERATOR = "rg"
 """Folder with the reference generator: its feasible map clamps commands; its network is in the graph already."""
 FEASIBLE = "feasible.npz"
 GENERATOR_FILES = ("rg.safetensors", "rg.json", FEASIBLE)
-
-
-class ContractBroken(Exception):
-    """An exported folder is incomplete, damaged, or of another format. The text says what to do."""
 
 
 class PortEntry(Section):

@@ -13,13 +13,14 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from iowbc.deploy.contract import FEASIBLE, GENERATOR, GRAPH, ROBOT, Contract, ContractBroken, read_contract
-from iowbc.recipe.references import Grasps
-from iowbc.reference.feasibility import FeasibleMap
+from iowbc.control import gait
+from iowbc.control.command import COMMAND, approach, rate_limits
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.deploy.contract import FEASIBLE, GENERATOR, GRAPH, ROBOT, Contract, read_contract
+from iowbc.errors import ContractBroken
+from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
-from iowbc.task import gait
-from iowbc.task.command import COMMAND, approach, rate_limits
-from iowbc.task.references import ReferenceLayer, both_wrists
 
 Array = NDArray[np.floating[Any]]
 Generator = Callable[[Array, Array], Array]

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
-from iowbc.evaluation.rollout import Played, play_in
-from iowbc.evaluation.trials import UNDISTURBED, Trial, command_script, trials_at
+from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, command_script, trials_at
+from iowbc.evaluation.trials.rollout import Played, play_in
 from iowbc.recipe.evaluation import Segment
-from iowbc.recipe.holding import FREE
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.vector_env import VectorEnv
+from iowbc.recipe.simulation.holding import FREE
+from iowbc.task.vector.vector_env import VectorEnv
 
 
 def acceptance_trials(recipe: Recipe) -> list[Trial]:
@@ -29,7 +29,7 @@ def acceptance_trials(recipe: Recipe) -> list[Trial]:
 def try_out(
     recipe: Recipe, robot: Path, rg: Path | None, exported: Path, interrupted: Callable[[], bool]
 ) -> tuple[ExportedPolicy, list[Played]]:
-    """Let the controller in the folder `exported` play the trials. Raises Stopped when interrupted.
+    """Let the controller in the folder `exported` play the trials. Raises Interrupted when interrupted.
 
     Returns the driver, which holds the golden vectors and the difference of targets, and how the trials went.
     """

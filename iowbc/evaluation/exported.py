@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.deploy.controller import Controller, Measured
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 
 class ExportedPolicy:

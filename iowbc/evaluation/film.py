@@ -10,8 +10,8 @@ import pandas as pd
 
 from iowbc.evaluation.video import Film, with_text
 from iowbc.recipe.evaluation import Video
-from iowbc.sim.rendering import SceneRenderer
-from iowbc.task.vector_env import VectorEnv
+from iowbc.sim.rendering.renderer import SceneRenderer
+from iowbc.task.vector.vector_env import VectorEnv
 
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from iowbc.pipeline.display import Display, StageView
-from iowbc.pipeline.tracking import Tracker
-from iowbc.pipeline.workspace import Workspace
+from iowbc.pipeline.console.display import Display, StageView
+from iowbc.pipeline.store.workspace import Workspace
+from iowbc.pipeline.tracking.tracker import Tracker
 
 
 class StageReport:

@@ -4,22 +4,19 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from iowbc.pipeline.display import Display, StageView
-from iowbc.pipeline.history import remember
-from iowbc.pipeline.locking import key_lock
+from iowbc.errors import Damaged, Interrupted, PipelineFailed, StageFailed
+from iowbc.pipeline.console.display import Display, StageView
+from iowbc.pipeline.console.wording import short
 from iowbc.pipeline.machine import available_cores, host, versions
-from iowbc.pipeline.planning import Planner, Step, changed_code
+from iowbc.pipeline.planner import Planner, Step, changed_code
 from iowbc.pipeline.reporting import StageReport
-from iowbc.pipeline.store import Artifact, Damaged
-from iowbc.pipeline.tracking import Tracker
-from iowbc.pipeline.wording import short
-from iowbc.pipeline.workspace import Workspace
-from iowbc.recipe.writing import as_yaml
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
-
-
-class PipelineFailed(Exception):
-    """A stage failed; the text names it, the reason, and what to do next."""
+from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.store.last_used import remember
+from iowbc.pipeline.store.locks import key_lock
+from iowbc.pipeline.store.store import Artifact
+from iowbc.pipeline.store.workspace import Workspace
+from iowbc.pipeline.tracking.tracker import Tracker
+from iowbc.recipe.reading.writing import as_yaml
 
 
 class Runner:

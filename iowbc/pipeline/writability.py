@@ -4,8 +4,8 @@ import os
 import tempfile
 from pathlib import Path
 
-from iowbc.pipeline.layout import Runs
-from iowbc.recipe.problems import UsageError
+from iowbc.errors import UsageError
+from iowbc.pipeline.store.runs import Runs
 
 
 def require_writable_runs(runs: Runs) -> None:

@@ -4,8 +4,8 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from iowbc.recipe.holding import Held, ObjectScene
 from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.holding import Held, ObjectScene
 
 REACHABLE_HEIGHT = (0.3, 1.0)
 """No humanoid of this size commands its pelvis out of these heights [m]."""

@@ -5,8 +5,8 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation import Segment
-from iowbc.recipe.holding import ObjectScene
 from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.holding import ObjectScene
 
 
 class Acceptance(Section):

@@ -8,10 +8,10 @@ from iowbc.recipe.distillation import Distillation
 from iowbc.recipe.evaluation import Evaluation
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
-from iowbc.recipe.reference import ReferenceGenerator
+from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.section import Section
-from iowbc.recipe.simulation import Simulation
-from iowbc.recipe.task import Task
+from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
 StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]

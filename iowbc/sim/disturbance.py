@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.distribution import Distribution
-from iowbc.sim import random
+from iowbc import counter_random as random
+from iowbc.recipe.simulation.distribution import Distribution
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]

@@ -4,8 +4,8 @@ from typing import Any
 
 import mujoco
 
-from iowbc.recipe.scene import Scene
-from iowbc.recipe.simulation import Physics
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
 from iowbc.sim.objects import OBJECT_BIT, add_object
 

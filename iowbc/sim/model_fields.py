@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.scene import Scene
-from iowbc.sim.draws import GRAVITY
-from iowbc.sim.layout import Layout
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.sim.episode_draws import GRAVITY
+from iowbc.sim.model_index import Layout
 from iowbc.sim.objects import TORSION, inertia_per_mass
 
 Array = NDArray[Any]

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from iowbc.recipe.scene import Object, Scene
+from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.robot.description import Robot
 
 OBJECT_BIT = 4

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.partner import Partner as Recipe
-from iowbc.recipe.scene import Scene
+from iowbc.recipe.simulation.partner import Partner as Recipe
+from iowbc.recipe.simulation.scene import Scene
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.draws import GRAVITY
+from iowbc.sim.episode_draws import GRAVITY
 from iowbc.sim.state import SimulationState
 
 Array = NDArray[Any]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iowbc.recipe.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import Robot
 from iowbc.sim.divergence import Divergence
 from iowbc.sim.world import World

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.sensing import Sensing as Recipe
+from iowbc.recipe.simulation.sensing import Sensing as Recipe
 from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import JOINTS, MeasuredState, SimulationState

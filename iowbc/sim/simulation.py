@@ -8,13 +8,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.simulation import Simulation as Recipe
+from iowbc import counter_random as random
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import Robot
-from iowbc.sim import partner, random, sensing
+from iowbc.sim import partner, sensing
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.disturbance import Blows
 from iowbc.sim.divergence import Divergence
-from iowbc.sim.draws import GRAVITY, Draws
+from iowbc.sim.episode_draws import GRAVITY, Draws
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.world import World
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.layout import Layout
+from iowbc.sim.model_index import Layout
 
 Array = NDArray[Any]
 

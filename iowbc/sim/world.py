@@ -8,14 +8,14 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
-from iowbc.recipe.scene import Scene
-from iowbc.recipe.simulation import Physics
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.layout import BASE_ANGULAR, BASE_LINEAR, Layout, as_slice
-from iowbc.sim.look import look_model
 from iowbc.sim.model import compile_scene
 from iowbc.sim.model_fields import ModelFields
+from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout, as_slice
+from iowbc.sim.rendering.appearance import look_model
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.state import SimulationState
 

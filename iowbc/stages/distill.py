@@ -2,7 +2,8 @@
 
 import time
 
-from iowbc.stages.contract import Interrupted, Job, Stage
+from iowbc.errors import Interrupted
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 
 PANELS = ("kl", "action_rmse", "action_agreement", "episode_seconds", "teacher_share", "reward")
@@ -23,7 +24,7 @@ def run(job: Job) -> None:
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.robot.description import load_robot
     from iowbc.task.mirror import action_mirror, observation_mirror
-    from iowbc.task.vector_env import VectorEnv
+    from iowbc.task.vector.vector_env import VectorEnv
 
     torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
     torch.manual_seed(job.recipe.seed)

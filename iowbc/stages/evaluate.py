@@ -3,8 +3,9 @@
 import json
 from typing import TYPE_CHECKING
 
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
 
 if TYPE_CHECKING:
@@ -20,13 +21,12 @@ def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, tables, figures, films and a summary."""
     import torch
 
+    from iowbc.errors import NoRenderer
     from iowbc.evaluation.film import filmed
-    from iowbc.evaluation.playing import film_row
-    from iowbc.evaluation.protocol import Protocol
-    from iowbc.evaluation.report import write_report
-    from iowbc.evaluation.rollout import Stopped
+    from iowbc.evaluation.report.report import write_report
+    from iowbc.evaluation.trials.protocol import Protocol
+    from iowbc.evaluation.viewer import film_row
     from iowbc.learning.acting import TeacherPolicy, load_policy
-    from iowbc.sim.headless import NoRenderer
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe, rg = job.recipe, job.inputs.get("rg-fit")
@@ -56,7 +56,7 @@ def run(job: Job) -> None:
             film_row(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
-    except Stopped as stopped:
+    except Interrupted as stopped:
         raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
     metrics = headline(summary)
     job.report.metrics(metrics, 0)
@@ -68,7 +68,7 @@ def run(job: Job) -> None:
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
     """The figures to show at the end of a run: survival and errors at the lightest and heaviest mass of each suite."""
-    from iowbc.evaluation.metrics import ERRORS
+    from iowbc.evaluation.trials.metrics import ERRORS
 
     metrics = {"trials": float(summary["trials"].sum()), "survived": float(summary["survived"].sum())}
     for _, row in summary.iterrows():

@@ -2,7 +2,8 @@
 
 import json
 
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
 
 
@@ -11,17 +12,17 @@ def run(job: Job) -> None:
     import numpy as np
     import torch
 
-    from iowbc.deploy import contract, golden
+    from iowbc.control.generator import ReferenceNetwork
+    from iowbc.control.observation import observation_layout
+    from iowbc.deploy import contract
     from iowbc.deploy.controller import open_session
-    from iowbc.deploy.folder import write_folder
-    from iowbc.deploy.graph import ControllerGraph
-    from iowbc.deploy.onnx_graph import run_torch
     from iowbc.evaluation.acceptance import try_out
-    from iowbc.evaluation.rollout import Stopped
+    from iowbc.export import golden
+    from iowbc.export.folder import write_folder
+    from iowbc.export.graph import ControllerGraph
+    from iowbc.export.onnx_graph import run_torch
     from iowbc.learning.storage import load_student
-    from iowbc.reference.network import ReferenceNetwork
     from iowbc.robot.description import load_robot
-    from iowbc.task.observation import observation_layout
 
     torch.set_num_threads(1)  # as on the robot, where the controller has one thread
     recipe, task, settings = job.recipe, job.recipe.task, job.recipe.export
@@ -49,7 +50,7 @@ def run(job: Job) -> None:
     write_folder(job.out, graph, recipe, rg, sources)
     try:
         policy, played = try_out(recipe, job.robot, rg, job.out, job.interrupted)
-    except Stopped as stopped:
+    except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
 
     inputs = golden.stacked(policy.inputs)
@@ -109,5 +110,5 @@ STAGE = Stage(
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
-    packages=("stages.export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
+    packages=("stages.export", "export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
 )

@@ -2,7 +2,7 @@
 
 from iowbc.recipe.recipe import Recipe
 
-ENVIRONMENTS = ("task", "sim", "reference.network", "reference.feasibility", "robot")
+ENVIRONMENTS = ("task", "sim", "control", "robot", "counter_random")
 """Packages that decide how an environment steps."""
 
 

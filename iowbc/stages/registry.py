@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
+from iowbc.pipeline.stage import Stage
 from iowbc.stages import distill, evaluate, export, rg_dataset, rg_fit, teacher
-from iowbc.stages.contract import Stage
 
 STAGES: Mapping[str, Stage] = {
     stage.name: stage

@@ -3,7 +3,8 @@
 import json
 import time
 
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.stage import Job, Stage
 
 CHUNK = {"static": 256, "ocp": 8}
 """Samples in a shard: one to three seconds of work, which is what an interruption or a crash costs."""
@@ -11,17 +12,18 @@ CHUNK = {"static": 256, "ocp": 8}
 
 def run(job: Job) -> None:
     """Leaves `dataset.npz`, `feasible.npz`, `summary.json` and figures."""
-    from iowbc.reference.crosscheck import compare, pick
-    from iowbc.reference.dataset import assemble, reasons
-    from iowbc.reference.feasible_region import measure_region
-    from iowbc.reference.figures import dataset_figures
-    from iowbc.reference.labelling import LabelTask
-    from iowbc.reference.labelling_pool import Stopped, label_all
-    from iowbc.reference.mirror_check import mirror_error
-    from iowbc.reference.posture_strip import draw_strip
-    from iowbc.reference.sampling import SamplePlan, check_ranges
+    from iowbc.errors import NoRenderer
+    from iowbc.reference.labels.crosscheck import compare, pick
+    from iowbc.reference.labels.dataset import assemble, reasons
+    from iowbc.reference.labels.labelling import LabelTask
+    from iowbc.reference.labels.mirror_check import mirror_error
+    from iowbc.reference.labels.plan import SamplePlan, check_ranges
+    from iowbc.reference.labels.pool import label_all
+    from iowbc.reference.pictures.figures import dataset_figures
+    from iowbc.reference.pictures.postures import draw_strip
+    from iowbc.reference.region import measure_region
     from iowbc.robot.description import load_robot
-    from iowbc.sim.headless import NoRenderer, context
+    from iowbc.sim.rendering.backend import context
 
     recipe, seed = job.recipe.rg, job.recipe.seed
     robot = load_robot(job.robot)
@@ -67,7 +69,7 @@ def run(job: Job) -> None:
                 progress=lambda done, total: job.report.progress(done, total, "optimal control"),
             )
             check = compare(dataset, again)
-    except Stopped as stop:
+    except Interrupted as stop:
         raise Interrupted("finished shards are kept") from stop
 
     metrics = {
@@ -129,5 +131,5 @@ STAGE = Stage(
     ),
     reads=lambda recipe: (),
     run=run,
-    packages=("reference", "robot"),
+    packages=("reference", "control", "robot"),
 )

@@ -3,7 +3,8 @@
 import json
 from typing import Any
 
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.stage import Job, Stage
 
 WORST_SHOWN = 5
 
@@ -12,17 +13,17 @@ def run(job: Job) -> None:
     """Leaves `rg.safetensors`, `rg.json`, `feasible.npz`, `report.json` and figures."""
     import numpy as np
 
-    from iowbc.reference.dataset import Dataset
-    from iowbc.reference.feasibility import FeasibleMap
-    from iowbc.reference.feasible_region import measure_gentle_region
-    from iowbc.reference.figures import error_figures, gentle_figure, learning_figure
-    from iowbc.reference.fit_gates import judge_fit
-    from iowbc.reference.fit_preparation import prepare
-    from iowbc.reference.fitting import FitStopped, fit
-    from iowbc.reference.network import ReferenceNetwork
-    from iowbc.reference.network_inputs import base_columns, input_names
-    from iowbc.reference.sampling import SamplePlan
-    from iowbc.reference.smoothness import measure_jumps
+    from iowbc.control.feasible_map import FeasibleMap
+    from iowbc.control.generator import ReferenceNetwork
+    from iowbc.reference.fit.fitting import fit
+    from iowbc.reference.fit.gates import judge_fit
+    from iowbc.reference.fit.network_inputs import base_columns, input_names
+    from iowbc.reference.fit.preparation import prepare
+    from iowbc.reference.fit.smoothness import measure_jumps
+    from iowbc.reference.labels.dataset import Dataset
+    from iowbc.reference.labels.plan import SamplePlan
+    from iowbc.reference.pictures.figures import error_figures, gentle_figure, learning_figure
+    from iowbc.reference.region import measure_gentle_region
     from iowbc.robot.description import load_robot
 
     rg, source = job.recipe.rg, job.inputs["rg-dataset"]
@@ -40,7 +41,7 @@ def run(job: Job) -> None:
 
     try:
         fitted = fit(prepared.train, prepared.validation, rg.fit, job.recipe.seed, epoch_done, job.interrupted)
-    except FitStopped as stop:
+    except Interrupted as stop:
         raise Interrupted from stop
     support = robot.support
     network = ReferenceNetwork(
@@ -101,5 +102,5 @@ STAGE = Stage(
     slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem", "rg.feasible"),
     reads=lambda recipe: ("rg-dataset",),
     run=run,
-    packages=("reference", "robot"),
+    packages=("reference", "control", "robot"),
 )

@@ -3,7 +3,8 @@
 import math
 import time
 
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 
 PANELS = (
@@ -27,7 +28,7 @@ def run(job: Job) -> None:
     from iowbc.learning.storage import save_network
     from iowbc.robot.description import load_robot
     from iowbc.task.mirror import action_mirror, observation_mirror
-    from iowbc.task.vector_env import VectorEnv
+    from iowbc.task.vector.vector_env import VectorEnv
 
     torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
     recipe, settings = job.recipe, job.recipe.teacher

@@ -7,26 +7,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc import counter_random as random
+from iowbc.control import gait
+from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE
+from iowbc.control.observation import FullLayout, Sensed, observation_layout, observe, privileged_layout
+from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
-from iowbc.sim import random
-from iowbc.sim.layout import as_slice
+from iowbc.sim.model_index import as_slice
 from iowbc.sim.simulation import Simulation
-from iowbc.task import gait
-from iowbc.task.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE
-from iowbc.task.commander import Commander
+from iowbc.task.commands.commander import Commander
 from iowbc.task.curriculum import Difficulty, difficulty, initial_level, next_level
-from iowbc.task.episode import Episode
+from iowbc.task.endings import dropped, fallen
+from iowbc.task.episodes import Episode
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion, low_pass, motion
-from iowbc.task.observation import FullLayout, Sensed, observation_layout, observe, privileged_layout
 from iowbc.task.privileged import privileged
-from iowbc.task.recorder import Ending, count_endings, count_step, write_signals
-from iowbc.task.references import ReferenceLayer, both_wrists
+from iowbc.task.record.recorder import Ending, count_endings, count_step, write_signals
 from iowbc.task.rewards.total import RewardFunction, Scored, Step
-from iowbc.task.shared import Buffers
-from iowbc.task.snapshots import by_scene, by_world
-from iowbc.task.termination import dropped, fallen
+from iowbc.task.vector.shared import Buffers
+from iowbc.task.vector.snapshots import by_scene, by_world
 
 Array = NDArray[Any]
 Indices = NDArray[np.intp]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.curriculum import Curriculum
+from iowbc.recipe.task.curriculum import Curriculum
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
@@ -14,7 +14,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Difficulty:
-    """The scales of n environments, each (n,); see `iowbc.recipe.curriculum.Phase`."""
+    """The scales of n environments, each (n,); see `iowbc.recipe.task.curriculum.Phase`."""
 
     velocity: Array
     posture: Array

@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.task.command import COMMAND
+from iowbc.control.command import COMMAND
 from iowbc.task.rewards.total import TERMS, TRACKED
 
 Array = NDArray[Any]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from iowbc.control.observation import FullLayout, ObservationLayout
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import AXIAL_SIGN, VECTOR_SIGN, MirrorMap, joint_mirror, support_mirror
-from iowbc.task.observation import FullLayout, ObservationLayout
 
 VECTORS = (
     "projected_gravity",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iowbc.recipe.task import SceneShares
+from iowbc.recipe.task.task import SceneShares
 
 
 def scene_of(count: int, shares: SceneShares) -> list[str]:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.pipeline.naming import open_artifact
-from iowbc.recipe.problems import UsageError
+from iowbc.commands.named import open_artifact
+from iowbc.errors import UsageError
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 Key = Callable[[str, str], str]

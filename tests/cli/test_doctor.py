@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from iowbc.pipeline import doctor
-from iowbc.pipeline.layout import Runs
+from iowbc.commands import doctor
+from iowbc.pipeline.store.runs import Runs
 
 
 def test_this_machine_is_fit(tmp_path: Path) -> None:

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import torch
 
-from iowbc.deploy.folder import write_folder
-from iowbc.deploy.graph import ControllerGraph
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.control.observation import observation_layout
+from iowbc.export.folder import write_folder
+from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.recipe import Recipe
-from iowbc.reference.feasibility import FeasibleMap
-from iowbc.reference.network import ReferenceNetwork
 from iowbc.robot.description import Robot, load_robot, robot_folder
-from iowbc.task.observation import observation_layout
 
 HISTORY = 25
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.deploy.contract import CONTRACT, GRAPH, ContractBroken, read_contract
+from iowbc.deploy.contract import CONTRACT, GRAPH, read_contract
 from iowbc.deploy.controller import Controller, Measured
+from iowbc.errors import ContractBroken
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 

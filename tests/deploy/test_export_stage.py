@@ -8,19 +8,18 @@ from typing import Any
 
 import pytest
 
-from iowbc.deploy import golden
-from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, ContractBroken, read_contract
+from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
 from iowbc.deploy.controller import open_session
-from iowbc.deploy.graph import ControllerGraph
-from iowbc.evaluation.playing import NoDisplay, exported_source, play, require_display
-from iowbc.evaluation.rollout import Stopped
+from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
+from iowbc.evaluation.viewer import exported_source, play, require_display
+from iowbc.export import golden
+from iowbc.export.graph import ControllerGraph
 from iowbc.learning.storage import save_network
+from iowbc.pipeline.stage import Job
 from iowbc.recipe.evaluation import Segment, Video
-from iowbc.recipe.problems import UsageError
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.stages import export
-from iowbc.stages.contract import Interrupted, Job, StageFailed
 
 STAND = [{"duration": 0.3, "ramp": 0.0}]
 
@@ -178,7 +177,7 @@ def test_what_cannot_be_played_is_refused_with_what_can(done: Job, tmp_path: Pat
 
 
 def test_an_interrupted_film_leaves_no_file(done: Job, tmp_path: Path) -> None:
-    with pytest.raises(Stopped):
+    with pytest.raises(Interrupted):
         play(exported_source(done.out), video=tmp_path / "out.mp4", interrupted=lambda: True)
     assert list(tmp_path.iterdir()) == []
 

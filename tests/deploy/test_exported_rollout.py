@@ -7,17 +7,17 @@ import pytest
 from numpy.typing import NDArray
 
 from iowbc.deploy.controller import Controller
-from iowbc.deploy.golden import largest_difference, stacked
-from iowbc.deploy.graph import ControllerGraph
-from iowbc.deploy.onnx_graph import run_torch
 from iowbc.evaluation.exported import ExportedPolicy
-from iowbc.evaluation.rollout import play_in
-from iowbc.evaluation.trials import command_script, trials_at
+from iowbc.evaluation.trials.plan import command_script, trials_at
+from iowbc.evaluation.trials.rollout import play_in
+from iowbc.export.golden import largest_difference, stacked
+from iowbc.export.graph import ControllerGraph
+from iowbc.export.onnx_graph import run_torch
 from iowbc.learning.acting import StudentPolicy
 from iowbc.recipe.evaluation import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 TOLERANCE = 1e-5
 SEQUENCE = (

@@ -8,17 +8,17 @@ import onnx
 import pytest
 import torch
 
+from iowbc.control.gait import phase_signal, swing_prior
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.control.observation import Sensed, observe
 from iowbc.deploy.contract import GRAPH
 from iowbc.deploy.controller import open_session
-from iowbc.deploy.golden import Values, largest_difference, read_golden, run_session, stacked, write_golden
-from iowbc.deploy.graph import ControllerGraph
-from iowbc.deploy.onnx_graph import run_torch, write_onnx
-from iowbc.recipe.references import GaitPrior
-from iowbc.reference.network import ReferenceNetwork
+from iowbc.export.golden import Values, largest_difference, read_golden, run_session, stacked, write_golden
+from iowbc.export.graph import ControllerGraph
+from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.task.gait import phase_signal, swing_prior
-from iowbc.task.observation import Sensed, observe
 
 TOLERANCE = 1e-5
 

@@ -11,18 +11,19 @@ import pandas as pd
 import pytest
 import torch
 
-from iowbc.evaluation.aggregate import COSTS
-from iowbc.evaluation.metrics import ERRORS
-from iowbc.evaluation.protocol import Protocol, in_batch, replayed
-from iowbc.evaluation.rollout import play_episodes
-from iowbc.evaluation.trials import sweep_trials
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.evaluation.report.aggregate import COSTS
+from iowbc.evaluation.trials.metrics import ERRORS
+from iowbc.evaluation.trials.plan import sweep_trials
+from iowbc.evaluation.trials.protocol import Protocol, in_batch, replayed
+from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network
+from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
 from iowbc.stages import evaluate
-from iowbc.stages.contract import Interrupted, Job, StageFailed
 from iowbc.task.batch import full_layout
 
 QUESTION = {

@@ -6,9 +6,9 @@ from pydantic import ValidationError
 
 from iowbc.recipe.evaluation import Evaluation, HeavyCase, Segment, Sweep
 from iowbc.recipe.export import Acceptance
-from iowbc.recipe.holding import HOLDABLE, SCENES
-from iowbc.recipe.references import Grasps
-from iowbc.recipe.simulation import Simulation as SimulationRecipe
+from iowbc.recipe.simulation.holding import HOLDABLE, SCENES
+from iowbc.recipe.simulation.simulation import Simulation as SimulationRecipe
+from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.sim.simulation import Simulation
 

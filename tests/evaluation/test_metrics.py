@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iowbc.evaluation.metrics import Trace, error_norm, moving_average, trial_metrics, wrapped
+from iowbc.evaluation.trials.metrics import Trace, error_norm, moving_average, trial_metrics, wrapped
 
 DT = 0.02
 GAIT_STEPS = 40

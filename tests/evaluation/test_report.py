@@ -5,12 +5,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from iowbc.evaluation.aggregate import COSTS, aggregate, load_capacity, variants_of
-from iowbc.evaluation.figures import comparison, errors_against_mass, style_of
-from iowbc.evaluation.metrics import ERRORS
-from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
-from iowbc.evaluation.report import write_report
-from iowbc.evaluation.tables import capacity_table, latex, markdown, success_table, sweep_table
+from iowbc.evaluation.report.aggregate import COSTS, aggregate, load_capacity, variants_of
+from iowbc.evaluation.report.figures import comparison, errors_against_mass, style_of
+from iowbc.evaluation.report.paper import LIFTING, PUSHING, VARIANTS, reported
+from iowbc.evaluation.report.report import write_report
+from iowbc.evaluation.report.tables import capacity_table, latex, markdown, success_table, sweep_table
+from iowbc.evaluation.trials.metrics import ERRORS
 
 
 def trials_of(variant: str, suite: str, survivors: dict[float, int], case: str = "") -> pd.DataFrame:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iowbc.evaluation.metrics import trial_metrics
-from iowbc.evaluation.protocol import ending, survived
-from iowbc.evaluation.rollout import RECORDED, VECTORS, Stopped, play_in
+from iowbc.errors import Interrupted
+from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.evaluation.trials.protocol import ending, survived
+from iowbc.evaluation.trials.rollout import RECORDED, VECTORS, play_in
 from iowbc.recipe.evaluation import Success
 from iowbc.recipe.recipe import Recipe
 
@@ -108,7 +109,7 @@ def test_traces_have_the_shapes_that_metrics_need() -> None:
 
 
 def test_an_interruption_stops_at_once() -> None:
-    with pytest.raises(Stopped, match="2 episodes"):
+    with pytest.raises(Interrupted, match="2 episodes"):
         played([5, 5], ["time_limit", "time_limit"], interrupted=lambda: True)
 
 

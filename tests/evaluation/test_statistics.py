@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iowbc.evaluation.statistics import mean_half_width, wilson_interval
+from iowbc.evaluation.report.statistics import mean_half_width, wilson_interval
 
 
 def test_wilson_interval_of_four_in_five_is_the_textbook_one() -> None:

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from iowbc.evaluation.film import filmed
-from iowbc.evaluation.trials import command_script, heavier_mass, heavy_trials, sweep_trials
-from iowbc.recipe.commands import Commands
+from iowbc.evaluation.trials.plan import command_script, heavier_mass, heavy_trials, sweep_trials
 from iowbc.recipe.evaluation import Beyond, Evaluation, HeavyCase, Segment, Sweep
+from iowbc.recipe.task.commands import Commands
 
 COMMANDS = Commands()
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from iowbc.pipeline.stage import Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages import distill, evaluate, export, teacher
-from iowbc.stages.contract import Stage
 
 SIMULATING = [teacher.STAGE, distill.STAGE, evaluate.STAGE, export.STAGE]
 

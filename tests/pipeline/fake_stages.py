@@ -11,11 +11,12 @@ import sys
 import time
 from collections.abc import Callable
 
-from iowbc.pipeline import tracking
-from iowbc.pipeline.layout import write_atomically
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline import stage as contract
+from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.store.runs import write_atomically
+from iowbc.pipeline.tracking import tracker as tracking
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages import contract
-from iowbc.stages.contract import Interrupted, Job, Stage, StageFailed
 
 
 def counting(name: str) -> Callable[[Job], None]:

@@ -6,9 +6,9 @@ import time
 import pytest
 from rich.console import Console
 
-from iowbc.pipeline.display import CURVE_POINTS, PlainDisplay, StageView
-from iowbc.pipeline.live import LiveDisplay, sparkline
-from iowbc.pipeline.wording import short, size
+from iowbc.pipeline.console.display import CURVE_POINTS, PlainDisplay, StageView
+from iowbc.pipeline.console.live_table import LiveDisplay, sparkline
+from iowbc.pipeline.console.wording import short, size
 
 
 def test_a_sparkline_rises_with_its_values() -> None:

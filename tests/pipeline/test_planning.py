@@ -7,10 +7,10 @@ import fake_stages
 import pytest
 from workplace import RECIPE, Workplace
 
-from iowbc.pipeline import planning
-from iowbc.pipeline.fingerprint import canonical_json, code_digests, data_digest
-from iowbc.pipeline.wording import duration
-from iowbc.recipe.problems import RecipeError
+from iowbc.errors import RecipeError
+from iowbc.pipeline import planner as planning
+from iowbc.pipeline.console.wording import duration
+from iowbc.pipeline.store.digests import canonical_json, code_digests, data_digest
 
 
 def test_a_first_plan_says_that_nothing_is_stored(workplace: Workplace) -> None:

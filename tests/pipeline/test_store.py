@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from workplace import Workplace
 
-from iowbc.pipeline.store import MANIFEST, Damaged, Store
-from iowbc.pipeline.workspace import Workspace
-from iowbc.stages.contract import Interrupted
+from iowbc.errors import Damaged, Interrupted
+from iowbc.pipeline.store.store import MANIFEST, Store
+from iowbc.pipeline.store.workspace import Workspace
 
 
 def flip(path: Path) -> None:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.pipeline.suitability import check_against_robot
-from iowbc.recipe.loading import load_recipe
-from iowbc.recipe.problems import RecipeError
+from iowbc.commands.robot_check import check_against_robot
+from iowbc.errors import RecipeError
+from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import robot_folder
 
 ELBOW = "rg:\n  sampling:\n    joint_ranges:\n      {name}: {{low: {low}, high: 1.0}}\n"

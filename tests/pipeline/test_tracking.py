@@ -10,9 +10,9 @@ from typing import Any
 
 from workplace import RECIPE, Workplace, until
 
-from iowbc.pipeline.journal import Journal, close_orphaned, statuses, unsent
-from iowbc.pipeline.layout import Runs
-from iowbc.pipeline.tracking import backlog
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.journal import Journal, close_orphaned, statuses, unsent
+from iowbc.pipeline.tracking.tracker import backlog
 
 SLOW = {"teacher": {"steps": 40, "pause": 0.05}}
 TRACKED = RECIPE.replace("track: false", "tracking_patience: 30")
@@ -20,7 +20,7 @@ TRACKED = RECIPE.replace("track: false", "tracking_patience: 30")
 
 def deliver(runs: Runs) -> int:
     """Send what is left, as the next run would."""
-    command = [sys.executable, "-m", "iowbc.pipeline.sender", str(runs.root)]
+    command = [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root)]
     return subprocess.run(command, check=False, timeout=120, stdin=subprocess.DEVNULL).returncode
 
 

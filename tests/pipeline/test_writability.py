@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.pipeline.layout import Runs
+from iowbc.errors import UsageError
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.writability import require_writable_runs
-from iowbc.recipe.problems import UsageError
 
 
 def test_a_missing_folder_is_made_and_nothing_is_left_in_it(tmp_path: Path) -> None:

@@ -14,13 +14,13 @@ from typing import Any
 
 import fake_stages
 
-from iowbc.pipeline.display import StageView
-from iowbc.pipeline.layout import Runs, read_json
-from iowbc.pipeline.planning import Options, Planner, Step
+from iowbc.pipeline.console.display import StageView
+from iowbc.pipeline.planner import Options, Planner, Step
 from iowbc.pipeline.runner import Runner
-from iowbc.pipeline.store import Artifact, Store
-from iowbc.recipe.loading import load_recipe
-from iowbc.stages.contract import Stage
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.runs import Runs, read_json
+from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.recipe.reading.loading import load_recipe
 
 COMMAND = Path(fake_stages.__file__)
 RECIPE = "seed: 3\nteacher:\n  steps: 4096\nexecution: {track: false, line_interval: 0.1}\n"

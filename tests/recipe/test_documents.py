@@ -2,8 +2,8 @@
 
 import pytest
 
-from iowbc.recipe.document import leaves, plain, read_document
-from iowbc.recipe.problems import RecipeError
+from iowbc.errors import RecipeError
+from iowbc.recipe.reading.document import leaves, plain, read_document
 
 
 def value_of(text: str) -> object:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.recipe.loading import LoadedRecipe, load_recipe
-from iowbc.recipe.problems import RecipeError
+from iowbc.errors import RecipeError
+from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -153,7 +153,7 @@ def test_a_wrong_override_is_told_like_a_wrong_line(tmp_path: Path) -> None:
 
 def test_a_recipe_is_validated_fast_and_without_heavy_imports(tmp_path: Path) -> None:
     script = (
-        "import sys; from iowbc.recipe.loading import load_recipe; load_recipe(sys.argv[1]);"
+        "import sys; from iowbc.recipe.reading.loading import load_recipe; load_recipe(sys.argv[1]);"
         "print([m for m in ('torch', 'mujoco', 'mlflow', 'numpy', 'pandas', 'pinocchio') if m in sys.modules])"
     )
     path = write(tmp_path, "teacher:\n  steps: 4096\n")

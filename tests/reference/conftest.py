@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from reference_jobs import make_job, small_recipe
 
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.reference.sample import Sample
-from iowbc.reference.support_model import SupportModel
-from iowbc.robot.arms import ArmKinematics
+from iowbc.control.arms import ArmKinematics
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot, load_robot, robot_folder
-from iowbc.stages.contract import Job
 
 
 @pytest.fixture(scope="session")

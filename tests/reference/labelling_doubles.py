@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.reference.sample import Rejected, Sample
+from iowbc.errors import Rejected
+from iowbc.reference.labels.sample import Sample
 
 
 class Double:

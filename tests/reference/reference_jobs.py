@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
-from iowbc.stages.contract import Job
 
 SMALL: dict[str, Any] = {
     "sampling": {"samples": 400, "mirrored_share": 0.1},

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from iowbc.reference.constrained_step import constrained_step
-from iowbc.reference.sample import Rejected
+from iowbc.errors import Rejected
+from iowbc.reference.labels.constrained_step import constrained_step
 
 
 def test_a_worked_example() -> None:

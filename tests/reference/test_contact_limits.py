@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio
 import pytest
 
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.reference.self_collision import SelfCollision, segment_distance
-from iowbc.reference.support_model import SupportModel
-from iowbc.reference.support_polygon import support_edges, support_margin
-from iowbc.reference.wrench_cone import SoleLimits
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.self_collision import SelfCollision, segment_distance
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_polygon import support_edges, support_margin
+from iowbc.reference.labels.wrench_cone import SoleLimits
 from iowbc.robot.description import Robot
 
 LIMITS = SoleLimits(friction=0.5 * np.sqrt(2.0), half_length=0.1, half_width=0.03, smallest_load=20.0)

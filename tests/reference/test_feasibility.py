@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iowbc.reference.feasibility import FeasibleMap, build_map
+from iowbc.control.feasible_map import FeasibleMap, build_map
 
 PITCHES = np.array([0.0, 0.5, 1.0, 1.5])
 HEIGHTS = np.array([0.5, 0.6, 0.7, 0.8])

@@ -7,19 +7,20 @@ import numpy as np
 import pinocchio
 import pytest
 
-from iowbc.recipe.reference import Fit, FitGates, ReferenceGenerator, Smoothness
-from iowbc.reference.dataset import Dataset
-from iowbc.reference.feasibility import FeasibleMap
-from iowbc.reference.fit_gates import judge_fit
-from iowbc.reference.fit_preparation import split_by_group
-from iowbc.reference.fitting import FitData, FitStopped, fit
-from iowbc.reference.network import ReferenceNetwork
-from iowbc.reference.sample import Sample
-from iowbc.reference.smoothness import Jumps, measure_jumps
-from iowbc.reference.static import StaticMethod
-from iowbc.reference.support_model import SupportModel
-from iowbc.reference.task_error import TaskErrors, TaskKinematics
-from iowbc.stages.contract import Job
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.errors import Interrupted
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, Smoothness
+from iowbc.reference.fit.fitting import FitData, fit
+from iowbc.reference.fit.gates import judge_fit
+from iowbc.reference.fit.preparation import split_by_group
+from iowbc.reference.fit.smoothness import Jumps, measure_jumps
+from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.static import StaticMethod
+from iowbc.reference.labels.support_model import SupportModel
 
 
 def toy(count: int, seed: int) -> FitData:
@@ -66,7 +67,7 @@ def test_it_stops_early_and_keeps_the_best_epoch() -> None:
 
 
 def test_it_stops_when_asked() -> None:
-    with pytest.raises(FitStopped):
+    with pytest.raises(Interrupted):
         learn(Fit(epochs=50, hidden=(8,)), stop_at=2)
 
 

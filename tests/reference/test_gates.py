@@ -7,11 +7,12 @@ import numpy as np
 import pinocchio
 import pytest
 
-from iowbc.recipe.reference import LabelGates, ReferenceGenerator
-from iowbc.reference.gates import Judge
-from iowbc.reference.sample import Posture, Rejected, Sample
-from iowbc.reference.static import StaticMethod
-from iowbc.reference.support_model import SupportModel
+from iowbc.errors import Rejected
+from iowbc.recipe.generator import LabelGates, ReferenceGenerator
+from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.static import StaticMethod
+from iowbc.reference.labels.support_model import SupportModel
 
 
 @pytest.fixture(scope="module")

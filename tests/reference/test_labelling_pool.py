@@ -13,8 +13,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))  # workers find the doubles by this path too
 from labelling_doubles import DoubleTask
 
-from iowbc.reference.labelling_pool import CRASHED, Stopped, label_all
-from iowbc.reference.shards import Shard, read_shard, write_shard
+from iowbc.errors import Interrupted
+from iowbc.reference.labels.pool import CRASHED, label_all
+from iowbc.reference.labels.shards import Shard, read_shard, write_shard
 
 COUNT, CHUNK = 40, 8
 
@@ -127,7 +128,7 @@ def stop_after(samples: int) -> tuple[Callable[[], bool], Callable[[int, int], N
 
 def test_an_interruption_keeps_finished_shards_and_leaves_no_process(tmp_path: Path, expected: Shard) -> None:
     interrupted, progress = stop_after(16)
-    with pytest.raises(Stopped):
+    with pytest.raises(Interrupted):
         run(tmp_path, DoubleTask(pause=0.02), workers=2, interrupted=interrupted, progress=progress)
     assert not [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
     assert 2 <= len(list(tmp_path.glob("*.npz"))) < 5

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.reference.network import ReferenceNetwork
-from iowbc.reference.network_inputs import base_columns, input_names
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.fit.network_inputs import base_columns, input_names
 from iowbc.robot.description import Robot
 
 
@@ -126,7 +126,7 @@ def test_inputs_are_named_as_the_recipe_samples_them(robot: Robot) -> None:
 
 def test_workers_of_the_simulation_import_nothing_heavy_with_it() -> None:
     code = (
-        "import sys, iowbc.reference.network, iowbc.reference.feasibility;"
+        "import sys, iowbc.control.generator, iowbc.control.feasible_map;"
         "print([name for name in ('torch', 'pinocchio', 'crocoddyl', 'matplotlib', 'scipy') if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,21 +6,21 @@ import numpy as np
 import pinocchio
 import pytest
 
-from iowbc.recipe.reference import LabelGates, ReferenceGenerator
-from iowbc.reference.crosscheck import compare, pick
-from iowbc.reference.dataset import Dataset
-from iowbc.reference.gates import Judge
-from iowbc.reference.kinematic_start import KinematicStart
-from iowbc.reference.optimal_control import OptimalControlMethod
-from iowbc.reference.sample import Sample
-from iowbc.reference.sampling import SamplePlan
-from iowbc.reference.shards import Shard
-from iowbc.reference.static import StaticMethod
-from iowbc.reference.support_model import SupportModel
-from iowbc.reference.wrench_cone import sole_limits
-from iowbc.reference.wrench_distribution import distribute
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.generator import LabelGates, ReferenceGenerator
+from iowbc.reference.labels.crosscheck import compare, pick
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.kinematic_start import KinematicStart
+from iowbc.reference.labels.optimal_control import OptimalControlMethod
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.shards import Shard
+from iowbc.reference.labels.static import StaticMethod
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.wrench_cone import sole_limits
+from iowbc.reference.labels.wrench_distribution import distribute
 from iowbc.robot.description import Robot
-from iowbc.stages.contract import Job
 
 COMMANDS = ((0.70, 0.0), (0.60, 0.4), (0.66, -0.2), (0.68, 0.9))
 

@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from reference_jobs import make_job, small_recipe
 
-from iowbc.recipe.loading import load_recipe
-from iowbc.reference.dataset import Dataset
-from iowbc.reference.feasibility import FeasibleMap
-from iowbc.reference.network import ReferenceNetwork
-from iowbc.reference.sampling import COMMAND_MIRROR, SamplePlan
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.plan import COMMAND_MIRROR, SamplePlan
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 from iowbc.stages import rg_dataset, rg_fit
-from iowbc.stages.contract import Interrupted, Job, StageFailed
 
 DATA = ("dataset.npz", "feasible.npz", "summary.json")
 

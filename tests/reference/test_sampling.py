@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from iowbc.recipe.commands import Commands
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.recipe.references import Grasps
-from iowbc.reference.sampling import COMMAND_MIRROR, SamplePlan, check_ranges
-from iowbc.robot.arms import ArmKinematics
+from iowbc.control.arms import ArmKinematics
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.task.joint_references import Grasps
+from iowbc.reference.labels.plan import COMMAND_MIRROR, SamplePlan, check_ranges
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror
 

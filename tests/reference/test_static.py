@@ -8,15 +8,16 @@ import numpy as np
 import pinocchio
 import pytest
 
-from iowbc.recipe.reference import ReferenceGenerator
-from iowbc.reference.costs import posture_weights
-from iowbc.reference.dataset import Dataset
-from iowbc.reference.sample import Posture, Rejected, Sample
-from iowbc.reference.static import StaticMethod
-from iowbc.reference.support_model import SupportModel
+from iowbc.errors import Rejected
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.costs import posture_weights
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.static import StaticMethod
+from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
-from iowbc.stages.contract import Job
 
 LABELS = 40
 

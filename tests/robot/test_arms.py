@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.robot.arms import ArmKinematics
+from iowbc.control.arms import ArmKinematics
 from iowbc.robot.description import Robot
 
 PERIOD = 0.02

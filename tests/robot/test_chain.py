@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from iowbc.control.chain import Chain, turn
 from iowbc.robot import rotations
-from iowbc.robot.chain import Chain, turn
 
 RANDOM = np.random.default_rng(0)
 LENGTH, ROWS = 4, 5

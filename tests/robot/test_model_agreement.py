@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from iowbc.robot.arms import ArmKinematics
+from iowbc.control.arms import ArmKinematics
 from iowbc.robot.description import Robot
 from iowbc.robot.pinocchio_model import configuration
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.recipe.simulation import Simulation as Recipe
-from iowbc.robot.arms import ArmKinematics
+from iowbc.control.arms import ArmKinematics
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import Robot, load_robot, robot_folder
 from iowbc.sim import world
 from iowbc.sim.simulation import Simulation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iowbc.sim.layout import as_slice
+from iowbc.sim.model_index import as_slice
 
 
 @pytest.mark.parametrize("indices", [[4], [3, 4, 5], [2, 9], [1, 4, 7]])

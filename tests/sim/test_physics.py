@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from conftest import changed, run
 
-from iowbc.recipe.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
 
 GRAVITY = 9.81
 

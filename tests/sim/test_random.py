@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from iowbc.recipe.distribution import Distribution
-from iowbc.sim import random
+from iowbc import counter_random as random
+from iowbc.recipe.simulation.distribution import Distribution
 
 
 def keys(count: int, seed: int = 0) -> np.ndarray:

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from conftest import run
 
-from iowbc.recipe.simulation import Simulation as Recipe
-from iowbc.sim import headless, look
-from iowbc.sim.rendering import GRIP, PUSH, SMALLEST_FORCE, SceneRenderer
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.sim.rendering import appearance as look
+from iowbc.sim.rendering import backend as headless
+from iowbc.sim.rendering.renderer import GRIP, PUSH, SMALLEST_FORCE, SceneRenderer
 
 
 @pytest.mark.parametrize("scene", ["free", "lift", "tyre", "push"])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from conftest import changed, run
 
-from iowbc.recipe.simulation import Simulation as Recipe
-from iowbc.sim import random
+from iowbc import counter_random as random
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.sim.divergence import Divergence
 from iowbc.sim.replay import replay
 from iowbc.sim.simulation import Simulation

@@ -9,7 +9,7 @@ from task_worlds import with_changes
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot, load_robot, robot_folder
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 
 @pytest.fixture(scope="session")

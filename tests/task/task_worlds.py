@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 
 def changed(section: Any, path: str, value: Any) -> Any:

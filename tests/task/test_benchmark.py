@@ -13,11 +13,11 @@ from iowbc.benchmarks.bare_loop import STATE, BareLoops, record
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown
 from iowbc.benchmarks.other_physics import VARIANTS, compare
 from iowbc.benchmarks.standing_generator import write_standing_generator
+from iowbc.control.command import COMMAND, HEIGHT, PITCH
+from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
-from iowbc.task.command import COMMAND, HEIGHT, PITCH
-from iowbc.task.references import ReferenceLayer
-from iowbc.task.setup import Setup
+from iowbc.task.vector.setup import Setup
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from task_worlds import actions
 
-from iowbc.recipe.curriculum import Curriculum
+from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.task.curriculum import difficulty, initial_level, next_level
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 RECIPE = Curriculum(rise=0.1, fall=0.05, early=0.5, tracking=0.6)

@@ -7,7 +7,7 @@ import numpy as np
 from task_worlds import actions
 
 from iowbc.sim.divergence import Divergence
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from task_worlds import rollout
 
-from iowbc.recipe.commands import CommandRates, Commands
-from iowbc.recipe.curriculum import Curriculum
-from iowbc.sim import random
-from iowbc.task.command import COMMAND, HEIGHT, OFFSET, PITCH, VELOCITY, approach, rate_limits
+from iowbc import counter_random as random
+from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, VELOCITY, approach, rate_limits
+from iowbc.recipe.task.commands import CommandRates, Commands
+from iowbc.recipe.task.curriculum import Curriculum
+from iowbc.task.commands.drawing import draw_goals, draw_holding_time, nominal_command
+from iowbc.task.commands.script import CommandScript, CommandSegment
 from iowbc.task.curriculum import difficulty
-from iowbc.task.sampling import draw_goals, draw_holding_time, nominal_command
-from iowbc.task.script import CommandScript, CommandSegment
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 COMMANDS = Commands()

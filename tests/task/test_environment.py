@@ -9,14 +9,14 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_by_sb3
 from task_worlds import actions
 
-import iowbc.task.registration  # noqa: F401
-from iowbc.task.environment import Environment
+import iowbc.task.gym.registration  # noqa: F401
+from iowbc.task.gym.environment import Environment
 
 NAMES = ("iowbc/Free-v0", "iowbc/Lift-v0", "iowbc/Push-v0")
 
 
 def test_a_name_with_its_module_needs_no_import_before() -> None:
-    env = gymnasium.make("iowbc.task.registration:iowbc/Tyre-v0", disable_env_checker=True)
+    env = gymnasium.make("iowbc.task.gym.registration:iowbc/Tyre-v0", disable_env_checker=True)
     assert env.reset(seed=0)[0].shape == env.observation_space.shape
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from task_worlds import actions, rollout, same
 
-from iowbc.task.episode import Episode
-from iowbc.task.script import CommandScript, CommandSegment
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.episodes import Episode
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from iowbc.recipe.references import GaitPrior
-from iowbc.task import gait
+from iowbc.control import gait
+from iowbc.recipe.task.joint_references import GaitPrior
 
 PRIOR = GaitPrior(frequency=1.0, stance=0.6)
 DT = 0.02

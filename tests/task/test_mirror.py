@@ -11,10 +11,10 @@ from task_worlds import QUIET, actions
 
 from iowbc.robot.description import Robot
 from iowbc.sim import world
-from iowbc.task.episode import Episode
+from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.episodes import Episode
 from iowbc.task.mirror import action_mirror, command_mirror, observation_mirror
-from iowbc.task.script import CommandScript, CommandSegment
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 

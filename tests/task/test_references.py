@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from task_worlds import QUIET, rollout, same
 
+from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.control.references import WAIST, ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.references import References
-from iowbc.reference.feasibility import FeasibleMap
-from iowbc.reference.network import ReferenceNetwork
+from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
-from iowbc.task.command import HEIGHT, OFFSET, PITCH
-from iowbc.task.references import WAIST, ReferenceLayer, both_wrists
-from iowbc.task.sampling import nominal_command
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.commands.drawing import nominal_command
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 GRASP = both_wrists(References().grasps.lift)[None]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from task_worlds import QUIET, rollout
 
-from iowbc.recipe.reward import Reward
+from iowbc.recipe.task.reward import Reward
 from iowbc.task.rewards import gait, smooth, sync
 from iowbc.task.rewards import object as equilibrium
 from iowbc.task.rewards.kernel import kernel, squared_norm
 from iowbc.task.rewards.total import TERMS
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 

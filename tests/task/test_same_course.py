@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from task_worlds import rollout, same
 
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 

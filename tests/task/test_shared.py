@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pytest
 
-from iowbc.task.setup import shares
-from iowbc.task.shared import attach_shared, create_shared, private_buffers
+from iowbc.task.vector.setup import shares
+from iowbc.task.vector.shared import attach_shared, create_shared, private_buffers
 
 FIELDS = {"action": ((3,), "float32"), "done": ((), "bool"), "sum": ((2, 2), "float64")}
 

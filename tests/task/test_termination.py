@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.recipe.termination import Termination
-from iowbc.task.termination import dropped, fallen
+from iowbc.recipe.task.termination import Termination
+from iowbc.task.endings import dropped, fallen
 
 RECIPE = Termination()
 

@@ -8,10 +8,10 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from task_worlds import actions, rollout, with_changes
 
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.environment import Environment
+from iowbc.task.gym.environment import Environment
+from iowbc.task.record.signals import REASONS, SIGNALS
 from iowbc.task.rewards.total import TERMS
-from iowbc.task.signals import REASONS, SIGNALS
-from iowbc.task.vector_env import VectorEnv
+from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
 

@@ -17,8 +17,9 @@ import psutil
 import pytest
 from task_worlds import actions
 
-from iowbc.task.crew import WorkerFailed, Workers
-from iowbc.task.vector_env import VectorEnv
+from iowbc.errors import WorkerFailed
+from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.vector.workers import Workers
 
 Make = Callable[..., VectorEnv]
 SOON = 5.0
@@ -131,7 +132,7 @@ PARENT = """
     import signal, sys, time
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
-    from iowbc.task.vector_env import VectorEnv
+    from iowbc.task.vector.vector_env import VectorEnv
     import numpy as np
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
@@ -200,7 +201,7 @@ def test_workers_take_little_memory_beyond_their_imports(make: Make) -> None:
     env.reset()
     for step in range(3):
         env.step(actions(step, 48))
-    code = "import iowbc.task.setup, psutil; print(psutil.Process().memory_info().rss)"
+    code = "import iowbc.task.vector.setup, psutil; print(psutil.Process().memory_info().rss)"
     imports = int(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
     used = psutil.Process(crew(env).processes[0]).memory_info().rss
     assert (used - imports) / 1e6 < 150.0

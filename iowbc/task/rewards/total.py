@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.recipe.reward import Kernel, Reward
+from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+from iowbc.recipe.task.reward import Kernel, Reward
 from iowbc.sim.state import SimulationState
-from iowbc.task.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.task.motion import Motion
 from iowbc.task.rewards import gait, smooth, sync
 from iowbc.task.rewards import object as equilibrium

@@ -1,0 +1,70 @@
+"""`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from iowbc.commands.named import Named, named
+from iowbc.commands.results import shown_path
+from iowbc.errors import UsageError
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.writability import require_writable
+
+TRIALS = "trials.parquet"
+
+
+def compare(store: Store, console: Console, words: Sequence[str], output: Path) -> None:
+    """Write `metrics.md`, and the report over all trials, under `output`; print the tables. Raises `UsageError`."""
+    found = [named(store, word) for word in words]
+    if len(found) < 2:
+        raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
+    require_writable(output, "--output")
+    (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
+    tried = [run for run in found if _trials(run).is_file()]
+    if len(tried) > 1:
+        _report(tried, output)
+    for path in (output / "metrics.md", *sorted((output / "tables").glob("*.md"))):
+        console.print(path.read_text(encoding="utf-8"), markup=False, highlight=False, soft_wrap=True)
+    for path in sorted(output.rglob("*.*")):
+        console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
+
+
+def metrics_table(found: Sequence[Named]) -> str:
+    """All metrics of all stages as a Markdown table, a column for each run."""
+    names = dict.fromkeys(
+        (stage, metric) for run in found for stage, artifact in run.artifacts.items() for metric in artifact.metrics
+    )
+    rows = ["| stage | metric | " + " | ".join(run.word for run in found) + " |", "|---|---|" + "---:|" * len(found)]
+    for stage, metric in names:
+        values = [run.artifacts[stage].metrics.get(metric) if stage in run.artifacts else None for run in found]
+        cells = ["" if value is None else f"{value:.4g}" for value in values]
+        rows.append(f"| {stage} | {metric} | " + " | ".join(cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _trials(run: Named) -> Path:
+    """The trials of a run's evaluation; no file where it has none."""
+    return run.artifacts["eval"].folder / TRIALS if "eval" in run.artifacts else Path(TRIALS, "missing")
+
+
+def _report(runs: Sequence[Named], output: Path) -> None:
+    import pandas as pd
+
+    from iowbc.evaluation.report.report import write_report
+
+    trials = [pd.read_parquet(_trials(run)) for run in runs]
+    counts = Counter(label for table in trials for label in table["variant"].unique())
+    labels: dict[str, str] = {}
+    for index, (table, run) in enumerate(zip(trials, runs, strict=True)):
+        own = [str(label) for label in table["variant"].unique()]
+        if any(counts[label] > 1 for label in own):
+            labels[run.word] = own[0]
+            trials[index] = table.assign(variant=run.word)
+    rates = {run.artifacts["eval"].ingredients["recipe"]["eval"]["success"]["capacity_rate"] for run in runs}
+    if len(rates) > 1:
+        raise UsageError(
+            f"the recipes count a mass as carried at different rates (eval.success.capacity_rate): {rates}"
+        )
+    write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)

@@ -1,0 +1,201 @@
+"""`iowbc doctor`: whether this machine can run a recipe, and what to do where it cannot."""
+
+import importlib.metadata
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.pipeline.console.wording import duration
+from iowbc.pipeline.machine import available_cores
+from iowbc.pipeline.store.runs import Runs
+
+Verdict = Literal["good", "doubtful", "bad"]
+STYLES = {"good": "green", "doubtful": "yellow", "bad": "bold red"}
+LEAST_MEMORY = 4e9
+"""Memory that the quickstart recipe needs for its worker processes [bytes]."""
+LEAST_DISK = 5e9
+"""Disk that a full run and its tracking take [bytes]."""
+PATIENCE = 120.0
+"""Seconds after which a check that runs in a process of its own has failed."""
+
+CONTACT_MODEL = """
+import crocoddyl, numpy, pinocchio
+model = pinocchio.Model()
+joint = model.addJoint(0, pinocchio.JointModelFreeFlyer(), pinocchio.SE3.Identity(), "root_joint")
+model.appendBodyToJoint(joint, pinocchio.Inertia.Random(), pinocchio.SE3.Identity())
+frame = model.addFrame(pinocchio.Frame("foot", joint, 0, pinocchio.SE3.Identity(), pinocchio.FrameType.OP_FRAME))
+state = crocoddyl.StateMultibody(model)
+contact = crocoddyl.ContactModel6D(
+    state, frame, pinocchio.SE3.Identity(), pinocchio.LOCAL, state.nv, numpy.zeros(2))
+x = state.zero()
+data = pinocchio.Data(model)
+pinocchio.forwardKinematics(model, data, x[:7], x[7:], numpy.zeros(6))
+pinocchio.computeJointJacobians(model, data)
+pinocchio.updateFramePlacements(model, data)
+made = contact.createData(data)
+contact.calc(made, x)
+assert numpy.isfinite(made.Jc).all() and abs(made.Jc).sum() > 0
+"""
+"""Computes a contact of a free body; mismatched binaries of crocoddyl and pinocchio crash here."""
+
+PICTURE = """
+from iowbc.sim.rendering import backend as headless
+chosen = headless.backend()
+context = headless.context(64, 64)
+import mujoco
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light pos='0 0 3'/><geom size='1'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+context.free()
+print(chosen)
+"""
+"""Sets up what a picture without a screen needs."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    name: str
+    verdict: Verdict
+    text: str
+
+
+def examine(runs: Runs, console: Console) -> int:
+    """Print all findings; returns 1 where something essential fails, else 0."""
+    table = Table(box=None, padding=(0, 1), show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    verdicts = []
+    for finding in findings(runs):
+        verdicts.append(finding.verdict)
+        table.add_row(finding.name, Text(finding.verdict, style=STYLES[finding.verdict]), Text(finding.text))
+    console.print(table)
+    if "bad" in verdicts:
+        console.print("not fit to run recipes: see the lines marked bad", highlight=False)
+        return 1
+    console.print("fit to run recipes", highlight=False)
+    return 0
+
+
+def findings(runs: Runs) -> Iterator[Finding]:
+    """Everything that is looked at, essential things first."""
+    yield _python()
+    yield from _packages()
+    yield _robot()
+    yield _process("crocoddyl and pin", CONTACT_MODEL, _contact_verdict)
+    yield _process("pictures", PICTURE, _picture_verdict)
+    yield _cores()
+    yield _memory()
+    yield _disk(runs)
+    yield _tracking(runs)
+
+
+def _python() -> Finding:
+    version = sys.version.split()[0]
+    fits = sys.version_info[:2] == (3, 11)
+    return Finding("Python", "good" if fits else "bad", version if fits else f"{version}; Python 3.11 is needed")
+
+
+def _packages() -> Iterator[Finding]:
+    """Installed versions against those that iowbc asks for."""
+    found = []
+    for requirement in importlib.metadata.requires("iowbc") or []:
+        if "extra ==" in requirement:
+            continue
+        name = re.split(r"[^\w.\-]", requirement, maxsplit=1)[0]
+        try:
+            version = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            yield Finding(name, "bad", f"not installed; `pip install '{requirement}'`")
+            continue
+        pinned = re.search(r"==([\w.]+)", requirement)
+        if pinned and version.partition("+")[0] != pinned[1]:
+            yield Finding(name, "bad", f"{version} instead of {pinned[1]}; `pip install '{requirement}'`")
+        found.append(f"{name} {version}")
+    yield Finding("packages", "good", ", ".join(found))
+
+
+def _robot() -> Finding:
+    from iowbc.robot.description import load_robot, robot_folder
+
+    try:
+        robot = load_robot(robot_folder("g1"))
+    except (OSError, ValueError) as error:
+        return Finding("robot", "bad", str(error))
+    return Finding("robot", "good", f"{robot.name} with {len(robot.joints)} joints in {robot.folder}")
+
+
+def _process(name: str, script: str, verdict: Callable[[int, str, str], tuple[Verdict, str]]) -> Finding:
+    """Run a check where a crash does no harm."""
+    command = [sys.executable, "-c", script]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        return Finding(name, "bad", f"no answer within {duration(PATIENCE)}")
+    last = done.stderr.strip().splitlines()[-1:] or [""]
+    return Finding(name, *verdict(done.returncode, done.stdout.strip(), last[0]))
+
+
+def _contact_verdict(code: int, output: str, error: str) -> tuple[Verdict, str]:
+    if code == 0:
+        return "good", "a contact model computes"
+    reason = f"it crashes (signal {-code})" if code < 0 else error
+    return "bad", (
+        f"a contact model does not compute: {reason}; the binaries must match: "
+        "`pip install crocoddyl==3.2.1 pin==4.0.0 libpinocchio==4.0.0`"
+    )
+
+
+def _picture_verdict(code: int, output: str, error: str) -> tuple[Verdict, str]:
+    if code == 0:
+        return "good", f"drawn without a screen by {output}"
+    reason = f"it crashes (signal {-code})" if code < 0 else error.partition("NoRenderer: ")[2] or error
+    return "doubtful", f"none, and no films: {reason}"
+
+
+def _cores() -> Finding:
+    cores = available_cores()
+    return Finding("cores", "good" if cores > 1 else "doubtful", f"{cores} of {os.cpu_count()}")
+
+
+def _memory() -> Finding:
+    import psutil
+
+    memory = psutil.virtual_memory()
+    text = f"{memory.available / 1e9:.1f} GB free of {memory.total / 1e9:.1f} GB"
+    if memory.available < LEAST_MEMORY:
+        return Finding("memory", "doubtful", f"{text}; fewer --workers need less")
+    return Finding("memory", "good", text)
+
+
+def _disk(runs: Runs) -> Finding:
+    try:
+        runs.root.mkdir(parents=True, exist_ok=True)
+        probe = runs.root / f".probe-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        return Finding("disk", "bad", f"{runs.root} cannot be written: {error.strerror}; give another with --runs")
+    free = shutil.disk_usage(runs.root).free
+    text = f"{free / 1e9:.1f} GB free in {runs.root.absolute()}"
+    return Finding("disk", "good" if free > LEAST_DISK else "doubtful", text)
+
+
+def _tracking(runs: Runs) -> Finding:
+    from iowbc.pipeline.tracking.tracker import backlog, tracking_uri
+
+    waiting = len(backlog(runs))
+    text = tracking_uri(runs) + (f"; {waiting} runs are not sent whole yet" if waiting else "")
+    return Finding("tracking", "doubtful" if waiting else "good", text)

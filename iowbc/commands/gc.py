@@ -1,0 +1,107 @@
+"""`iowbc gc`: removes what was asked for by name, and nothing that a process works on."""
+
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from iowbc.commands.named import known_recipes, last_used
+from iowbc.commands.results import shown_path
+from iowbc.errors import UsageError, nearest
+from iowbc.pipeline.console.wording import size
+from iowbc.pipeline.store.last_used import recall
+from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.workspace import unfinished
+from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
+from iowbc.pipeline.writability import require_writable_runs
+
+REMOVING = ".removing-"
+"""What the name of a folder that is being removed begins with."""
+DAY = 86_400.0
+"""Seconds."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What may be removed."""
+
+    unused: bool = False
+    """Artifacts that no recipe used last."""
+    recipes: tuple[str, ...] = ()
+    """These recipes' records, and artifacts that no other recipe used last."""
+    work: bool = False
+    """Scratch and checkpoints of stages that did not finish, and journals of their runs that MLflow has."""
+    damaged: bool = False
+    """Artifacts that were set aside as damaged."""
+    older_than: float = 0.0
+    """Of all these only what is older [days]."""
+
+
+def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None:
+    """Remove what the scope names, or list it. Raises `UsageError` without a scope."""
+    if not (scope.unused or scope.recipes or scope.work or scope.damaged):
+        raise UsageError(
+            "gc removes only what it is told to: --unused (artifacts that no recipe used last), --recipe NAME, "
+            "--work (unfinished stages), --damaged; --older-than DAYS narrows it, --dry-run only lists"
+        )
+    if store.runs.root.exists() and not dry_run:
+        require_writable_runs(store.runs)
+    total = 0
+    for path in dict.fromkeys(_doomed(store, scope)):
+        if time.time() - path.stat().st_mtime < scope.older_than * DAY:
+            continue
+        count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
+        total += count
+        verb = "would remove" if dry_run else "removed"
+        if not dry_run:
+            _remove(path)
+        console.print(f"{verb} {shown_path(path)} ({size(count)})", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"{size(total)} in all", highlight=False)
+
+
+def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
+    runs = store.runs
+    recipes = known_recipes(store)
+    for recipe in scope.recipes:
+        if recipe not in recipes:
+            listing = ", ".join(recipes) or "none"
+            raise UsageError(
+                f"--recipe {recipe}: no such recipe has run; those that have: {listing}{nearest(recipe, recipes)}"
+            )
+    kept = {use["key"] for name in recipes if name not in scope.recipes for use in _uses(store, name)}
+    free = [a for a in store.artifacts() if a.manifest.key not in kept and not holder(runs, a.manifest.key)]
+    if scope.unused:
+        remembered = {use["key"] for name in recipes for use in _uses(store, name)}
+        yield from (artifact.folder for artifact in free if artifact.manifest.key not in remembered)
+        yield from runs.store.glob(f"*/{REMOVING}*")
+    for recipe in scope.recipes:
+        own = {artifact.manifest.key for artifact in last_used(store, recipe).values()}
+        yield from (artifact.folder for artifact in free if artifact.manifest.key in own)
+        yield runs.recipes / f"{recipe}.json"
+    if scope.work:
+        yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))
+        for path in runs.tracking.glob("*.jsonl"):
+            with Journal(path) as journal:
+                if journal.acquire() and not unsent(path):
+                    yield path
+                    yield sent_path(path)
+    if scope.damaged:
+        yield from runs.damaged.glob("*")
+
+
+def _uses(store: Store, recipe: str) -> list[dict[str, str]]:
+    return list(recall(store.runs, recipe).get("stages", {}).values())
+
+
+def _remove(path: Path) -> None:
+    """A folder disappears from its place at once, then its files."""
+    if path.is_dir():
+        doomed = path.with_name(REMOVING + path.name.removeprefix(REMOVING))
+        path.rename(doomed)
+        shutil.rmtree(doomed)
+    else:
+        path.unlink()

@@ -1,0 +1,93 @@
+"""What a user calls an artifact or a recipe, and what is meant."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from iowbc.errors import Damaged, UsageError, nearest
+from iowbc.pipeline.store.last_used import recall
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Artifact, Store
+
+SHORTEST_PREFIX = 4
+"""Characters of a key that are enough to name an artifact, where they are unique."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a word of the command line means."""
+
+    word: str
+    artifacts: Mapping[str, Artifact]
+    """By stage: all that a recipe used last, or the one artifact that was named."""
+    recipe: Mapping[str, Any] | None = None
+    """The resolved recipe, where the word names a recipe."""
+
+
+def named(store: Store, word: str) -> Named:
+    """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
+    recipes = known_recipes(store)
+    if Path(word).suffix in (".yaml", ".yml"):
+        return _recipe(store, word, Path(word).stem.lower(), recipes)
+    if word in recipes:
+        return _recipe(store, word, word, recipes)
+    name, slash, stage = word.rpartition("/")
+    if slash and name in recipes:
+        found = _recipe(store, word, name, recipes)
+        if stage not in found.artifacts:
+            stages = ", ".join(found.artifacts) or "none"
+            raise UsageError(f"{word}: recipe {name} has no finished stage '{stage}'; finished: {stages}")
+        return Named(word, {stage: found.artifacts[stage]})
+    artifact = _by_key(store, word)
+    return Named(word, {artifact.manifest.stage: artifact})
+
+
+def open_artifact(word: str, runs: Path | str = "runs") -> Artifact:
+    """From Python: the artifact that `RECIPE/STAGE` or the first characters of a key name. Raises `UsageError`."""
+    found = named(Store(Runs(Path(runs))), word)
+    if found.recipe is not None:
+        stages = ", ".join(f"{word}/{stage}" for stage in found.artifacts)
+        raise UsageError(f"'{word}' is a recipe; name one of its artifacts: {stages or 'none is stored'}")
+    (artifact,) = found.artifacts.values()
+    return artifact
+
+
+def known_recipes(store: Store) -> list[str]:
+    """Names of the recipes that have finished a stage, alphabetically."""
+    return sorted(path.stem for path in store.runs.recipes.glob("*.json"))
+
+
+def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
+    """By stage: the artifacts that a recipe used last, as far as they are still stored."""
+    found = {}
+    for stage, use in recall(store.runs, recipe).get("stages", {}).items():
+        try:
+            artifact = store.find(stage, use["key"])
+        except Damaged:
+            continue
+        if artifact is not None:
+            found[stage] = artifact
+    return found
+
+
+def _recipe(store: Store, word: str, name: str, recipes: list[str]) -> Named:
+    if name not in recipes:
+        listing = ", ".join(recipes) or "none"
+        raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
+    return Named(word, last_used(store, name), recall(store.runs, name)["recipe"])
+
+
+def _by_key(store: Store, prefix: str) -> Artifact:
+    found = [artifact for artifact in store.artifacts() if artifact.manifest.key.startswith(prefix)]
+    if len(prefix) >= SHORTEST_PREFIX and len(found) == 1:
+        return found[0]
+    if len(prefix) >= SHORTEST_PREFIX and found:
+        keys = ", ".join(f"{artifact.manifest.stage} {artifact.manifest.key[:12]}" for artifact in found)
+        raise UsageError(f"'{prefix}' is the beginning of several keys: {keys}")
+    recipes = known_recipes(store)
+    raise UsageError(
+        f"'{prefix}' is neither a recipe that has run in {store.runs.root} ({', '.join(recipes) or 'none has'}), "
+        f"nor RECIPE/STAGE, nor the first {SHORTEST_PREFIX} or more characters of a key; `iowbc ls` lists them"
+        f"{nearest(prefix, recipes)}"
+    )

@@ -1,0 +1,98 @@
+"""What `iowbc play` plays: a recipe's policy, one artifact, or an exported folder."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+from rich.console import Console
+
+from iowbc.commands.named import named
+from iowbc.errors import Damaged, UsageError
+from iowbc.pipeline.store.last_used import remaking
+from iowbc.pipeline.store.store import RECIPE, Artifact, Store
+
+if TYPE_CHECKING:
+    from iowbc.evaluation.viewer import Source
+
+POLICIES = ("export", "distill", "teacher")
+"""Stages that leave a policy, the one to prefer first."""
+CONTRACT = "contract.json"
+"""Every exported folder has one."""
+
+
+def play_word(
+    store: Store, console: Console, word: str, stage: str | None, *, video: Path | None, **settings: Any
+) -> int:
+    """Play what a word names; `settings` are those of `iowbc.evaluation.viewer.play`. Returns the exit code."""
+    artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
+    generator = None
+    if artifact is not None:
+        generator = _generator(store, artifact)
+        for read in filter(None, (artifact, generator)):
+            _check_whole(store, read)
+
+    from iowbc.errors import ContractBroken, Interrupted, NoDisplay, NoRenderer
+    from iowbc.evaluation.viewer import exported_source, play
+
+    try:
+        if artifact is None or artifact.manifest.stage == "export":
+            source = exported_source(artifact.folder if artifact is not None else Path(word))
+        else:
+            source = _source(artifact, generator)
+        result = play(source, video=video, **settings)
+    except (NoDisplay, NoRenderer, ContractBroken) as error:
+        raise UsageError(str(error)) from error
+    except Interrupted as stopped:
+        console.print(str(stopped), markup=False, highlight=False)
+        return 0
+    made = f"; {video} has {result['frames']} pictures" if video else ""
+    text = f"{result['end']} after {result['seconds']:.1f} of {result['duration']:.1f} s{made}"
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    return 0
+
+
+def playable(store: Store, word: str, stage: str | None) -> Artifact:
+    """The policy that a word and `--stage` name. Raises `UsageError`."""
+    found = named(store, word)
+    ready = [name for name in POLICIES if name in found.artifacts]
+    if not ready or (stage is not None and stage not in ready):
+        raise UsageError(
+            f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
+            f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found.artifacts) or 'none'}"
+        )
+    return found.artifacts[stage or ready[0]]
+
+
+def _check_whole(store: Store, artifact: Artifact) -> None:
+    """Raises `UsageError` where a file of an artifact is not what was published."""
+    try:
+        store.verify(artifact)
+    except Damaged as error:
+        raise UsageError(
+            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact)}"
+        ) from None
+
+
+def _generator(store: Store, artifact: Artifact) -> Artifact | None:
+    """The reference generator that a policy was trained on; None for an export, which holds its own, or without one."""
+    digest = artifact.ingredients.get("inputs", {}).get("rg-fit")
+    if artifact.manifest.stage == "export" or digest is None:
+        return None
+    generator = next((found for found in store.artifacts("rg-fit") if found.manifest.digest == digest), None)
+    if generator is None:
+        raise UsageError(
+            f"the reference generator (content {digest[:12]}) that {artifact.manifest.stage} "
+            f"{artifact.manifest.key[:12]} was trained on is no longer stored; run its recipe again"
+        )
+    return generator
+
+
+def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
+    """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
+    from iowbc.evaluation.viewer import Source
+    from iowbc.recipe.recipe import Recipe
+    from iowbc.robot.description import robot_folder
+
+    recipe = Recipe.model_validate(yaml.safe_load((artifact.folder / RECIPE).read_text(encoding="utf-8")))
+    folder = robot_folder(recipe.robot)
+    return Source(recipe, folder, generator.folder if generator is not None else None, artifact.folder)

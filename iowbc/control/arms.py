@@ -1,0 +1,113 @@
+"""Kinematics of both arms, many rows at once in NumPy: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.control.chain import Chain, turn
+from iowbc.robot.description import Robot
+
+Array = NDArray[Any]
+
+DAMPING = 0.05
+"""Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·DAMPING) next to a singular posture."""
+REACH = 0.2
+"""Further squared damping for each metre of error [m]: out of reach, a stretched arm settles instead of overshooting,
+since its reach falls off by no more than half of this times the squared angle of the elbow."""
+LONGEST = 0.1
+"""Longest error that a step answers to [m]: a wrist turns towards a distant target without overshooting."""
+POSTURE_GAIN = 1.0
+"""Rate at which the redundant joints return to the rest posture [1/s]."""
+X, Y = 0, 1
+IDENTITY = np.eye(3)
+
+
+class ArmKinematics:
+    """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left 7, right 7."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        joint_speed: float | None = None,
+        damping: float = DAMPING,
+        posture_gain: float = POSTURE_GAIN,
+    ) -> None:
+        """`joint_speed`: bound on the references' speed [rad/s]; without it each joint's own limit."""
+        names = [robot.joints[index] for index in robot.interaction]
+        chains = [robot.tree.chain(body, robot.torso) for body in robot.wrist_bodies]
+        order = [names.index(body.hinge.name) for chain in chains for body in chain if body.hinge is not None]
+        if order != list(range(len(names))):
+            raise ValueError(f"{robot.folder}: the arm joints must be the left chain followed by the right one")
+        self.rest = robot.default_position[robot.interaction]
+        self.lower, self.upper = robot.lower[robot.interaction], robot.upper[robot.interaction]
+        own = robot.velocity_limit[robot.interaction]
+        self.speed = own if joint_speed is None else np.minimum(own, joint_speed)
+        self.damping, self.posture_gain = damping, posture_gain
+        self._chain, self._waist = Chain(chains), Chain([robot.tree.chain(robot.torso, robot.base)])
+        self._grip = robot.grip_offset.T[:, :, None]
+
+    def forward(self, arm_position: Array) -> tuple[Array, Array]:
+        """Wrist positions (n, 2, 3) [m] in the torso frame and their Jacobian (n, 2, 3, 7), of arms (n, 14) [rad]."""
+        count, joints = len(arm_position), self._chain.length
+        vectors = np.empty((3, joints + 1, 2, count))
+        vectors[:, joints] = self._grip
+        self._chain.carry(arm_position.reshape(count, 2, joints).transpose(2, 1, 0), vectors, joints)
+        rows = np.ascontiguousarray(vectors.transpose(3, 2, 0, 1))
+        return rows[..., joints], rows[..., :joints]
+
+    def solve_step(self, arm_position: Array, target: Array, dt: float) -> Array:
+        """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
+
+        `arm_position` (n, 14) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
+        next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to LONGEST;
+        kept to the joint ranges and the joint speed.
+        """
+        count = len(arm_position)
+        wrist, jacobian = self.forward(arm_position)
+        transposed = np.swapaxes(jacobian, -1, -2)
+        error = target - wrist
+        distance = np.sqrt(np.vecdot(error, error))
+        near = np.minimum(distance, LONGEST)
+        error *= (LONGEST / np.maximum(distance, LONGEST))[..., None]
+        damping = self.damping**2 + REACH * near
+        gram = jacobian @ transposed + damping[..., None, None] * IDENTITY
+        posture = (self.posture_gain * dt * (self.rest - arm_position)).reshape(count, 2, -1)
+        wanted = error - np.einsum("nsij,nsj->nsi", jacobian, posture)
+        step = posture + np.einsum("nsji,nsj->nsi", jacobian, np.linalg.solve(gram, wanted[..., None])[..., 0])
+        bound = self.speed * dt
+        moved = arm_position + step.reshape(count, -1).clip(-bound, bound)
+        kept: Array = moved.clip(self.lower, self.upper)
+        return kept
+
+    def solve(self, arm_position: Array, target: Array, *, steps: int = 60, dt: float = 0.1) -> Array:
+        """Repeats `solve_step`: postures (n, 14) whose wrists are at, or as near as they get to, `target` (n, 2, 3)."""
+        for _ in range(steps):
+            arm_position = self.solve_step(arm_position, target, dt)
+        return arm_position
+
+    def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
+        """Points (n, k, 3) [m] of the heading frame at the base, as the torso frame sees them; the rest as below."""
+        moved = points.transpose(2, 1, 0)[:, :, None].copy()
+        turn(moved, Y, -pelvis_pitch[None])
+        self._waist.fetch(waist.T[:, None], moved)
+        seen: Array = moved[:, :, 0].transpose(2, 1, 0)
+        return seen
+
+    def torso_in_heading(
+        self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Rotation (n, 3, 3) and position (n, 3) [m] of the torso frame in the heading frame at the base.
+
+        `waist` (n, 3): yaw, roll, pitch positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
+        """
+        vectors = np.zeros((3, 4, 1, len(waist)))
+        for axis in range(3):
+            vectors[axis, axis] = 1.0
+        self._waist.carry(waist.T[:, None], vectors)
+        if pelvis_roll is not None:
+            turn(vectors, X, pelvis_roll[None])
+        turn(vectors, Y, pelvis_pitch[None])
+        rows = np.ascontiguousarray(vectors[:, :, 0].transpose(2, 0, 1))
+        return rows[..., :3], rows[..., 3]

@@ -1,0 +1,36 @@
+"""The 11-D skill-level command C: names, places of its parts, and its rate limits."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.task.commands import CommandRates
+
+Array = NDArray[np.floating[Any]]
+
+COMMAND = (
+    "v_x",
+    "v_y",
+    "yaw_rate",
+    "height",
+    "pitch",
+    *(f"{side}_{axis}" for side in ("left", "right") for axis in "xyz"),
+)
+"""Names of the command's entries: m/s, m/s, rad/s, m, rad, and six wrist offsets in m; heading frame."""
+VELOCITY = slice(0, 3)
+YAW_RATE = 2
+HEIGHT = 3
+PITCH = 4
+OFFSET = slice(5, 11)
+
+
+def rate_limits(rates: CommandRates) -> Array:
+    """Largest change a second of each entry, (11,)."""
+    return np.array([rates.velocity, rates.velocity, rates.yaw_rate, rates.height, rates.pitch, *[rates.offset] * 6])
+
+
+def approach(command: Array, goal: Array, largest_step: Array) -> Array:
+    """The command moved towards its goal by at most `largest_step` (11,); commands (n, 11)."""
+    moved: Array = command + (goal - command).clip(-largest_step, largest_step)
+    return moved

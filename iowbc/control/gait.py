@@ -1,0 +1,88 @@
+"""The gait clock φ_t: when it runs, which foot should be on the ground, and the swing it adds to the reference."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.task.joint_references import GaitPrior
+
+Array = NDArray[np.floating[Any]]
+Mask = NDArray[np.bool_]
+
+SUPPORT_JOINTS = 15
+LEFT_LEG_PITCH = (0, 3, 4)
+"""Hip pitch, knee and ankle pitch among the support joints, left leg."""
+RIGHT_LEG_PITCH = (6, 9, 10)
+"""The same, right leg."""
+
+
+def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
+    """Whether the commanded velocity asks for steps; command (n, 11), result (n,)."""
+    speed = np.hypot(command[:, 0], command[:, 1])
+    moving: Mask = (speed > gait.moving_speed) | (np.abs(command[:, 2]) > gait.moving_yaw_rate)
+    return moving
+
+
+def foot_phase(phase: Array) -> Array:
+    """Phase of the left and the right foot, half a stride apart; (n,) to (n, 2), each in [0, 1)."""
+    both = np.empty((len(phase), 2))
+    both[:, 0] = phase
+    both[:, 1] = np.mod(phase + 0.5, 1.0)
+    return both
+
+
+def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: float) -> tuple[Array, Mask]:
+    """One control step of the clock: new phase (n,) and whether it runs (n,).
+
+    It starts when the command asks for motion. When the command stops, it runs on to the next moment at which both feet
+    are down, phase 0 or 0.5, and rests there.
+    """
+    step = gait.frequency * dt
+    halves = np.floor(phase * 2.0 + 1e-9)
+    advanced = phase + step
+    arrived = np.floor(advanced * 2.0 + 1e-9) > halves
+    rests = ~moving & (~stepping | arrived)
+    kept = np.where(stepping & arrived, (halves + 1.0) * 0.5, phase)
+    new = np.mod(np.where(rests, kept, advanced), 1.0)
+    return new, ~rests
+
+
+def swing_progress(foot_phase: Array, stance: float) -> Array:
+    """How far each foot is through its swing, 0 on the ground and 1 at touch-down; (n, 2) to (n, 2)."""
+    progress: Array = ((foot_phase - stance) / (1.0 - stance)).clip(0.0, 1.0)
+    return progress
+
+
+def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
+    """Which feet should be on the ground, (n, 2); both while the clock rests."""
+    down: Mask = (foot_phase < stance) | ~stepping[:, None]
+    return down
+
+
+def swing_prior(phase: Array, stepping: Mask, gait: GaitPrior) -> Array:
+    """What the gait prior adds to θ_S_ref, (n, 15) [rad]: amplitude · sin(π·progress); zero while the clock rests."""
+    if not gait.enabled:
+        return np.zeros((len(phase), SUPPORT_JOINTS))
+    bump = np.sin(np.pi * swing_progress(foot_phase(phase), gait.stance)) * stepping[:, None]
+    added: Array = bump @ _amplitudes(gait.hip_pitch, gait.knee, gait.ankle_pitch)
+    return added
+
+
+@cache
+def _amplitudes(hip_pitch: float, knee: float, ankle_pitch: float) -> Array:
+    """What the swing of each foot adds at most to each support joint, (2, 15) [rad]."""
+    amplitude = np.zeros((2, SUPPORT_JOINTS))
+    for foot, joints in enumerate((LEFT_LEG_PITCH, RIGHT_LEG_PITCH)):
+        amplitude[foot, joints] = hip_pitch, knee, ankle_pitch
+    return amplitude
+
+
+def phase_signal(phase: Array, stepping: Mask) -> Array:
+    """(sin 2πφ, cos 2πφ), shape (n, 2); zero while the clock rests, so that standing is its own value."""
+    signal = np.empty((len(phase), 2))
+    signal[:, 0] = np.sin(2.0 * np.pi * phase)
+    signal[:, 1] = np.cos(2.0 * np.pi * phase)
+    signal *= stepping[:, None]
+    return signal

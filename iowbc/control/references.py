@@ -1,0 +1,109 @@
+"""The reference layer: a command becomes arm references by differential IK (eq. 2, 3) and support references by the RG.
+
+Pure arrays over n environments; the deployed controller uses it too.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.control.arms import ArmKinematics
+from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.recipe.task.joint_references import References
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import VECTOR_SIGN
+
+Array = NDArray[np.floating[Any]]
+
+SETTLING, REFINING = 0.3, 0.02
+"""Time that an iteration of inverse kinematics stands for at the start [s]: the longer, the more it heeds the rest
+posture of the arms, and the less their targets."""
+WAIST = slice(12, 15)
+"""Waist yaw, roll and pitch among the support joints."""
+
+
+def both_wrists(left: tuple[float, float, float]) -> Array:
+    """Base grasp of both wrists, (2, 3), from the left one's position in the heading frame [m]."""
+    return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
+
+
+class ReferenceLayer:
+    """Arm and support references of n environments. Holds constants only; the references are the caller's."""
+
+    def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
+        """`rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture, and commands are
+        not clamped to a feasible map."""
+        self.arms = ArmKinematics(robot)
+        self.network, self.feasible = None, None
+        if rg is not None:
+            from iowbc.control.feasible_map import FeasibleMap
+            from iowbc.control.generator import ReferenceNetwork
+
+            self.network = ReferenceNetwork.load(rg) if references.use_rg else None
+            self.feasible = FeasibleMap.load(rg / "feasible.npz")
+        self._settling, self._refining = references.arms.settling, references.arms.refining
+        self.default_arms = robot.default_position[robot.interaction]
+        self.default_support = robot.default_position[robot.support]
+        self.default_height = robot.default_height
+
+    def clamp(self, command: Array) -> Array:
+        """The command with height and torso pitch brought into the feasible map; (n, 11)."""
+        if self.feasible is None:
+            return command
+        clamped = command.copy()
+        clamped[:, HEIGHT], clamped[:, PITCH] = self.feasible.clamp(command[:, HEIGHT], command[:, PITCH])
+        return clamped
+
+    def startable(self, command: Array) -> Array:
+        """The command with the posture in which an episode can start, (n, 11): without a generator the default one."""
+        if self.network is not None:
+            return command
+        changed = command.copy()
+        changed[:, HEIGHT], changed[:, PITCH] = self.default_height, 0.0
+        return changed
+
+    def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
+        """References at the start of an episode, settled in the commanded posture.
+
+        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, 14), support (n, 15).
+        """
+        arms = np.tile(self.default_arms, (len(command), 1))
+        target = self.wrist_target(self.support(arms, command), command, grasp)
+        for _ in range(self._settling):
+            arms = self.arms.solve_step(arms, target, SETTLING)
+        support = self.support(arms, command)
+        for _ in range(self._refining):
+            arms, support = self.advance(arms, support, command, grasp, REFINING)
+        return arms, support
+
+    def advance(self, arms: Array, support: Array, command: Array, grasp: Array, dt: float) -> tuple[Array, Array]:
+        """References one control period later; shapes as in `start`."""
+        arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt)
+        return arms, self.support(arms, command)
+
+    def support(self, arms: Array, command: Array) -> Array:
+        """θ_S_ref = φ_RG(θ_I_ref, σ_base), (n, 15) [rad], without the gait prior."""
+        if self.network is None:
+            return np.tile(self.default_support, (len(command), 1))
+        base = np.zeros((len(command), len(self.network.inputs) - arms.shape[1]))
+        base[:, :2] = command[:, HEIGHT : PITCH + 1]
+        return self.network(arms, base)
+
+    def pelvis_pitch(self, support: Array, command: Array) -> Array:
+        """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""
+        pitch: Array = command[:, PITCH] - support[:, WAIST.stop - 1]
+        return pitch
+
+    def start_pitch(self, support: Array, command: Array) -> Array:
+        """Pelvis pitch in which an episode begins, (n,) [rad]: the default posture has its feet flat at zero."""
+        return np.zeros(len(command)) if self.network is None else self.pelvis_pitch(support, command)
+
+    def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:
+        """x_wrist = x_task_base + Δp (eq. 2), turned from the heading frame into the torso frame; (n, 2, 3) [m].
+
+        The torso stands where the references put it, not where it is measured: the arms do not answer to swaying.
+        """
+        wrists = grasp + command[:, OFFSET].reshape(-1, 2, 3)
+        return self.arms.into_torso(support[:, WAIST], self.pelvis_pitch(support, command), wrists)

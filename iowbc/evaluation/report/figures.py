@@ -1,0 +1,193 @@
+"""The paper's figures: errors against lifting mass, against pushing mass, and the comparison of variants."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from iowbc.evaluation.report.aggregate import load_capacity, variants_of
+from iowbc.evaluation.report.paper import TABLES, VARIANTS
+from iowbc.evaluation.trials.metrics import ERRORS, error_norm
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+"""Okabe and Ito's palette: told apart with any colour vision; markers repeat the distinction."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+LABELS = {
+    "E_alpha": "$E_\\alpha$, torso pitch [rad]",
+    "E_h": "$E_h$, height [m]",
+    "E_v": "$E_v$, velocity [m/s]",
+    "E_psi": "$E_\\psi$, heading [rad]",
+}
+PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; × none survived"
+DPI = 150
+PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
+"""Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
+HEADROOM = 0.15
+"""Room above the highest point, in parts of its height."""
+FAILURE_SPACING = 0.035
+"""Distance of two variants' crosses, in heights of the panel."""
+
+
+def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
+    """Colour and marker of a variant, the same in every figure; `variants`: all that are shown."""
+    known = [*VARIANTS, *(name for name in variants if name not in VARIANTS)]
+    place = known.index(variant)
+    return COLOURS[place % len(COLOURS)], MARKERS[place % len(MARKERS)]
+
+
+def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
+    """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
+    figure = Figure(figsize=(9.5, 6.6), layout="constrained")
+    for axes, name in zip(figure.subplots(2, 2, sharex=True).flat, ERRORS, strict=True):
+        for variant in variants_of(summary):
+            rows = _rows(summary, suite, variant)
+            colour, marker = style_of(variant, variants_of(summary))
+            half = rows[f"{name}_half"].fillna(0.0)
+            axes.errorbar(
+                rows["mass"], rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
+            )
+            _paper_curve(axes, suite, variant, ERRORS.index(name), colour, marker)
+            _mark_failures(axes, rows, variant, variants_of(summary))
+        axes.set_ylabel(LABELS[name])
+        _tidy(axes)
+    for axes in figure.axes[2:]:
+        axes.set_xlabel(f"{suite} mass [kg]")
+    _legend(figure, figure.axes[0])
+    figure.suptitle(f"Tracking errors against {suite} mass ({PAPER_NOTE})", fontsize=10)
+    return figure
+
+
+def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
+    """Error norm over lifting mass and over pushing mass, load capacity, success in the heavy tasks.
+
+    A panel for each that was evaluated.
+    """
+    sweeps = [suite for suite in ("lifting", "pushing") if (summary["suite"] == suite).any()]
+    count = len(sweeps) + bool(sweeps) + 1
+    figure = Figure(
+        figsize=(max(PANEL_WIDTH * count, SMALLEST_WIDTH), 4.2), layout=ConstrainedLayoutEngine(wspace=0.06)
+    )
+    panels = list(figure.subplots(1, count, squeeze=False).flat)
+    for axes, suite in zip(panels, sweeps, strict=False):
+        _norm_panel(axes, summary, suite)
+    if sweeps:
+        _capacity_panel(panels[-2], summary, sweeps, capacity_rate)
+    _success_panel(panels[-1], summary)
+    for axes, letter in zip(panels, "abcd", strict=False):
+        axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
+    if sweeps:
+        figure.suptitle(PAPER_NOTE, fontsize=10)
+    _legend(figure, panels[0])
+    return figure
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Save as PNG without the time of day in it, so that equal trials give equal files."""
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
+    axes.set_title(f"error norm, {suite}")
+    for variant in variants_of(summary):
+        rows = _rows(summary, suite, variant)
+        colour, marker = style_of(variant, variants_of(summary))
+        axes.plot(rows["mass"], rows["norm"], color=colour, marker=marker, markersize=5, label=variant)
+        _paper_curve(axes, suite, variant, None, colour, marker)
+        _mark_failures(axes, rows, variant, variants_of(summary))
+    axes.set_xlabel("mass [kg]")
+    axes.set_ylabel("norm of the four errors [SI units]")
+    _tidy(axes)
+
+
+def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: float) -> None:
+    axes.set_title(f"load capacity at {100 * rate:.0f} % success")
+    groups = {
+        variant: [
+            np.nan if _rows(summary, suite, variant).empty else load_capacity(summary, suite, variant, rate) or 0.0
+            for suite in suites
+        ]
+        for variant in variants_of(summary)
+    }
+    _bars(axes, groups, suites, "{:g}")
+    axes.set_ylabel("mass [kg]")
+
+
+def _success_panel(axes: Axes, summary: pd.DataFrame) -> None:
+    axes.set_title("success rate")
+    chosen = summary[summary["suite"] == "heavy"]
+    if chosen.empty:
+        heaviest = summary.groupby("suite")["mass"].transform("max")
+        chosen = summary[summary["mass"] == heaviest]
+    names = list(dict.fromkeys(zip(chosen["case"], chosen["mass"], strict=True)))
+    groups = {}
+    for variant in variants_of(summary):
+        rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"])["rate"]
+        groups[variant] = [100 * float(rows.get(name, np.nan)) for name in names]
+    _bars(axes, groups, [f"{case}\n{mass:g} kg" for case, mass in names], "{:.0f}")
+    axes.set_ylabel("surviving trials [%]")
+    axes.set_ylim(0, 110)
+
+
+def _bars(axes: Axes, groups: dict[str, list[float]], names: list[str], text: str) -> None:
+    width = 0.8 / max(len(groups), 3)
+    for place, (variant, values) in enumerate(groups.items()):
+        positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
+        bars = axes.bar(positions, values, width, color=style_of(variant, list(groups))[0], label=variant)
+        axes.bar_label(bars, [text.format(value) for value in values], fontsize=8)
+    axes.set_xticks(range(len(names)), names, fontsize=8)
+    _from_zero(axes)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _rows(summary: pd.DataFrame, suite: str, variant: str) -> pd.DataFrame:
+    chosen = summary[(summary["suite"] == suite) & (summary["variant"] == variant)]
+    return chosen.sort_values("mass")
+
+
+def _paper_curve(axes: Axes, suite: str, variant: str, error: int | None, colour: str, marker: str) -> None:
+    points = [
+        (mass, float(error_norm(np.array(errors))) if error is None else errors[error])
+        for mass, row in TABLES[suite].items()
+        if (errors := row.get(variant)) is not None
+    ]
+    if points:
+        masses, values = zip(*points, strict=True)
+        axes.plot(masses, values, color=colour, marker=marker, markersize=5, linestyle=":", markerfacecolor="none")
+
+
+def _mark_failures(axes: Axes, rows: pd.DataFrame, variant: str, variants: list[str]) -> None:
+    """A cross at the panel's upper edge for each mass at which the variant never survived, one line a variant."""
+    failed = rows[rows["survived"] == 0]["mass"]
+    height = 0.98 - FAILURE_SPACING * variants.index(variant)
+    crosses = axes.plot(
+        failed,
+        [height] * len(failed),
+        "x",
+        color=style_of(variant, variants)[0],
+        transform=axes.get_xaxis_transform(),
+        clip_on=False,
+        markersize=6,
+    )
+    for cross in crosses:
+        cross.set_in_layout(False)
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=9, ncols=len(labels), loc="outside lower center", frameon=False)
+
+
+def _tidy(axes: Axes) -> None:
+    _from_zero(axes)
+    axes.grid(True, color="0.9")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _from_zero(axes: Axes) -> None:
+    """The vertical axis from 0 to above the highest point, so that its marker, bar label and interval are whole."""
+    highest = axes.dataLim.ymax
+    axes.set_ylim(0.0, (1.0 + HEADROOM) * highest if np.isfinite(highest) and highest > 0 else 1.0)

@@ -1,0 +1,1 @@
+"""Which trials there are, and how they are played and measured."""

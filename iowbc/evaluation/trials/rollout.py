@@ -1,0 +1,138 @@
+"""Plays episodes with a policy, each once, and records the signals of every step."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.errors import Interrupted
+from iowbc.evaluation.trials.metrics import Trace
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.episodes import Episode
+from iowbc.task.vector.vector_env import VectorEnv
+
+Array = NDArray[np.float64]
+
+RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
+"""Signals that a trace keeps."""
+VECTORS = ("system_velocity", "commanded_velocity", "partner_force", "grip_force", "base_position")
+"""Those of them with more than one column."""
+ASK_EVERY = 25
+"""Control steps between two questions whether to stop."""
+
+
+class Acting(Protocol):
+    """What drives the environments; `iowbc.learning.acting.Policy` is one."""
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        """Forget the past of the marked environments, shape (n,)."""
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Residual action (n, 15) from s_t (n, S) and s_priv (n, P)."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """How one episode went."""
+
+    trace: Trace
+    seconds: float
+    """Time until it ended [s]."""
+    fallen: bool
+    dropped: bool
+    finished: bool
+    """Whether it reached its time limit."""
+    drawn: Mapping[str, Array]
+    """Everything that was drawn for it, by name, each of shape (k,)."""
+
+    @property
+    def survived(self) -> bool:
+        """No fall, nothing dropped, for the whole episode."""
+        return self.finished and not (self.fallen or self.dropped)
+
+
+def play_episodes(
+    recipe: Recipe,
+    robot: Path,
+    rg: Path | None,
+    episodes: Sequence[Episode],
+    policy: Acting,
+    *,
+    workers: int,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> list[Played]:
+    """Play each episode to its end and return how they went, in their order; independent of `workers`.
+
+    progress: told the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
+    """
+    environment = VectorEnv(
+        recipe, robot, rg=rg, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)
+    )
+    try:
+        return play_in(environment, recipe, policy, interrupted, progress)
+    finally:
+        environment.close()
+
+
+def play_in(
+    environment: VectorEnv,
+    recipe: Recipe,
+    policy: Acting,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+    look: Callable[[float], None] = lambda seconds: None,
+) -> list[Played]:
+    """Play the episodes of an environment that was made for them; see `play_episodes`.
+
+    look: called with the time [s] after the reset and after each step, while the first episode lasts.
+    """
+    count, dt = environment.num_envs, 1.0 / recipe.task.control_frequency
+    layout = environment.layout
+    observation = environment.reset()
+    drawn = {name: np.array(values, np.float64).reshape(count, -1) for name, values in environment.drawn().items()}
+    policy.reset(np.ones(count, np.bool_))
+    frames: list[dict[str, Array]] = []
+    length = np.zeros(count, np.int64)
+    endings = {name: np.zeros(count, np.bool_) for name in ("fallen", "dropped")}
+    finished = np.zeros(count, np.bool_)
+    look(0.0)
+    while not length.all():
+        if len(frames) % ASK_EVERY == 0:
+            if interrupted():
+                raise Interrupted(f"stopped after {len(frames) * dt:.1f} s of {count} episodes")
+            progress(len(frames) * dt)
+        action = policy.act(observation[:, layout.observation], observation[:, layout.privileged])
+        observation, _, ended, infos = environment.step(action)
+        done = np.asarray(ended, np.bool_)
+        frames.append({name: np.array(environment.signals[name], np.float64) for name in RECORDED})
+        if not (length[0] or done[0]):
+            look(len(frames) * dt)
+        ends = done & (length == 0)
+        length[ends] = len(frames)
+        for name, flags in endings.items():
+            flags[ends] = environment.signals[name].reshape(count)[ends] > 0
+        for index in np.flatnonzero(ends):
+            finished[index] = bool(infos[index].get("TimeLimit.truncated", False))
+        if done.any():
+            policy.reset(done)
+    recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
+    return [
+        Played(
+            trace=_trace(recorded, index, int(length[index]), dt),
+            seconds=float(length[index] * dt),
+            fallen=bool(endings["fallen"][index]),
+            dropped=bool(endings["dropped"][index]),
+            finished=bool(finished[index]),
+            drawn={name: values[index] for name, values in drawn.items()},
+        )
+        for index in range(count)
+    ]
+
+
+def _trace(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
+    rows = {name: values[:steps, index] for name, values in recorded.items()}
+    return Trace(dt=dt, **{name: row if name in VECTORS else row[:, 0] for name, row in rows.items()})

@@ -1,0 +1,1 @@
+"""Writes the controller that a robot runs: graph, contract, golden vectors."""

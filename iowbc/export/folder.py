@@ -1,0 +1,84 @@
+"""Writes the exported folder: the graph, its contract, and all else that a controller loads."""
+
+import shutil
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+from iowbc.control.command import COMMAND
+from iowbc.deploy import contract
+from iowbc.export.graph import ControllerGraph, Port
+from iowbc.export.onnx_graph import write_onnx
+from iowbc.recipe.evaluation import Evaluation
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.recipe.recipe import Recipe
+
+PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "torch")
+"""Packages whose versions the contract records."""
+
+
+def write_folder(
+    out: Path, graph: ControllerGraph, recipe: Recipe, rg: Path | None, sources: Mapping[str, str]
+) -> contract.Contract:
+    """Write `policy.onnx`, `contract.json`, `recipe.json`, the robot's folder, and with `rg` the generator's folder.
+
+    sources: artifact keys of what went into the graph, by stage.
+    """
+    robot = graph.robot
+    write_onnx(graph, out / contract.GRAPH, recipe.export.opset, {"recipe": recipe.name, **sources})
+    shutil.copytree(robot.folder, out / contract.ROBOT)
+    if rg is not None:
+        (out / contract.GENERATOR).mkdir()
+        for name in contract.GENERATOR_FILES:
+            shutil.copy(rg / name, out / contract.GENERATOR / name)
+    (out / contract.RECIPE).write_text(world_of(recipe).model_dump_json(indent=1) + "\n")
+    statement = contract.Contract(
+        recipe=recipe.name,
+        robot=robot.name,
+        sha256=contract.digest(out / contract.GRAPH),
+        opset=recipe.export.opset,
+        control_frequency=recipe.task.control_frequency,
+        physics_frequency=1.0 / recipe.simulation.physics.timestep,
+        inputs=tuple(map(_entry, graph.input_ports())),
+        outputs=tuple(map(_entry, graph.output_ports())),
+        joints=robot.joints,
+        support=tuple(robot.support.tolist()),
+        interaction=tuple(robot.interaction.tolist()),
+        kp=tuple(robot.kp.tolist()),
+        kd=tuple(robot.kd.tolist()),
+        effort=tuple(robot.effort.tolist()),
+        velocity_limit=tuple(robot.velocity_limit.tolist()),
+        lower=tuple(robot.lower.tolist()),
+        upper=tuple(robot.upper.tolist()),
+        default_position=tuple(robot.default_position.tolist()),
+        action_scale=tuple(graph.scale.double().tolist()),
+        action_bound=graph.bound,
+        history=graph.history,
+        observation=tuple(contract.Part(name=name, size=size) for name, size in graph.layout.parts),
+        command=COMMAND,
+        commands=recipe.task.commands,
+        references=recipe.task.references,
+        versions={name: version(name) for name in PACKAGES},
+        sources=dict(sources),
+    )
+    contract.write_contract(statement, out)
+    return statement
+
+
+def world_of(recipe: Recipe) -> Recipe:
+    """The recipe reduced to what the export depends on; all else at its default, but for the commands to play."""
+    asked = recipe.export.acceptance
+    return Recipe(
+        name=recipe.name,
+        seed=recipe.seed,
+        robot=recipe.robot,
+        rg=ReferenceGenerator(height=recipe.rg.height),
+        simulation=recipe.simulation,
+        task=recipe.task,
+        eval=Evaluation() if asked is None else Evaluation(sequence=asked.sequence),
+        export=recipe.export,
+    )
+
+
+def _entry(port: Port) -> contract.PortEntry:
+    return contract.PortEntry(name=port.name, shape=port.shape, unit=port.unit, frame=port.frame, meaning=port.meaning)

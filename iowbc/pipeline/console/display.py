@@ -1,0 +1,129 @@
+"""What the console shows of a run: the state of each stage, and its output as plain lines."""
+
+import os
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import IO, Protocol
+
+from iowbc.pipeline.console.wording import duration
+
+RATE_WINDOW = 60.0
+"""Seconds over which a stage's rate is averaged."""
+CURVE_POINTS = 400
+"""Points of the main metric that are remembered for its small curve."""
+
+
+@dataclass
+class StageView:
+    """What is known of a stage while a recipe runs."""
+
+    name: str
+    state: str = "waits"
+    note: str = ""
+    done: float = 0.0
+    total: float = 0.0
+    metric: str = ""
+    """Name of the main metric: the first one that the stage reports."""
+    curve: list[float] = field(default_factory=list)
+    started: float = 0.0
+    seconds: float | None = None
+    _marks: deque[tuple[float, float]] = field(default_factory=deque)
+
+    def progress(self, done: float, total: float, note: str) -> None:
+        """The stage is at `done` of `total`, in units of its own."""
+        moment = time.monotonic()
+        if done < self.done or total != self.total:
+            self._marks.clear()
+        self.done, self.total, self.note = done, total, note
+        self._marks.append((moment, done))
+        while len(self._marks) > 2 and moment - self._marks[0][0] > RATE_WINDOW:
+            self._marks.popleft()
+
+    def measured(self, metric: str, value: float) -> None:
+        """The main metric's next value; every second one is dropped when there are many."""
+        self.metric = self.metric or metric
+        self.curve.append(value)
+        if len(self.curve) > CURVE_POINTS:
+            del self.curve[1::2]
+
+    @property
+    def rate(self) -> float | None:
+        """Units a second, lately."""
+        if len(self._marks) < 2 or self._marks[-1][0] - self._marks[0][0] <= 0.0:
+            return None
+        return (self._marks[-1][1] - self._marks[0][1]) / (self._marks[-1][0] - self._marks[0][0])
+
+    @property
+    def left(self) -> float | None:
+        """Time until the stage is done at the present rate [s]."""
+        rate = self.rate
+        return (self.total - self.done) / rate if rate and rate > 0.0 and self.total else None
+
+    @property
+    def share(self) -> float:
+        """Part that is done, 0 to 1."""
+        return min(1.0, self.done / self.total) if self.total else 0.0
+
+
+class Display(Protocol):
+    """Where a run shows how it goes."""
+
+    def begin(self, views: Sequence[StageView]) -> None:
+        """Start to show these stages."""
+
+    def changed(self, view: StageView) -> None:
+        """A stage changed its state: shown at once."""
+
+    def moved(self, view: StageView) -> None:
+        """A stage made progress: shown now and then."""
+
+    def say(self, text: str) -> None:
+        """One line."""
+
+    def end(self) -> None:
+        """Nothing more comes."""
+
+
+class PlainDisplay:
+    """Lines for logs: each change of state, and progress once in a while."""
+
+    def __init__(self, interval: float, stream: IO[str] | None = None) -> None:
+        self.interval = interval
+        self.stream = stream or sys.stdout
+        self._last = time.monotonic()
+
+    def begin(self, views: Sequence[StageView]) -> None:
+        """Start to show these stages."""
+
+    def changed(self, view: StageView) -> None:
+        """A stage changed its state: shown at once."""
+        spent = f" in {duration(view.seconds)}" if view.seconds is not None else ""
+        self.say(f"{view.name}: {view.state}{spent}{' - ' + view.note if view.note else ''}")
+        self._last = time.monotonic()
+
+    def moved(self, view: StageView) -> None:
+        """A stage made progress: shown once in an interval."""
+        if time.monotonic() - self._last < self.interval:
+            return
+        self._last = time.monotonic()
+        parts = [f"{view.name}: {100 * view.share:.0f} %"]
+        if view.rate is not None:
+            parts.append(f"{view.rate:.4g}/s")
+        if view.left is not None:
+            parts.append(f"{duration(view.left)} left")
+        if view.curve:
+            parts.append(f"{view.metric} {view.curve[-1]:.4g}")
+        self.say("  ".join([*parts, view.note] if view.note else parts))
+
+    def say(self, text: str) -> None:
+        """One line; a reader that has gone away (`| head`) does not stop the run."""
+        try:
+            print(text, file=self.stream, flush=True)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
+
+    def end(self) -> None:
+        """Nothing more comes."""

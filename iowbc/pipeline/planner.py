@@ -1,0 +1,221 @@
+"""What would run, and why."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import iowbc
+from iowbc.errors import Damaged, Problem, RecipeError, shown
+from iowbc.pipeline.nested import MISSING, differences, nested
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.digests import code_digests, data_digest, folder_digest
+from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.workspace import Workspace
+from iowbc.recipe.reading.loading import LoadedRecipe
+
+OnCodeChange = Literal["report", "rerun"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a run was asked for."""
+
+    until: str | None = None
+    force: frozenset[str] = frozenset()
+    on_code_change: OnCodeChange = "report"
+    workers: int | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stage of a recipe: its key, whether its artifact can be used, and why not."""
+
+    stage: Stage
+    key: str | None
+    """None while an input's content is not known."""
+    ingredients: Mapping[str, Any] | None
+    artifact: Artifact | None
+    """The stored artifact with this key, whole; also where it would be replaced."""
+    reasons: tuple[str, ...]
+    """Why it would run; empty where it is cached."""
+    notes: tuple[str, ...] = ()
+    damage: str = ""
+    """What is wrong with the stored artifact with this key."""
+    expected: float | None = None
+    """Time that it took with the same values, the seed aside [s]; None where it never ran with them."""
+    code: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def cached(self) -> bool:
+        """True where the stored artifact is used as it is."""
+        return not self.reasons
+
+
+class Planner:
+    """Decides, stage by stage, for one recipe on one store."""
+
+    def __init__(
+        self, loaded: LoadedRecipe, registry: Mapping[str, Stage], store: Store, robot: Path, options: Options
+    ) -> None:
+        self.loaded = loaded
+        self.store = store
+        self.options = options
+        self.robot_digest = folder_digest(robot)
+        self.resolved = loaded.recipe.model_dump(mode="json")
+        self.stages = self._selected(registry)
+
+    def _selected(self, registry: Mapping[str, Stage]) -> list[Stage]:
+        """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
+        names = [str(name) for name in self.loaded.recipe.stages]
+        for option, asked in (("--until", [self.options.until or names[-1]]), ("--force", sorted(self.options.force))):
+            for name in asked:
+                if name not in names:
+                    text = f"'{name}' is not a stage of this recipe; valid: {', '.join(names)}"
+                    raise RecipeError([Problem(f"{option} {name}", text)])
+        stages = [registry[name] for name in names]
+        for stage in stages:
+            for wanted in stage.reads(self.loaded.recipe):
+                if wanted not in names:
+                    text = f"key 'stages': {stage.name} reads {wanted}, which is not among them: {', '.join(names)}"
+                    raise RecipeError([Problem(self.loaded.place("stages"), text)])
+        last = names.index(self.options.until) if self.options.until else len(names) - 1
+        late = [name for name in names[last + 1 :] if name in self.options.force]
+        if late:
+            text = f"{', '.join(late)} comes after {self.options.until}, where --until ends the run; leave one out"
+            raise RecipeError([Problem(f"--force {late[0]}", text)])
+        return stages[: last + 1]
+
+    def plan(self) -> list[Step]:
+        """A step for each stage, as things stand; nothing is changed."""
+        steps: dict[str, Step] = {}
+        for stage in self.stages:
+            inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
+            step = self.decide(stage, inputs)
+            unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
+            steps[stage.name] = replace(step, expected=None) if unknown else step
+        return list(steps.values())
+
+    def reads(self, stage: Stage) -> tuple[str, ...]:
+        """Names of the stages whose artifacts a stage reads."""
+        return stage.reads(self.loaded.recipe)
+
+    def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> Step:
+        """What is to be done for a stage whose inputs are these; None is an input that would be made anew."""
+        code = stage_code(stage)
+        unknown = [name for name, artifact in inputs.items() if artifact is None]
+        ingredients = {
+            "stage": stage.name,
+            "version": stage.version,
+            "recipe": {path: slice_value(self.resolved, path, stage) for path in stage.slice},
+            "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
+            "robot": self.robot_digest,
+        }
+        former = self._closest(stage.name, ingredients)
+        expected = former.manifest.seconds if former and _as_long(former.ingredients, ingredients) else None
+        if unknown:
+            reasons = self._reasons(ingredients, former, unknown)
+            return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
+        key = data_digest(ingredients)
+        damage = ""
+        artifact: Artifact | None = None
+        try:
+            artifact = self.store.find(stage.name, key)
+            if artifact is not None:
+                self.store.verify(artifact)
+        except Damaged as error:
+            damage = str(error)
+            artifact = None
+        found: list[str] = []
+        notes: list[str] = []
+        if stage.name in self.options.force:
+            found.append("forced by --force")
+        if damage:
+            found.append(f"damaged: {damage}")
+        elif artifact is None:
+            found.extend(self._reasons(ingredients, former, ()))
+        else:
+            expected = artifact.manifest.seconds
+            changed = changed_code(artifact.manifest.code, code)
+            if changed:
+                text = f"code changed since it was made: {', '.join(changed)}"
+                (found if self.options.on_code_change == "rerun" else notes).append(text)
+        if found:
+            notes.extend(self._checkpoint(stage, key))
+        return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code)
+
+    def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
+        """What an earlier attempt has left."""
+        record = Workspace(self.store.runs, stage.name, key).record
+        forced = stage.name in self.options.force
+        if record and (record.get("forced") or not forced):
+            total = float(record.get("total", 0.0))
+            share = f", {100 * float(record.get('done', 0.0)) / total:.0f} %" if total else ""
+            yield f"goes on from attempt {record.get('attempts', 1)}{share}"
+
+    def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
+        """The stored artifact of a stage that differs least; of several this recipe's own, then the newest."""
+
+        def distance(artifact: Artifact) -> tuple[int, bool, float]:
+            count = len(list(self._differences(ingredients, artifact.ingredients)))
+            return count, artifact.manifest.recipe != self.loaded.recipe.name, -artifact.manifest.made
+
+        return min(self.store.artifacts(stage), key=distance, default=None)
+
+    def _reasons(self, ingredients: Mapping[str, Any], former: Artifact | None, unknown: Sequence[str]) -> list[str]:
+        """Why a stage is made: whose artifact it is compared with, inputs made anew, then all that differs."""
+        if former is None:
+            return ["nothing stored yet"]
+        found = list(self._differences(ingredients, former.ingredients))
+        texts = [f"{name} is made anew" for name in unknown] + found
+        if found and former.manifest.recipe != self.loaded.recipe.name:
+            texts.insert(0, f"compared with recipe {former.manifest.recipe}")
+        return texts or ["nothing stored yet"]
+
+    def _differences(self, ingredients: Mapping[str, Any], old: Mapping[str, Any]) -> Iterator[str]:
+        """How a key's ingredients differ from earlier ones, each with its place in the recipe."""
+        for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
+            yield f"{path} ({self.loaded.place(path)}): {_shown(before)} -> {_shown(after)}"
+        if old.get("version") != ingredients["version"]:
+            yield f"stage version {old.get('version')} -> {ingredients['version']}"
+        if old.get("robot") != ingredients["robot"]:
+            yield "the robot's files changed"
+        old_inputs = old.get("inputs", {})
+        for name, digest in ingredients["inputs"].items():
+            if digest is not None and old_inputs.get(name) != digest:
+                yield f"{name} changed" if name in old_inputs else f"{name} is read now"
+        yield from (f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
+
+
+def _as_long(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Whether a stage takes about the time that it took with other ingredients: only the seed and contents differ."""
+    changed = differences(nested(old.get("recipe", {})), nested(new["recipe"]))
+    return old.get("version") == new["version"] and all(path == "seed" for path, _, _ in changed)
+
+
+def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
+    """Names of the subpackages and modules whose code differs."""
+    return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
+
+
+def stage_code(stage: Stage) -> dict[str, str]:
+    """Digests of a stage's own module and of the parts of the package that it declares."""
+    module = stage.run.__module__.removeprefix("iowbc.")
+    own = {module} if module != stage.run.__module__ else set()
+    return code_digests(Path(iowbc.__file__).parent, own | set(stage.packages))
+
+
+def _shown(value: Any) -> str:
+    return "(absent)" if value is MISSING else shown(value)
+
+
+def slice_value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:
+    """The part of a recipe at a dotted path."""
+    if path.split(".")[0] in ("execution", "stages"):
+        raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
+    value: Any = resolved
+    for part in path.split("."):
+        if not isinstance(value, Mapping) or part not in value:
+            raise ValueError(f"stage {stage.name}: its slice names '{path}', which no recipe has")
+        value = value[part]
+    return value

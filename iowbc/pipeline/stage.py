@@ -1,0 +1,59 @@
+"""What a stage declares and what it receives."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from iowbc.recipe.recipe import Recipe
+
+
+class Report(Protocol):
+    """Where a stage tells how it goes: console and tracking."""
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        """Record named values at a step; one batched tracking call."""
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        """Say how far the stage is, in units of its own (samples, environment steps, trials)."""
+
+    def say(self, text: str) -> None:
+        """Print one line."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One execution of a stage."""
+
+    recipe: Recipe
+    key: str
+    """The artifact's key; checkpoints in `work` are bound to it."""
+    robot: Path
+    """The robot's folder."""
+    inputs: Mapping[str, Path]
+    """Artifact folder of each stage that this one reads."""
+    out: Path
+    """The artifact is written here; published by the runner when `run` returns."""
+    work: Path
+    """Scratch and checkpoints; survives an interruption, removed after publishing."""
+    workers: int
+    """Worker processes to use; never changes a result."""
+    report: Report
+    interrupted: Callable[[], bool]
+    """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of the pipeline: what makes its key, and the function that does the work."""
+
+    name: str
+    version: int
+    """Raised when the same recipe would give a different artifact."""
+    slice: tuple[str, ...]
+    """Dotted recipe paths that decide the result."""
+    reads: Callable[[Recipe], tuple[str, ...]]
+    """Names of the stages whose artifacts this one reads, for a given recipe."""
+    run: Callable[[Job], None]
+    packages: tuple[str, ...] = ()
+    """Subpackages whose code digest is recorded with the artifact, e.g. ("reference", "robot")."""

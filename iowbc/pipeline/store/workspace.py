@@ -1,0 +1,95 @@
+"""The folder of a stage that is being made: scratch, output, and how far it is."""
+
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+from iowbc.pipeline.machine import host
+from iowbc.pipeline.store.runs import Runs, read_json, write_atomically
+
+PROGRESS = "progress.json"
+WRITE_INTERVAL = 1.0
+"""Seconds between two records of the progress on disk."""
+
+
+class Workspace:
+    """`runs/work/<key>/`: `scratch/` survives an interruption, `out/` starts empty at each attempt."""
+
+    def __init__(self, runs: Runs, stage: str, key: str) -> None:
+        self.stage = stage
+        self.key = key
+        self.root = runs.work / key
+        self.scratch = self.root / "scratch"
+        self.out = self.root / "out"
+        self._state: dict[str, Any] = {}
+        self._begun = 0.0
+        self._written = 0.0
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What the last attempt recorded; empty where there was none."""
+        found = read_json(self.root / PROGRESS)
+        return found if isinstance(found, dict) else {}
+
+    def begin(self, recipe: str, forced: bool, code: dict[str, str]) -> bool:
+        """Make room for an attempt; returns whether it continues an earlier one.
+
+        A forced attempt continues only one that was forced too.
+        """
+        earlier = self.record
+        if forced and not earlier.get("forced"):
+            shutil.rmtree(self.root, ignore_errors=True)
+            earlier = {}
+        shutil.rmtree(self.out, ignore_errors=True)
+        self.scratch.mkdir(parents=True, exist_ok=True)
+        self.out.mkdir()
+        self._begun = time.monotonic()
+        self._state = {
+            "stage": self.stage,
+            "key": self.key,
+            "recipe": recipe,
+            "pid": os.getpid(),
+            "host": host(),
+            "forced": forced or bool(earlier.get("forced")),
+            "attempts": int(earlier.get("attempts", 0)) + 1,
+            "before": float(earlier.get("seconds", 0.0)),
+            "seconds": float(earlier.get("seconds", 0.0)),
+            "code": code,
+        }
+        self.write()
+        return bool(earlier)
+
+    @property
+    def attempts(self) -> int:
+        """Attempts so far, with this one."""
+        return int(self._state["attempts"])
+
+    @property
+    def seconds(self) -> float:
+        """Time spent over all attempts [s]."""
+        return float(self._state["before"]) + time.monotonic() - self._begun
+
+    def progress(self, done: float, total: float, note: str) -> None:
+        """Record how far the stage is, at most once in a while."""
+        self._state.update(done=done, total=total, note=note)
+        if time.monotonic() - self._written > WRITE_INTERVAL:
+            self.write()
+
+    def write(self) -> None:
+        """Record the progress on disk."""
+        self._written = time.monotonic()
+        self._state.update(seconds=self.seconds, updated=time.time())
+        write_atomically(self.root / PROGRESS, json.dumps(self._state))
+
+    def remove(self) -> None:
+        """Remove scratch, checkpoints and leftovers."""
+        shutil.rmtree(self.root, ignore_errors=True)
+
+
+def unfinished(runs: Runs) -> list[tuple[Path, dict[str, Any]]]:
+    """Work folders and their records, newest first."""
+    found = [(path, read_json(path / PROGRESS) or {}) for path in runs.work.glob("*") if path.is_dir()]
+    return sorted(found, key=lambda item: -float(item[1].get("updated", 0.0)))

@@ -1,0 +1,1 @@
+"""What a run tells MLflow, by way of a journal on disk."""

@@ -1,0 +1,234 @@
+"""One journal on its way to MLflow."""
+
+import contextlib
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from iowbc.pipeline.store.locks import named_lock
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.journal import (
+    close_orphaned,
+    events,
+    header,
+    lives,
+    mark_sent,
+    note_status,
+    sent,
+    sent_path,
+    statuses,
+    unsent,
+)
+
+if TYPE_CHECKING:
+    from mlflow.tracking import MlflowClient
+
+MAXIMUM_METRICS = 1000
+"""Metrics that MLflow takes in one call."""
+MAXIMUM_PARAMETERS = 100
+"""Parameters that MLflow takes in one call."""
+MAXIMUM_TEXT = 5000
+"""Longest value of a parameter or tag that MLflow's stores take [characters]."""
+ORIGIN_TAG = "iowbc.origin"
+"""Tag with a run's journal and its name there, by which a sender finds what another one made before it died."""
+REFUSALS = ("INVALID_PARAMETER_VALUE", "BAD_REQUEST", "RESOURCE_DOES_NOT_EXIST", "RESOURCE_ALREADY_EXISTS")
+"""Answers that another attempt would not change; what was refused is left out."""
+
+
+class Delivery:
+    """Sends one journal. Reads each line once, however long the run is."""
+
+    def __init__(self, runs: Runs, path: Path) -> None:
+        self.runs, self.path = runs, path
+        self.offset, self.ids = sent(path)
+        self.statuses = statuses(path, self.offset)
+        self.repeats = True
+        """Whether the next event may have been sent by a sender that died before it could say so."""
+        self._checked = -1
+        self._client: MlflowClient | None = None
+        self._experiment = ""
+
+    def lives(self) -> bool:
+        """Whether the journal's process lives; the runs of one that does not are ended, once."""
+        if lives(self.path):
+            return True
+        size = self.path.stat().st_size
+        if size != self._checked:
+            close_orphaned(self.path)
+            self._checked = self.path.stat().st_size
+        return False
+
+    def advance(self) -> bool:
+        """Send what is new, and remove the journal once its run has finished; False where MLflow was not reached."""
+        try:
+            if self.offset < self.path.stat().st_size:
+                self._connect()
+                self._send()
+            if set(self.statuses.values()) == {"FINISHED"} and not unsent(self.path) and not lives(self.path):
+                self.path.unlink()
+                sent_path(self.path).unlink(missing_ok=True)
+        except Exception as error:
+            print(f"{time.strftime('%F %T')} {self.path.name}: {type(error).__name__}: {error}", flush=True)
+            self.repeats = True
+            return False
+        return True
+
+    @property
+    def client(self) -> "MlflowClient":
+        """The store or server that the journal names."""
+        assert self._client is not None
+        return self._client
+
+    def _connect(self) -> None:
+        if self._client is None:
+            first = header(self.path)
+            made = client(str(first["uri"]))
+            with set_up(self.runs):
+                self._experiment = experiment(made, str(first["experiment"]), self.runs)
+            self._client = made
+
+    def _send(self) -> None:
+        """Send event by event; neighbouring metrics of a run go in one call."""
+        gathered: list[dict[str, Any]] = []
+        position = self.offset
+        for event, behind in events(self.path, self.offset):
+            note_status(self.statuses, event)
+            if gathered and not _fits(gathered, event):
+                self._metrics(gathered)
+                self._mark(position)
+                gathered = []
+            if event["event"] == "metrics":
+                gathered.append(event)
+            else:
+                self._one(event)
+                self._mark(behind)
+            position = behind
+        if gathered:
+            self._metrics(gathered)
+        self._mark(position)
+
+    def _mark(self, offset: int) -> None:
+        """All before this offset has been sent."""
+        self.offset = offset
+        self.repeats = False
+        mark_sent(self.path, offset, self.ids)
+
+    def _one(self, event: Mapping[str, Any]) -> None:
+        if event["event"] == "journal" or self._unknown(event):
+            return
+        with _refusals_noted(self.path, event):
+            if event["event"] == "run":
+                self._run(event)
+            elif event["event"] == "reopen":
+                self.client.update_run(self.ids[event["id"]], status="RUNNING")
+                self._batch(event["id"], tags=event["tags"])
+            elif event["event"] == "tags":
+                self._batch(event["id"], tags=event["tags"])
+            elif event["event"] == "text":
+                self.client.log_text(self.ids[event["id"]], event["text"], event["file"])
+            elif event["event"] == "files":
+                self._files(event)
+            elif event["event"] == "end":
+                self.client.set_terminated(self.ids[event["id"]], event["status"], event["time"])
+
+    def _unknown(self, event: Mapping[str, Any]) -> bool:
+        """Whether an event belongs to a run that MLflow refused to make; it is left out."""
+        return event["event"] != "run" and event["id"] not in self.ids
+
+    def _run(self, event: Mapping[str, Any]) -> None:
+        tags = {**event["tags"], ORIGIN_TAG: f"{self.path.stem}/{event['id']}"}
+        if event["parent"] in self.ids:
+            tags["mlflow.parentRunId"] = self.ids[event["parent"]]
+        if self.repeats:
+            condition = f"tags.`{ORIGIN_TAG}` = '{tags[ORIGIN_TAG]}'"
+            made = self.client.search_runs([self._experiment], condition, max_results=1)
+            if made:
+                self.ids[event["id"]] = made[0].info.run_id
+                return
+        run = self.client.create_run(
+            self._experiment, start_time=event["time"], tags=_cut(tags), run_name=event["name"]
+        ).info.run_id
+        self.ids[event["id"]] = run
+        self._batch(event["id"], params=event["params"])
+
+    def _files(self, event: Mapping[str, Any]) -> None:
+        for path in map(Path, event["paths"]):
+            if path.is_dir():
+                self.client.log_artifacts(self.ids[event["id"]], str(path), path.name)
+            elif path.is_file():
+                self.client.log_artifact(self.ids[event["id"]], str(path))
+
+    def _metrics(self, gathered: list[dict[str, Any]]) -> None:
+        from mlflow.entities import Metric
+
+        if self._unknown(gathered[0]):
+            return
+        with _refusals_noted(self.path, gathered[0]):
+            metrics = [
+                Metric(name, value, event["time"], event["step"])
+                for event in gathered
+                for name, value in event["values"].items()
+            ]
+            for start in range(0, len(metrics), MAXIMUM_METRICS):
+                self.client.log_batch(self.ids[gathered[0]["id"]], metrics=metrics[start : start + MAXIMUM_METRICS])
+
+    def _batch(
+        self, run: str, *, tags: Mapping[str, str] | None = None, params: Mapping[str, str] | None = None
+    ) -> None:
+        from mlflow.entities import Param, RunTag
+
+        texts = list(_cut(params or {}).items())
+        for start in range(0, len(texts), MAXIMUM_PARAMETERS):
+            chunk = [Param(name, text) for name, text in texts[start : start + MAXIMUM_PARAMETERS]]
+            self.client.log_batch(self.ids[run], params=chunk)
+        if tags:
+            self.client.log_batch(self.ids[run], tags=[RunTag(name, text) for name, text in _cut(tags).items()])
+
+
+@contextlib.contextmanager
+def set_up(runs: Runs) -> Iterator[None]:
+    """Wait until no other process sets up the database or an experiment: MLflow's own set-up is not safe for two."""
+    with named_lock(runs.tracking / "setup.lock"):
+        yield
+
+
+def client(uri: str) -> "MlflowClient":
+    """A client of a tracking store or server."""
+    from mlflow.tracking import MlflowClient
+
+    return MlflowClient(tracking_uri=uri)
+
+
+def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
+    """Identifier of an experiment, which is made where it is missing; files of the embedded store lie under `runs/`."""
+    found = client.get_experiment_by_name(name)
+    if found is not None:
+        return str(found.experiment_id)
+    embedded = client.tracking_uri.startswith("sqlite:")
+    location = runs.tracked_files.absolute().as_uri() if embedded else None
+    return str(client.create_experiment(name, artifact_location=location))
+
+
+def _fits(gathered: list[dict[str, Any]], event: Mapping[str, Any]) -> bool:
+    """Whether an event can go in one call with these metrics."""
+    if event["event"] != "metrics":
+        return False
+    count = sum(len(earlier["values"]) for earlier in gathered) + len(event["values"])
+    return gathered[0]["id"] == event["id"] and count <= MAXIMUM_METRICS
+
+
+def _cut(texts: Mapping[str, str]) -> dict[str, str]:
+    return {name: text[:MAXIMUM_TEXT] for name, text in texts.items()}
+
+
+@contextlib.contextmanager
+def _refusals_noted(path: Path, event: Mapping[str, Any]) -> Iterator[None]:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        yield
+    except MlflowException as error:
+        if error.error_code not in REFUSALS:
+            raise
+        print(f"{path.name}: MLflow refused '{event['event']}' of {event.get('id')}: {error.message}", flush=True)

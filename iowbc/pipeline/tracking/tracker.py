@@ -1,0 +1,178 @@
+"""What a run tells MLflow.
+
+It is written to a journal at once; a process of its own sends it, so that nothing here waits for a server.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from iowbc.pipeline.machine import boot, host
+from iowbc.pipeline.nested import flattened
+from iowbc.pipeline.store.digests import data_digest
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import INGREDIENTS, RECIPE, Artifact
+from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
+from iowbc.recipe.execution import Execution
+from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.recipe.reading.writing import as_yaml
+
+PARENT = "recipe"
+"""Identifier of the parent run within a journal; a nested run has its stage's name."""
+SHOWN_FOLDERS = ("figures", "tables", "videos")
+"""Folders of an artifact that go to MLflow."""
+CHECKING_TIME = 1.0
+"""Seconds within which a sender that looks at a journal has let go of it again."""
+URI_VARIABLE = "MLFLOW_TRACKING_URI"
+
+
+def tracking_uri(runs: Runs) -> str:
+    """The tracking server that the environment names, else the embedded database."""
+    return os.environ.get(URI_VARIABLE) or f"sqlite:///{runs.database.absolute()}"
+
+
+class Tracker:
+    """Records one recipe run and its stages. A run of the same recipe that did not finish is continued."""
+
+    def __init__(self, runs: Runs, loaded: LoadedRecipe) -> None:
+        self.runs = runs
+        self.patience = loaded.recipe.execution.tracking_patience
+        self._sender: subprocess.Popen[bytes] | None = None
+        self._journal = self._continued(loaded) or self._begun(loaded)
+
+    def _begun(self, loaded: LoadedRecipe) -> Journal:
+        recipe = loaded.recipe
+        stamp = time.strftime("%Y%m%d-%H%M%S")
+        journal = Journal(self.runs.tracking / f"{stamp}-{recipe.name}-{os.getpid()}.jsonl")
+        journal.acquire(CHECKING_TIME)
+        resolved = recipe.model_dump(mode="json")
+        uri = tracking_uri(self.runs)
+        journal.write(
+            "journal", uri=uri, experiment=recipe.execution.experiment, recipe=recipe.name, digest=data_digest(resolved)
+        )
+        journal.write(
+            "run", id=PARENT, parent=None, name=recipe.name, tags=_process_tags(), params=parameters(resolved)
+        )
+        journal.write("text", id=PARENT, file=RECIPE, text=as_yaml(recipe))
+        return journal
+
+    def _continued(self, loaded: LoadedRecipe) -> Journal | None:
+        """The newest journal of the same resolved recipe whose run did not finish and whose process is gone."""
+        digest = data_digest(loaded.recipe.model_dump(mode="json"))
+        for path in sorted(self.runs.tracking.glob(f"*-{loaded.recipe.name}-*.jsonl"), reverse=True):
+            first = header(path)
+            if first.get("digest") != digest or first.get("uri") != tracking_uri(self.runs):
+                continue
+            if statuses(path).get(PARENT) == "FINISHED":
+                return None
+            journal = Journal(path)
+            if journal.acquire(CHECKING_TIME):
+                journal.write("reopen", id=PARENT, tags=_process_tags())
+                return journal
+            journal.close()
+            return None
+        return None
+
+    def stage(self, name: str, key: str, slices: Mapping[str, Any], resumed: bool) -> None:
+        """A stage begins to run, or goes on; `slices` is its part of the recipe."""
+        tags = {**_process_tags(), "iowbc.stage": name, "iowbc.key": key, "iowbc.cached": "false"}
+        if resumed and name in statuses(self._journal.path):
+            self._journal.write("reopen", id=name, tags={**tags, "iowbc.resumed": "true"})
+        else:
+            self._journal.write("run", id=name, parent=PARENT, name=name, tags=tags, params=parameters(slices))
+        self.send()
+
+    def metrics(self, name: str, values: Mapping[str, float], step: int) -> None:
+        """Values of a stage at a step."""
+        self._journal.write("metrics", id=name, values=cleaned(values), step=step)
+
+    def end(self, name: str, status: str, message: str = "") -> None:
+        """A stage that ran has ended with MLflow's status FAILED or KILLED."""
+        if message:
+            self._journal.write("tags", id=name, tags={"iowbc.message": message})
+        self._journal.write("end", id=name, status=status)
+
+    def finished(self, name: str, artifact: Artifact, cached: bool) -> None:
+        """A stage has its artifact; a cached one gets a nested run too."""
+        if cached:
+            if statuses(self._journal.path).get(name) == "FINISHED":
+                return
+            tags = {"iowbc.stage": name, "iowbc.key": artifact.manifest.key, "iowbc.cached": "true"}
+            self._journal.write("run", id=name, parent=PARENT, name=name, tags=tags, params={})
+        self._journal.write("tags", id=name, tags={"iowbc.artifact": str(artifact.folder)})
+        if artifact.metrics:
+            self.metrics(name, {f"summary/{key}": value for key, value in artifact.metrics.items()}, 0)
+            self.metrics(PARENT, {f"{name}/{key}": value for key, value in artifact.metrics.items()}, 0)
+        files = [INGREDIENTS, RECIPE] if cached else [INGREDIENTS, RECIPE, *SHOWN_FOLDERS]
+        present = [str((artifact.folder / file).absolute()) for file in files if (artifact.folder / file).exists()]
+        self._journal.write("files", id=name, paths=present)
+        self._journal.write("end", id=name, status="FINISHED")
+
+    def close(self, status: str, wait: bool) -> bool:
+        """End the parent run and let the sender take what is left; True where MLflow has everything."""
+        self._journal.write("end", id=PARENT, status=status)
+        path = self._journal.path
+        self._journal.close()
+        self.send()
+        limit = time.monotonic() + (self.patience if wait else 0.0)
+        while path.exists() and unsent(path):
+            if time.monotonic() > limit or (self._sender is not None and self._sender.poll() is not None):
+                return not (path.exists() and unsent(path))
+            time.sleep(0.05)
+        return True
+
+    def send(self) -> None:
+        """See to it that a sender is at work; it outlives this process."""
+        if self._sender is None or self._sender.poll() is not None:
+            self._sender = start_sender(self.runs)
+
+
+def record_figures(runs: Runs, name: str, figures: Mapping[str, float]) -> None:
+    """Record a run that has no stages, such as a benchmark: its figures by name."""
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    with Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl") as journal:
+        journal.acquire(CHECKING_TIME)
+        experiment = Execution.model_fields["experiment"].default
+        journal.write("journal", uri=tracking_uri(runs), experiment=experiment, recipe=name, digest="")
+        journal.write("run", id=PARENT, parent=None, name=name, tags=_process_tags(), params={})
+        journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
+        journal.write("end", id=PARENT, status="FINISHED")
+    start_sender(runs)
+
+
+def cleaned(values: Mapping[str, float]) -> dict[str, float]:
+    """Values under names that MLflow accepts."""
+    return {re.sub(r"[^\w\-. :/]", "_", name): float(value) for name, value in values.items()}
+
+
+def parameters(resolved: Mapping[str, Any]) -> dict[str, str]:
+    """A resolved recipe as MLflow parameters: dotted path and value as text."""
+    return {path: str(value) for path, value in flattened(resolved).items()}
+
+
+def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
+    """Start the process that sends the journals, in a session of its own so that Ctrl-C does not reach it."""
+    runs.tracking.mkdir(parents=True, exist_ok=True)
+    with (runs.tracking / "sender.log").open("ab") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root.absolute())],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+            env={**os.environ, "OMP_NUM_THREADS": "1"},
+        )
+
+
+def backlog(runs: Runs) -> list[Path]:
+    """Journals that MLflow does not have whole."""
+    return [path for path in sorted(runs.tracking.glob("*.jsonl")) if unsent(path)]
+
+
+def _process_tags() -> dict[str, str]:
+    return {"iowbc.pid": str(os.getpid()), "iowbc.host": host(), "iowbc.boot": boot()}

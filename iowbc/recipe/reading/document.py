@@ -1,0 +1,184 @@
+"""A YAML file as a tree that remembers where each value stands."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import yaml
+
+from iowbc.errors import Problem, RecipeError
+
+Scalar: TypeAlias = "str | int | float | bool | None"
+Tree: TypeAlias = "dict[str, Located] | list[Located] | Scalar"
+Plain: TypeAlias = "dict[str, Plain] | list[Plain] | Scalar"
+PlaceOf: TypeAlias = Callable[[Any], str]
+"""Names the place of one of PyYAML's marks."""
+
+MAXIMUM_DEPTH = 40
+"""Deeper nesting is an alias that contains itself."""
+MAXIMUM_NODES = 100_000
+"""More values are aliases that multiply each other."""
+
+
+@dataclass(frozen=True)
+class Located:
+    """A value and where it was written: `file:line:column` of its key, `--set ...`, or `default`."""
+
+    value: Tree
+    place: str
+
+
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """Resolves scalars as YAML 1.2 does: `1e-3` is a number; `on`, `010` and `1:30` mean what they look like."""
+
+    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 (PyYAML's own attribute)
+
+
+PLAIN_TAGS = [f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")]
+_NULL, _BOOL, _INT, _FLOAT = PLAIN_TAGS[:4]
+_Loader.add_implicit_resolver(_NULL, re.compile(r"^(?:~|null|Null|NULL|)$"), ["~", "n", "N", ""])
+_Loader.add_implicit_resolver(_BOOL, re.compile(r"^(?:true|True|TRUE|false|False|FALSE)$"), list("tTfF"))
+_Loader.add_implicit_resolver(_INT, re.compile(r"^(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)$"), list("-+0123456789"))
+_Loader.add_implicit_resolver(
+    _FLOAT,
+    re.compile(
+        r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
+    ),
+    list("-+.0123456789"),
+)
+
+
+def read_document(text: str, file: str) -> Located:
+    """The tree of one YAML document; the root's place is the file's first line.
+
+    Raises `RecipeError` for bad syntax, duplicate keys (all of them) and tags other than YAML's plain scalars.
+    """
+    return _read(text, lambda mark: f"{file}:{mark.line + 1}:{mark.column + 1}", f"{file}:1:1")
+
+
+def read_value(text: str, place: str) -> Located:
+    """The tree of a value given on the command line; everything in it stands at `place`."""
+    return _read(text, lambda mark: place, place)
+
+
+def _read(text: str, place_of: PlaceOf, root: str) -> Located:
+    try:
+        node = yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        reason = "a tab; indent with spaces" if mark and _is_tab(text, mark) else error.problem
+        raise RecipeError([Problem(place_of(mark) if mark else root, f"not valid YAML: {reason}")]) from None
+    except yaml.YAMLError as error:
+        raise RecipeError([Problem(root, f"not valid YAML: {error}")]) from None
+    if node is None:
+        return Located(None, root)
+    builder = _Builder(place_of)
+    tree = builder.build(node, root, 0)
+    if builder.problems:
+        raise RecipeError(builder.problems)
+    return tree
+
+
+def _is_tab(text: str, mark: yaml.Mark) -> bool:
+    """Whether a mark of PyYAML's stands at a tab."""
+    lines = text.splitlines()
+    return mark.line < len(lines) and lines[mark.line][mark.column : mark.column + 1] == "\t"
+
+
+class _Builder:
+    """Turns PyYAML's nodes into a tree and gathers what is wrong with them."""
+
+    def __init__(self, place_of: PlaceOf) -> None:
+        self.place_of = place_of
+        self.problems: list[Problem] = []
+        self.nodes = 0
+
+    def build(self, node: yaml.Node, place: str, depth: int) -> Located:
+        self.nodes += 1
+        if depth > MAXIMUM_DEPTH or self.nodes > MAXIMUM_NODES:
+            raise RecipeError([Problem(place, "an alias (*name) that contains itself, or far too many values")])
+        if node.tag not in PLAIN_TAGS:
+            self._complain(node, f"tag {node.tag!r} is not allowed in a recipe")
+            return Located(None, place)
+        if isinstance(node, yaml.MappingNode):
+            return Located(self._mapping(node, depth), place)
+        if isinstance(node, yaml.SequenceNode):
+            items = [self.build(item, self.place_of(item.start_mark), depth + 1) for item in node.value]
+            return Located(items, place)
+        return Located(self._scalar(node), place)
+
+    def _mapping(self, node: yaml.MappingNode, depth: int) -> dict[str, Located]:
+        entries: dict[str, Located] = {}
+        for key_node, value_node in node.value:
+            place = self.place_of(key_node.start_mark)
+            if not isinstance(key_node, yaml.ScalarNode):
+                self.problems.append(Problem(place, "a key must be a single word"))
+                continue
+            key = str(key_node.value)
+            if key in entries:
+                self.problems.append(Problem(place, f"key '{key}' is written twice; first at {entries[key].place}"))
+            entries[key] = self.build(value_node, place, depth + 1)
+        return entries
+
+    def _scalar(self, node: yaml.Node) -> Scalar:
+        text = str(node.value)
+        try:
+            if node.tag == _NULL:
+                return None
+            if node.tag == _BOOL:
+                return text.lower() == "true"
+            if node.tag == _INT:
+                return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
+            if node.tag == _FLOAT:
+                return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+        except ValueError:
+            self._complain(node, f"{text!r} is not a {node.tag.split(':')[-1]}")
+            return None
+        return text
+
+    def _complain(self, node: yaml.Node, text: str) -> None:
+        self.problems.append(Problem(self.place_of(node.start_mark), text))
+
+
+def plain(tree: Located) -> Plain:
+    """The tree without its places."""
+    if isinstance(tree.value, dict):
+        return {key: plain(entry) for key, entry in tree.value.items()}
+    if isinstance(tree.value, list):
+        return [plain(item) for item in tree.value]
+    return tree.value
+
+
+def located(value: object, place: str) -> Located:
+    """Plain data (mappings, sequences, scalars) as a tree that stands at one place."""
+    if isinstance(value, dict):
+        return Located({str(key): located(entry, place) for key, entry in value.items()}, place)
+    if isinstance(value, (list, tuple)):
+        return Located([located(item, place) for item in value], place)
+    if value is None or isinstance(value, (str, int, float, bool)):
+        return Located(value, place)
+    raise TypeError(f"not plain data: {value!r}")
+
+
+def merged(base: Located, over: Located) -> Located:
+    """`over` laid upon `base`: mappings merge key by key, everything else (lists too) is replaced."""
+    if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
+        return over
+    entries = dict(base.value)
+    for key, entry in over.value.items():
+        entries[key] = merged(entries[key], entry) if key in entries else entry
+    return Located(entries, over.place)
+
+
+def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Located]]:
+    """Every scalar and every empty collection with its path; list items are named by their index."""
+    entries: list[tuple[str, Located]] = []
+    if isinstance(tree.value, dict):
+        entries = list(tree.value.items())
+    elif isinstance(tree.value, list):
+        entries = [(str(index), item) for index, item in enumerate(tree.value)]
+    if not entries:
+        yield path, tree
+    for name, entry in entries:
+        yield from leaves(entry, (*path, name))

@@ -1,0 +1,91 @@
+"""Reads a recipe file: inheritance, overrides, validation, and where each value came from."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from iowbc.errors import Problem, RecipeError, nearest
+from iowbc.recipe.reading.document import Located, leaves, merged, read_document
+from iowbc.recipe.reading.overrides import overridden
+from iowbc.recipe.reading.validation import validate
+from iowbc.recipe.recipe import Recipe
+
+OWN_KEYS = ("name", "description")
+"""Keys that a recipe never inherits: they say which experiment this is."""
+
+
+@dataclass(frozen=True)
+class LoadedRecipe:
+    """A recipe, the file it came from, and the place of every value in it."""
+
+    recipe: Recipe
+    file: Path
+    overrides: tuple[str, ...]
+    places: Mapping[str, str]
+    """Place of each value that a file or an override wrote, by dotted path."""
+
+    def place(self, path: str) -> str:
+        """Where the value at a dotted path was written (`file:line:column`, `--set ...`), or `default`."""
+        parts = path.split(".")
+        for length in range(len(parts), 0, -1):
+            found = self.places.get(".".join(parts[:length]))
+            if found is not None:
+                return found
+        return next((place for known, place in self.places.items() if known.startswith(path + ".")), "default")
+
+
+def load_recipe(file: Path, overrides: Sequence[str] = ()) -> LoadedRecipe:
+    """Load, inherit, override and validate. Raises `RecipeError` with every problem and its line.
+
+    A recipe's name is its file's name unless it says otherwise; name and description are not inherited.
+    """
+    tree = _resolve(os.fspath(file), (), f"{file}:1:1")
+    if isinstance(tree.value, dict) and "name" not in tree.value:
+        tree = Located({"name": Located(Path(file).stem.lower(), f"{file}:1:1"), **tree.value}, tree.place)
+    tree = overridden(tree, overrides)
+    recipe = validate(tree)
+    places = {".".join(path): leaf.place for path, leaf in leaves(tree)}
+    return LoadedRecipe(recipe, Path(file), tuple(overrides), places)
+
+
+def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
+    """The tree of a file laid upon that of the recipe it extends."""
+    if os.path.realpath(file) in map(os.path.realpath, above):
+        raise RecipeError([Problem(place, f"recipes extend each other in a circle: {' -> '.join((*above, file))}")])
+    tree = read_document(_text(file, place), file)
+    if tree.value is None:
+        text = "is empty; write at least one line, for example `description: what this tries` or `extends: full.yaml`"
+        raise RecipeError([Problem(tree.place, text)])
+    if not isinstance(tree.value, dict):
+        raise RecipeError([Problem(tree.place, "a recipe is a mapping, `key: value` on each line")])
+    entries = dict(tree.value)
+    extends = entries.pop("extends", None)
+    own = Located(entries, tree.place)
+    if extends is None:
+        return own
+    if not isinstance(extends.value, str):
+        raise RecipeError([Problem(extends.place, "key 'extends': should be the name of one recipe file")])
+    parent = os.path.normpath(os.path.join(os.path.dirname(file), extends.value))
+    base = _resolve(parent, (*above, file), extends.place)
+    inherited = {key: entry for key, entry in _mapping(base).items() if key not in OWN_KEYS}
+    return merged(Located(inherited, base.place), own)
+
+
+def _mapping(tree: Located) -> dict[str, Located]:
+    return tree.value if isinstance(tree.value, dict) else {}
+
+
+def _text(file: str, place: str) -> str:
+    try:
+        return Path(file).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        text = f"is not UTF-8 text ({error.reason} at byte {error.start})"
+        raise RecipeError([Problem(f"{file}:1:1", text)]) from None
+    except OSError as error:
+        folder = Path(file).parent
+        known = sorted(str(found.name) for found in folder.glob("*.yaml")) if folder.is_dir() else []
+        listing = f"; recipes in {folder}: {', '.join(known)}" if known else ""
+        reason = "no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")
+        text = f"recipe {file}: {reason}{listing}{nearest(Path(file).name, known)}"
+        raise RecipeError([Problem(place, text)]) from None

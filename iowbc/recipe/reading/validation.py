@@ -1,0 +1,142 @@
+"""From a tree of values to a `Recipe`, with pydantic's errors told in the words of the file."""
+
+import re
+import types
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from iowbc.errors import Problem, RecipeError, nearest, shown
+from iowbc.recipe.reading.document import Located, leaves, plain
+from iowbc.recipe.recipe import Recipe
+
+
+def validate(tree: Located) -> Recipe:
+    """The recipe that a tree describes. Raises `RecipeError` with all problems."""
+    try:
+        recipe = Recipe.model_validate(plain(tree))
+    except ValidationError as error:
+        raise RecipeError(_problems(tree, error.errors(include_url=False))) from None
+    booleans = [
+        Problem(found.place, f"key '{'.'.join(path)}' = {found.value}: should be a number, not true or false")
+        for path, found in leaves(tree)
+        if isinstance(found.value, bool) and type(_value_at(recipe, path)) in (int, float)
+    ]
+    if booleans:
+        raise RecipeError(booleans)
+    return recipe
+
+
+def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
+    """One problem a place and key: what the members of a union say about the same value is joined."""
+    texts: dict[tuple[str, str], list[str]] = {}
+    for error in errors:
+        place, head, text = _problem(tree, error)
+        texts.setdefault((place, head), [])
+        if text not in texts[place, head]:
+            texts[place, head].append(text)
+    problems = [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
+    return sorted(problems, key=lambda problem: _position(problem.place))
+
+
+def _position(place: str) -> tuple[str, int, int]:
+    """File, line and column of a place, to sort by."""
+    rest, _, column = place.rpartition(":")
+    file, _, line = rest.rpartition(":")
+    return (file, int(line), int(column)) if line.isdecimal() and column.isdecimal() else (place, 0, 0)
+
+
+def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
+    """Place, `key 'x' = value`, and what is valid."""
+    path, found = _descend(tree, error["loc"])
+    if error["type"] == "missing":
+        name = ".".join((*path, str(error["loc"][-1])))
+        return found.place, f"key '{name}'", "is missing and has no default"
+    key = ".".join(path)
+    if error["type"] == "extra_forbidden":
+        section = path[:-1]
+        known = sorted(name for model in _models_at(section) for name in model.model_fields)
+        where = f"of '{'.'.join(section)}'" if section else "of a recipe"
+        hint = nearest(path[-1], known) or _elsewhere(path[-1])
+        text = f"is not a key {where}; valid: {', '.join(known) or 'none'}{hint}"
+        return found.place, f"key '{key}' = {shown(plain(found))}", text
+    head = f"key '{key}'" if key else "the recipe"
+    if not isinstance(found.value, dict):
+        head += f" = {shown(plain(found))}"
+    text = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
+    if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
+        text += nearest(found.value, re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", ""))))
+    return found.place, head, text
+
+
+def _descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ...], Located]:
+    """The deepest value of the file that an error's location leads to; names of union members are skipped."""
+    path: list[str] = []
+    for part in location:
+        if isinstance(tree.value, dict) and str(part) in tree.value:
+            tree = tree.value[str(part)]
+        elif isinstance(tree.value, list) and isinstance(part, int) and part < len(tree.value):
+            tree = tree.value[part]
+        else:
+            continue
+        path.append(str(part))
+    return tuple(path), tree
+
+
+def _models_at(path: Sequence[str]) -> list[type[BaseModel]]:
+    """The sections that may stand at a path."""
+    candidates: list[Any] = [Recipe]
+    for name in path:
+        candidates = [inner for candidate in candidates for inner in _inside(candidate, name)]
+    return [model for candidate in candidates for model in _models(candidate)]
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    elif get_origin(annotation) in (Union, types.UnionType):
+        for member in get_args(annotation):
+            yield from _models(member)
+    elif get_origin(annotation) is Annotated:
+        yield from _models(get_args(annotation)[0])
+
+
+def _inside(annotation: Any, name: str) -> Iterator[Any]:
+    """Annotations of what `name` leads to inside a value of an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        if name in annotation.model_fields:
+            yield annotation.model_fields[name].annotation
+    elif get_origin(annotation) in (Union, types.UnionType):
+        for member in get_args(annotation):
+            yield from _inside(member, name)
+    elif get_origin(annotation) is Annotated:
+        yield from _inside(get_args(annotation)[0], name)
+    else:
+        arguments = [argument for argument in get_args(annotation) if argument is not Ellipsis]
+        yield from arguments[-1:]
+
+
+def _elsewhere(name: str) -> str:
+    """`; did you mean 'section.name'?` where a misplaced key belongs to exactly one other section."""
+    places = [path for path in _known_paths(Recipe, ()) if path[-1] == name]
+    return f"; did you mean '{'.'.join(places[0])}'?" if len(places) == 1 else ""
+
+
+def _known_paths(model: type[BaseModel], path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    for name, field in model.model_fields.items():
+        yield (*path, name)
+        for section in _models(field.annotation):
+            yield from _known_paths(section, (*path, name))
+
+
+def _value_at(value: object, path: Sequence[str]) -> object:
+    for name in path:
+        if isinstance(value, BaseModel):
+            value = getattr(value, name, None)
+        elif isinstance(value, (tuple, list)):
+            value = value[int(name)]
+        elif isinstance(value, dict):
+            value = value.get(name)
+    return value

@@ -1,0 +1,1 @@
+"""Physics, scenes, partner, randomisation and sensors of a recipe."""

@@ -1,0 +1,47 @@
+"""Scenes, and quantities of an episode that a trial may hold at a value, by name: checked when a recipe is read."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.partner import Partner
+from iowbc.recipe.simulation.randomization import Randomization
+from iowbc.recipe.simulation.scene import Scenes
+
+SCENES = tuple(Scenes.model_fields)
+"""Names of the scenes."""
+FREE = "free"
+"""The scene without an object."""
+LOADED = tuple(name for name in SCENES if name != FREE)
+"""Scenes with an object."""
+SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale")
+"""Factors on impulses, pushes, sensor noise, and on how far the object's mass may rise in its range."""
+HOLDABLE = (
+    *(name for name, field in Randomization.model_fields.items() if field.annotation is Distribution),
+    *(
+        f"partner_{name}"
+        for name, field in Partner.model_fields.items()
+        if field.annotation is Distribution and name != "push_share"  # in a push it is drawn as the partner's share
+    ),
+    *SWITCHES,
+    "object_mass",
+)
+"""Names of what is drawn for an episode."""
+
+
+def _with_object(name: str) -> str:
+    if name not in LOADED:
+        raise ValueError(f"no scene {name!r} with an object; valid: {', '.join(LOADED)}; a mass of 0 is without one")
+    return name
+
+
+def _known_quantities(held: dict[str, float]) -> dict[str, float]:
+    unknown = sorted(set(held) - set(HOLDABLE))
+    if unknown:
+        raise ValueError(f"no randomised quantity {', '.join(unknown)}; valid: {', '.join(sorted(HOLDABLE))}")
+    return held
+
+
+ObjectScene = Annotated[str, AfterValidator(_with_object), Field(json_schema_extra={"enum": list(LOADED)})]
+Held = Annotated[dict[str, float], AfterValidator(_known_quantities)]

@@ -1,0 +1,36 @@
+"""The second carrier, at the object's far handle."""
+
+from pydantic import Field
+
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.distribution import Distribution
+
+
+class Partner(Section):
+    """A compliant carrier: a spring and a damper at the far handle that follow the commanded motion."""
+
+    enabled: bool = True
+    """Off leaves the robot alone with the object."""
+    share: Distribution = Distribution(low=0.0, high=0.6, nominal=0.0, probability=0.7)
+    """Share of a held object's weight that the partner bears; 0 means that nobody helps and the carrier is absent."""
+    push_share: Distribution = Distribution(low=-0.3, high=0.6, nominal=0.0, probability=0.7)
+    """In a push, the part of the rolling resistance that the partner overcomes; negative resists, 0 means absent."""
+    stiffness: Distribution = Distribution(low=100.0, high=600.0, nominal=300.0, shape="log-uniform")
+    """Horizontal stiffness at the handle [N/m]."""
+    damping: Distribution = Distribution(low=20.0, high=100.0, nominal=50.0, shape="log-uniform")
+    """Damping at the handle [N·s/m]."""
+    delay: Distribution = Distribution(low=0.05, high=0.3, nominal=0.15)
+    """Time by which the partner lags behind the commanded motion [s]; human reaction times."""
+    pace: Distribution = Distribution(low=0.7, high=1.2, nominal=1.0)
+    """Speed of the partner as a part of the commanded one: below 1 it holds back, above 1 it pulls."""
+    noise: Distribution = Distribution(low=0.0, high=8.0, nominal=0.0)
+    """Standard deviation of the partner's unsteady force, per horizontal axis [N]."""
+    noise_time: float = Field(default=0.5, gt=0.0)
+    """Correlation time of that force [s]."""
+    leash: float = Field(default=0.15, gt=0.0)
+    """Furthest that the partner's own aim runs ahead of the handle [m]; people wait for one another."""
+    strongest: float = Field(default=80.0, ge=0.0)
+    """Bound on the horizontal force of spring and damper [N]."""
+    stability: float = Field(default=0.3, gt=0.0, le=1.0)
+    """Bound on damping · period / mass and on stiffness · period² / mass, above which a force that is held over
+    a control period would make a light object oscillate."""

@@ -1,0 +1,73 @@
+"""What is drawn anew for each episode, and the disturbances within one; ranges of the paper's Table I."""
+
+from pydantic import Field
+
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.distribution import Distribution
+
+
+class Randomization(Section):
+    """Quantities drawn once an episode."""
+
+    enabled: bool = True
+    """Off gives every entry its nominal value."""
+    object_mass_scale: Distribution = Distribution(low=0.5, high=1.5, nominal=1.0)
+    """Object mass as a part of the nominal one (Table I: 50 to 150 %)."""
+    inertia_scale: Distribution = Distribution(low=0.8, high=1.2, nominal=1.0)
+    """Object inertia as a part of that of a uniform body of its mass."""
+    object_com_offset: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
+    """Offset of the object's centre of mass from its centre, per axis [m]."""
+    ground_friction: Distribution = Distribution(low=0.5, high=1.2, nominal=0.8)
+    """Friction between feet and ground (Table I)."""
+    object_ground_friction: Distribution = Distribution(low=0.02, high=0.15, nominal=0.06)
+    """Rolling resistance μ of the crate on its wheels (Table I)."""
+    surface_friction: Distribution = Distribution(low=1.0, high=1.5, nominal=1.2)
+    """Friction between palms and object (Table I)."""
+    link_mass_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
+    """Mass of each link as a part of its nominal one; the inertia follows."""
+    link_inertia_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
+    """Further factor on the inertia of each link."""
+    joint_friction: Distribution = Distribution(low=0.0, high=0.3, nominal=0.0, probability=0.3)
+    """Dry friction of each joint [N·m]; in some episodes only, for its 29 constraint rows slow the physics by 15 %."""
+    motor_damping: Distribution = Distribution(low=0.0, high=0.5, nominal=0.0)
+    """Viscous friction of each joint beyond the controller's own damping [N·m·s/rad]."""
+    kp_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
+    """Position gain of each joint as a part of its nominal one."""
+    kd_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
+    """Velocity gain of each joint as a part of its nominal one."""
+    encoder_bias: Distribution = Distribution(low=-0.015, high=0.015, nominal=0.0)
+    """Constant error of each joint position sensor [rad]."""
+    action_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
+    """Delay of the joint targets [control periods]."""
+    sensor_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
+    """Delay of joint and inertial measurements [control periods]."""
+    object_latency: Distribution = Distribution(low=0.0, high=2.0, nominal=0.0)
+    """Delay of the measured pose and rates of the object [control periods]."""
+    longest_latency: int = Field(default=4, ge=1)
+    """Length of the delay lines [control periods]; no latency may pass it."""
+
+
+class Impulses(Section):
+    """Random impulses on the object's centre of mass (paper III-D: I_rand)."""
+
+    enabled: bool = True
+    """Off leaves the object alone."""
+    interval: Distribution = Distribution(low=1.5, high=4.0, nominal=3.0)
+    """Time from one impulse to the next [s]."""
+    magnitude: Distribution = Distribution(low=1.0, high=8.0, nominal=4.0)
+    """Size [N·s]; 8 N·s stop a 7 kg box that moves at 1.1 m/s."""
+    duration: float = Field(default=0.1, gt=0.0)
+    """Time over which an impulse acts, as a constant force [s]."""
+
+
+class Pushes(Section):
+    """Random pushes on the robot's base."""
+
+    enabled: bool = True
+    """Off leaves the base alone."""
+    interval: Distribution = Distribution(low=2.0, high=5.0, nominal=4.0)
+    """Time from one push to the next [s]."""
+    speed: Distribution = Distribution(low=0.0, high=0.5, nominal=0.3)
+    """Change of the robot's velocity that a push would give it in the air, in a random horizontal direction [m/s]."""
+    duration: float = Field(default=0.1, gt=0.0)
+    """Time over which a push acts, as a constant force [s]."""

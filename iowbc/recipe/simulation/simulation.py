@@ -1,0 +1,58 @@
+"""The world: physics, scenes, partner, randomisation, sensing."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.partner import Partner
+from iowbc.recipe.simulation.randomization import Impulses, Pushes, Randomization
+from iowbc.recipe.simulation.scene import Scenes
+from iowbc.recipe.simulation.sensing import Sensing
+
+
+class Physics(Section):
+    """How MuJoCo integrates."""
+
+    timestep: float = Field(default=0.005, gt=0.0, le=0.02)
+    """Physics step [s]; a whole number of them makes a control period."""
+    pd: Literal["implicit", "explicit"] = "implicit"
+    """Whether the damping of the joint controllers is integrated implicitly (stable at any gain) or, as on the robot,
+    computed explicitly from the measured state at the physics rate."""
+    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
+    """Friction cone: the pyramid inscribed in it, or the cone itself, with which a step costs half as much again."""
+    solver: Literal["newton", "cg"] = "newton"
+    """Constraint solver."""
+    iterations: int = Field(default=10, ge=1)
+    """Solver iterations at most. Ten give the trajectories of a hundred to machine precision at no cost, for the solver
+    stops when it has converged; at five, joints are off by 0.1 rad after half a second."""
+    line_search_iterations: int = Field(default=20, ge=1)
+    """Line search iterations at most; as above."""
+    body_contact: Literal["nothing", "object", "everything"] = "object"
+    """What links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs and
+    torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` tells what each costs."""
+    contact_force: float = Field(default=1.0, gt=0.0)
+    """Vertical force above which a foot counts as being on the ground [N]."""
+    fastest: float = Field(default=200.0, gt=0.0)
+    """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
+    divergences_kept: int = Field(default=8, ge=0)
+    """How many diverged simulations are kept for replay."""
+
+
+class Simulation(Section):
+    """The world: physics, scenes, partner, randomisation, sensing."""
+
+    physics: Physics = Physics()
+    """How MuJoCo integrates."""
+    scenes: Scenes = Scenes()
+    """The worlds by name."""
+    partner: Partner = Partner()
+    """The second carrier."""
+    randomization: Randomization = Randomization()
+    """What is drawn anew for each episode."""
+    impulses: Impulses = Impulses()
+    """Impulses on the object's centre of mass."""
+    pushes: Pushes = Pushes()
+    """Pushes on the base."""
+    sensing: Sensing = Sensing()
+    """What the sensors add to the truth."""

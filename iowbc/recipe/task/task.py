@@ -1,0 +1,60 @@
+"""The Markov decision process."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import Section
+from iowbc.recipe.task.action import Action
+from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.task.curriculum import Curriculum
+from iowbc.recipe.task.joint_references import References
+from iowbc.recipe.task.observation import Observation
+from iowbc.recipe.task.reward import Reward
+from iowbc.recipe.task.termination import Termination
+
+SceneName = Literal["free", "lift", "tyre", "push"]
+
+
+class SceneShares(Section):
+    """Which part of the environments plays which scene; only the proportions matter."""
+
+    free: float = Field(default=0.1, ge=0.0)
+    """No object: walking, standing and posture alone."""
+    lift: float = Field(default=0.9, ge=0.0)
+    """The box, held between the wrists."""
+    tyre: float = Field(default=0.0, ge=0.0)
+    """The tyre, held between the wrists."""
+    push: float = Field(default=0.0, ge=0.0)
+    """The crate on wheels before the hands."""
+
+    @model_validator(mode="after")
+    def _some_scene(self) -> Self:
+        if self.free + self.lift + self.tyre + self.push <= 0.0:
+            raise ValueError("every share is zero: give at least one scene a positive share")
+        return self
+
+
+class Task(Section):
+    """The Markov decision process: commands, observation, action, reward, terminations, curriculum."""
+
+    control_frequency: float = Field(default=50.0, gt=0.0, le=500.0)
+    """Rate at which the policy acts [Hz]; must divide the physics rate."""
+    episode_duration: tuple[float, float] = (10.0, 20.0)
+    """Range from which the time limit of an episode is drawn [s]; a spread keeps environments out of step."""
+    scenes: SceneShares = SceneShares()
+    """Scenes that the environments play."""
+    commands: Commands = Commands()
+    """The 11-D skill-level command and how it is drawn."""
+    references: References = References()
+    """How a command becomes joint references: base grasp, arm kinematics, reference generator, gait prior."""
+    action: Action = Action()
+    """The residual action."""
+    observation: Observation = Observation()
+    """What the policy sees."""
+    reward: Reward = Reward()
+    """Terms and weights of the reward."""
+    termination: Termination = Termination()
+    """When an episode ends early."""
+    curriculum: Curriculum = Curriculum()
+    """The three phases of training."""

@@ -1,0 +1,1 @@
+"""Fits the reference generator to its labels, and judges it."""

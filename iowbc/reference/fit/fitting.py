@@ -1,0 +1,156 @@
+"""Fits the reference network in torch: joint errors, and what they do to feet, height and torso to first order."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from iowbc.errors import Interrupted
+from iowbc.recipe.generator import Fit
+from iowbc.reference.fit.task_error import LENGTH_ROWS, ROWS
+
+Array = NDArray[Any]
+
+SMALLEST_SPREAD = 1e-3
+"""Least standard deviation by which an input or output is divided: a constant stays constant."""
+FINAL_RATE = 0.01
+"""Last step size over the first."""
+
+
+@dataclass(frozen=True)
+class FitData:
+    """Inputs (n, inputs), outputs (n, 15) [rad], and the task Jacobians (n, 10, 15) of some samples."""
+
+    inputs: Array
+    outputs: Array
+    jacobian: Array
+
+    def take(self, which: Array) -> "FitData":
+        """Some of the samples."""
+        return FitData(self.inputs[which], self.outputs[which], self.jacobian[which])
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The network's numbers, float32."""
+
+    layers: tuple[tuple[Array, Array], ...]
+    input_mean: Array
+    input_std: Array
+    output_mean: Array
+    output_std: Array
+    epochs: int
+    training_loss: tuple[float, ...]
+    validation_loss: tuple[float, ...]
+
+
+def fit(
+    train: FitData,
+    validation: FitData,
+    recipe: Fit,
+    seed: int,
+    epoch_done: Callable[[int, float, float], None],
+    interrupted: Callable[[], bool],
+) -> Fitted:
+    """Trains with Adam on |δθ|² + w |J δθ|², lengths in units of `length_scale`; keeps the best validated epoch.
+
+    One thread and one seeded generator: the result is the same on every run.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        return _fit(train, validation, recipe, seed, epoch_done, interrupted)
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _fit(
+    train: FitData,
+    validation: FitData,
+    recipe: Fit,
+    seed: int,
+    epoch_done: Callable[[int, float, float], None],
+    interrupted: Callable[[], bool],
+) -> Fitted:
+    generator = torch.Generator().manual_seed(seed)
+    input_mean, input_std = _moments(train.inputs)
+    output_mean, output_std = _moments(train.outputs)
+    row_scale = np.ones((ROWS, 1))
+    row_scale[list(LENGTH_ROWS)] = 1.0 / recipe.length_scale
+    spread = torch.from_numpy(output_std)
+
+    def prepared(data: FitData) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        return (
+            torch.from_numpy(((data.inputs - input_mean) / input_std).astype(np.float32)),
+            torch.from_numpy(((data.outputs - output_mean) / output_std).astype(np.float32)),
+            torch.from_numpy((data.jacobian * row_scale * np.sqrt(recipe.task_weight)).astype(np.float32)),
+        )
+
+    def loss(x: torch.Tensor, y: torch.Tensor, jacobian: torch.Tensor) -> torch.Tensor:
+        error = (network(x) - y) * spread
+        task = torch.bmm(jacobian, error.unsqueeze(-1))
+        mean: torch.Tensor = (error.square().sum() + task.square().sum()) / len(x)
+        return mean
+
+    network = _network([train.inputs.shape[1], *recipe.hidden, train.outputs.shape[1]], generator)
+    x, y, jacobian = prepared(train)
+    held = prepared(validation)
+    count = len(x)
+    batches = max(count // recipe.batch, 1)
+    optimiser = torch.optim.Adam(network.parameters(), lr=recipe.learning_rate)
+    total = recipe.epochs * batches
+    schedule = torch.optim.lr_scheduler.LambdaLR(
+        optimiser, lambda step: FINAL_RATE + (1.0 - FINAL_RATE) * 0.5 * (1.0 + np.cos(np.pi * min(step / total, 1.0)))
+    )
+    best, best_epoch, kept = np.inf, 0, _numbers(network)
+    curves: list[tuple[float, float]] = []
+    for epoch in range(1, recipe.epochs + 1):
+        if interrupted():
+            raise Interrupted
+        order = torch.randperm(count, generator=generator)
+        summed = 0.0
+        for batch in torch.tensor_split(order, batches):
+            value = loss(x[batch], y[batch], jacobian[batch])
+            optimiser.zero_grad()
+            value.backward()  # type: ignore[no-untyped-call]
+            optimiser.step()
+            schedule.step()
+            summed += float(value.detach())
+        with torch.no_grad():
+            checked = float(loss(*held))
+        curves.append((summed / batches, checked))
+        epoch_done(epoch, *curves[-1])
+        if not np.isfinite(checked):
+            raise ValueError(f"the fit diverged in epoch {epoch}; lower rg.fit.learning_rate ({recipe.learning_rate})")
+        if checked < best:
+            best, best_epoch, kept = checked, epoch, _numbers(network)
+        if epoch - best_epoch >= recipe.patience:
+            break
+    training, validated = zip(*curves, strict=True)
+    return Fitted(kept, input_mean, input_std, output_mean, output_std, best_epoch, training, validated)
+
+
+def _moments(values: Array) -> tuple[Array, Array]:
+    mean, spread = values.mean(axis=0), np.maximum(values.std(axis=0), SMALLEST_SPREAD)
+    return mean.astype(np.float32), spread.astype(np.float32)
+
+
+def _network(sizes: list[int], generator: torch.Generator) -> torch.nn.Sequential:
+    modules: list[torch.nn.Module] = []
+    for i, (width_in, width_out) in enumerate(pairwise(sizes)):
+        layer = torch.nn.Linear(width_in, width_out)
+        torch.nn.init.kaiming_uniform_(layer.weight, nonlinearity="linear", generator=generator)
+        torch.nn.init.zeros_(layer.bias)
+        modules.append(layer)
+        if i < len(sizes) - 2:
+            modules.append(torch.nn.ELU())
+    return torch.nn.Sequential(*modules)
+
+
+def _numbers(network: torch.nn.Sequential) -> tuple[tuple[Array, Array], ...]:
+    layers = [module for module in network if isinstance(module, torch.nn.Linear)]
+    return tuple((layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy()) for layer in layers)

@@ -1,0 +1,70 @@
+"""The gates of the fitted network on held-out samples."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.generator import FitGates
+from iowbc.reference.fit.smoothness import Jumps
+from iowbc.reference.fit.task_error import TaskErrors
+from iowbc.reference.labels.dataset import Dataset
+
+Array = NDArray[Any]
+
+WORST = 10
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the held-out samples say."""
+
+    metrics: dict[str, float]
+    gates: dict[str, dict[str, float | bool | None]]
+    """Value, limit and result of each gate."""
+    failures: list[str]
+    """Each missed gate in words."""
+    worst: list[str]
+    """The worst held-out samples in words."""
+
+
+def judge_fit(
+    gates: FitGates, dataset: Dataset, held: NDArray[np.int64], predicted: Array, errors: TaskErrors, jumps: Jumps
+) -> Verdict:
+    """Compares predictions (n, 15) for the dataset's rows `held` with labels and commands."""
+    difference = predicted - dataset.support[held]
+    per_sample = np.sqrt((difference**2).mean(axis=1))
+    metrics = {
+        "joint_rmse": float(np.sqrt((difference**2).mean())),
+        "joint_median": float(np.median(np.abs(difference))),
+        "joint_p99": float(np.percentile(np.abs(difference), 99)),
+        "height_p95": float(np.percentile(np.abs(errors.height), 95)),
+        "pitch_p95": float(np.percentile(np.abs(errors.pitch), 95)),
+        "foot_p95": float(np.percentile(errors.foot, 95)),
+        "foot_rotation_p95": float(np.percentile(errors.foot_rotation, 95)),
+        "margin_p1": float(np.percentile(errors.margin, 1)),
+        "margin_median": float(np.median(errors.margin)),
+        "jump": float(jumps.largest.max()),
+        "jump_median": float(np.median(jumps.largest)),
+    }
+    below: Callable[[float, float], bool] = lambda value, limit: value <= limit  # noqa: E731
+    above: Callable[[float, float], bool] = lambda value, limit: value >= limit  # noqa: E731
+    judged: dict[str, dict[str, float | bool | None]] = {}
+    failures: list[str] = []
+    for name, limit in gates.model_dump().items():
+        holds = above if name == "margin_p1" else below
+        passed = True if limit is None else holds(metrics[name], limit)
+        judged[name] = {"value": metrics[name], "limit": limit, "passed": passed}
+        if not passed:
+            failures.append(f"{name} is {metrics[name]:.4g}, the limit {limit:.4g}")
+    order = np.argsort(-per_sample)[:WORST]
+    worst = [
+        f"number {dataset.index[held[i]]} "
+        f"(height {dataset.command[held[i], 0]:.3f} m, pitch {dataset.command[held[i], 1]:+.3f} rad): "
+        f"joints {per_sample[i]:.4f} rad, height {1e3 * errors.height[i]:+.1f} mm, pitch {errors.pitch[i]:+.4f} rad, "
+        f"feet {1e3 * errors.foot[i]:.1f} mm"
+        for i in order
+    ]
+    return Verdict(metrics, judged, failures, worst)

@@ -1,0 +1,94 @@
+"""From the dataset to what the fit needs: task Jacobians, splits by group, mirror images."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.fit.fitting import FitData
+from iowbc.reference.fit.network_inputs import base_columns
+from iowbc.reference.fit.task_error import TaskKinematics
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.plan import COMMAND_MIRROR
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import interaction_mirror, support_mirror
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """The dataset, split."""
+
+    train: FitData
+    validation: FitData
+    training: NDArray[np.int64]
+    """Rows of the dataset that are trained on."""
+    held_out: NDArray[np.int64]
+    """Rows of the dataset kept for the gates."""
+    samples: list[Sample]
+    """All rows as samples."""
+    kinematics: TaskKinematics
+
+
+def prepare(
+    dataset: Dataset, robot: Robot, recipe: ReferenceGenerator, seed: int, interrupted: Callable[[], bool]
+) -> Prepared | None:
+    """Splits by group and adds mirror images to the training part; None when interrupted."""
+    kinematics = TaskKinematics(SupportModel(robot, recipe.problem), recipe.height)
+    samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, dataset.payload, strict=True)]
+    configuration = np.concatenate(
+        [dataset.base_position, np.roll(dataset.base_quaternion, -1, axis=1), dataset.support], axis=1
+    )
+    jacobian = np.empty((len(dataset), 10, len(robot.support)), dtype=np.float32)
+    for row, (sample, q) in enumerate(zip(samples, configuration, strict=True)):
+        jacobian[row] = kinematics.jacobian(sample, q)
+        if row % 1000 == 0 and interrupted():
+            return None
+    train, validation, held_out = split_by_group(dataset.group, recipe.fit.validation, recipe.fit.held_out, seed)
+    whole = FitData(_inputs(recipe, dataset.arm, dataset.command, dataset.payload), dataset.support, jacobian)
+    learnt = whole.take(train)
+    if recipe.fit.mirror:
+        arms, legs = interaction_mirror(robot), support_mirror(robot)
+        image = FitData(
+            _inputs(
+                recipe,
+                arms(dataset.arm[train]),
+                dataset.command[train] * COMMAND_MIRROR,
+                dataset.payload[train][:, ::-1],
+            ),
+            legs(dataset.support[train]),
+            legs(jacobian[train]),
+        )
+        learnt = FitData(
+            np.concatenate([learnt.inputs, image.inputs]),
+            np.concatenate([learnt.outputs, image.outputs]),
+            np.concatenate([learnt.jacobian, image.jacobian]),
+        )
+    return Prepared(learnt, whole.take(validation), train, held_out, samples, kinematics)
+
+
+def split_by_group(
+    group: Array, validation: float, held_out: float, seed: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Rows for training, early stopping and the gates; rows of one group stay together, no part is empty."""
+    groups = np.random.default_rng(seed).permutation(np.unique(group))
+    count = len(groups)
+    held, checked = max(int(held_out * count), 1), max(int(validation * count), 1)
+    if held + checked >= count:
+        raise ValueError(
+            f"{count} independent samples are too few to split (held out {held}, validation {checked}); "
+            "raise rg.sampling.samples"
+        )
+    parts = groups[held + checked :], groups[held : held + checked], groups[:held]
+    train, stop, gate = (np.flatnonzero(np.isin(group, part)) for part in parts)
+    return train, stop, gate
+
+
+def _inputs(recipe: ReferenceGenerator, arm: Array, command: Array, payload: Array) -> Array:
+    return np.concatenate([arm, base_columns(recipe, command, payload)], axis=1)

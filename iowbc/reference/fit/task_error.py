@@ -1,0 +1,99 @@
+"""What a support posture does to feet, height and torso: errors by forward kinematics, and their Jacobian."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_polygon import support_edges, support_margin
+
+Array = NDArray[Any]
+
+ROWS = 10
+"""Foot position 3, foot rotation 3, height 1, torso rotation 3."""
+LENGTH_ROWS = (0, 1, 2, 6)
+
+
+@dataclass(frozen=True)
+class TaskErrors:
+    """Errors of postures that stand on both soles, the soles fitted together to their places."""
+
+    height: Array
+    """Height reached minus commanded, shape (n,) [m]."""
+    pitch: Array
+    """Torso pitch reached minus commanded, shape (n,) [rad]."""
+    foot: Array
+    """Distance of each sole centre from its place, shape (n,) [m]."""
+    foot_rotation: Array
+    """Angle of each sole from the common sole plane, shape (n,) [rad]."""
+    margin: Array
+    """Distance of the projected centre of mass inside the support polygon, shape (n,) [m]."""
+
+
+class TaskKinematics:
+    """Places postures on the ground: mean position and mean orientation of the soles at the middle of the stance."""
+
+    def __init__(self, support: SupportModel, height: Literal["pelvis", "com"]) -> None:
+        self.support, self.height = support, height
+        self.edges = support_edges(support.robot, support.problem)
+
+    def errors(self, samples: list[Sample], postures: Array) -> TaskErrors:
+        """Errors of support postures (n, 15) for these samples."""
+        found = np.array([self._error(sample, posture) for sample, posture in zip(samples, postures, strict=True)])
+        return TaskErrors(*found.T)
+
+    def _error(self, sample: Sample, posture: Array) -> tuple[float, float, float, float, float]:
+        support = self.support
+        model, data = support.model, support.data
+        support.lock(sample)
+        q = pinocchio.neutral(model)
+        q[7:] = posture
+        com = pinocchio.centerOfMass(model, data, q).copy()
+        pinocchio.updateFramePlacements(model, data)
+        soles = [data.oMf[sole] for sole in support.soles]
+        turn = soles[0].rotation.T @ soles[1].rotation
+        middle = pinocchio.SE3(
+            soles[0].rotation @ pinocchio.exp3(0.5 * pinocchio.log3(turn)),
+            0.5 * (soles[0].translation + soles[1].translation),
+        )
+        base, torso = middle.actInv(data.oMf[support.base]), middle.actInv(data.oMf[support.torso])
+        com = middle.actInv(com)
+        left = middle.actInv(soles[0]).translation - support.stance[0].translation
+        reached = com[2] if self.height == "com" else base.translation[2]
+        turned = sample.torso_rotation().T @ torso.rotation
+        return (
+            float(reached - sample.height),
+            float(pinocchio.log3(turned)[1]),
+            float(np.linalg.norm(left)),
+            float(0.5 * np.linalg.norm(pinocchio.log3(turn))),
+            float(support_margin(self.edges, com[:2])),
+        )
+
+    def jacobian(self, sample: Sample, configuration: Array) -> Array:
+        """Derivative of foot position and rotation, height and torso rotation by the support joints, shape (10, 15).
+
+        `configuration` (22,) stands on the ground; the base follows so that the soles stay fitted to their places.
+        """
+        support = self.support
+        model, data = support.model, support.data
+        support.lock(sample)
+        com_rows = pinocchio.jacobianCenterOfMass(model, data, configuration)[:, 6:]
+        pinocchio.updateFramePlacements(model, data)
+        left, right, torso = (
+            pinocchio.getFrameJacobian(model, data, frame, pinocchio.LOCAL_WORLD_ALIGNED)[:, 6:]
+            for frame in (*support.soles, support.torso)
+        )
+        places = [data.oMf[sole].translation for sole in support.soles]
+        middle = 0.5 * (places[0] + places[1])
+        turn, lift = -0.5 * (left[3:] + right[3:]), -0.5 * (left[2] + right[2])
+        centre = data.com[0] if self.height == "com" else data.oMf[support.base].translation
+        risen = lift - (pinocchio.skew(centre - middle) @ turn)[2]
+        if self.height == "com":
+            risen = risen + com_rows[2]
+        foot = 0.5 * (left[:3] - right[:3]) - pinocchio.skew(places[0] - middle) @ turn
+        rotation = 0.5 * (left[3:] - right[3:])
+        return np.concatenate([foot, rotation, risen[None], torso[3:] + turn])

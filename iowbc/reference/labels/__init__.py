@@ -1,0 +1,1 @@
+"""Labels for the reference generator: what is sampled, solved, judged and kept."""

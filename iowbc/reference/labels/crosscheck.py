@@ -1,0 +1,56 @@
+"""Static labels held against the optimal control problem."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.shards import Shard
+
+Array = NDArray[Any]
+
+WORST = 5
+
+
+@dataclass(frozen=True)
+class Check:
+    """Differences between both methods."""
+
+    difference: Array
+    """Largest joint difference of each sample, shape (n,) [rad]."""
+    count: int
+    metrics: dict[str, float]
+    worst: list[str]
+
+
+def pick(dataset: Dataset, plan: SamplePlan, recipe: ReferenceGenerator) -> list[int]:
+    """Numbers of the drawn samples to solve again, spread evenly over the kept ones."""
+    drawn = dataset.index[dataset.index < plan.drawn]
+    count = min(recipe.crosscheck.samples, len(drawn))
+    return [int(drawn[place]) for place in np.linspace(0, len(drawn) - 1, count).astype(int)] if count else []
+
+
+def compare(dataset: Dataset, again: Shard) -> Check | None:
+    """Differences where optimal control has a label too; None where it has none."""
+    if not len(again.kept):
+        return None
+    row = {int(index): place for place, index in enumerate(dataset.index)}
+    rows = [row[int(index)] for index in again.kept]
+    difference = np.abs(dataset.support[rows] - again.labels["support"]).max(axis=1)
+    metrics = {
+        "crosscheck_samples": float(len(difference)),
+        "crosscheck_solved": len(difference) / (len(again.kept) + len(again.rejected)),
+        "crosscheck_median": float(np.median(difference)),
+        "crosscheck_p90": float(np.percentile(difference, 90)),
+        "crosscheck_max": float(difference.max()),
+    }
+    worst = [
+        f"number {again.kept[i]} (height {dataset.command[rows[i], 0]:.3f} m, "
+        f"pitch {dataset.command[rows[i], 1]:+.3f} rad): {difference[i]:.4f} rad"
+        for i in np.argsort(-difference)[:WORST]
+    ]
+    return Check(difference, len(difference), metrics, worst)

@@ -1,0 +1,104 @@
+"""The labelled samples as one file: `dataset.npz` of the stage rg-dataset."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.shards import Shard
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Kept samples with their labels (leading dimension n), and rejected samples with their reasons (r)."""
+
+    index: Array
+    """Number of the sample, shape (n,)."""
+    group: Array
+    """Mirror images share a group, shape (n,)."""
+    arm: Array
+    """Arm postures, shape (n, 14) [rad]."""
+    command: Array
+    """Height [m], torso pitch, roll, yaw [rad], shape (n, 4)."""
+    payload: Array
+    """Mass at each wrist, shape (n, 2) [kg]."""
+    support: Array
+    """The labels: support postures, shape (n, 15) [rad]."""
+    base_position: Array
+    """Base over the middle of the soles, shape (n, 3) [m]."""
+    base_quaternion: Array
+    """Base orientation, wxyz, shape (n, 4)."""
+    wrench: Array
+    """Ground on each sole, in the sole's frame, force and moment, shape (n, 2, 6) [N, N·m]."""
+    torque: Array
+    """Torques of the support joints, shape (n, 15) [N·m]."""
+    margin: Array
+    """Distance of the centre of mass inside the support polygon, shape (n,) [m]."""
+    reached: Array
+    """Height reached, shape (n,) [m]."""
+    rejected_arm: Array
+    rejected_command: Array
+    rejected_payload: Array
+    """Samples without a label, shapes (r, 14), (r, 4), (r, 2)."""
+    rejected_index: Array
+    """Their numbers, shape (r,)."""
+    rejected_reason: Array
+    """Why, shape (r,), text."""
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def save(self, path: Path) -> None:
+        """Writes a compressed archive of plain arrays."""
+        np.savez_compressed(path, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
+
+    @classmethod
+    def load(cls, path: Path) -> "Dataset":
+        """Reads the archive. Raises ValueError where arrays are missing or not finite."""
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            missing = [f.name for f in fields(cls) if f.name not in stored.files]
+            if missing:
+                raise ValueError(f"{path}: no arrays {', '.join(missing)}; make it anew with `--force rg-dataset`")
+            dataset = cls(**{f.name: stored[f.name] for f in fields(cls)})
+        for f in fields(cls):
+            values = getattr(dataset, f.name)
+            if values.dtype.kind == "f" and not np.isfinite(values).all():
+                raise ValueError(
+                    f"{path}: {f.name} has values that are not finite; make it anew with `--force rg-dataset`"
+                )
+        return dataset
+
+
+def assemble(plan: SamplePlan, result: Shard) -> Dataset:
+    """Joins labels with the samples they belong to."""
+    if not len(result.kept):
+        counted = ", ".join(f"{count} {reason}" for reason, count in reasons(result).items())
+        raise ValueError(
+            f"no sample has a label ({counted}); widen rg.sampling.height and rg.sampling.pitch or rg.gates"
+        )
+    kept, rejected = plan.draw(result.kept), plan.draw(result.rejected)
+    return Dataset(
+        index=result.kept,
+        group=np.array([plan.group(int(index)) for index in result.kept]),
+        arm=np.stack([sample.arm for sample in kept]),
+        command=np.stack([sample.command for sample in kept]),
+        payload=np.stack([sample.payload for sample in kept]),
+        **result.labels,
+        rejected_arm=np.array([sample.arm for sample in rejected]).reshape(-1, len(plan.rest)),
+        rejected_command=np.array([sample.command for sample in rejected]).reshape(-1, 4),
+        rejected_payload=np.array([sample.payload for sample in rejected]).reshape(-1, 2),
+        rejected_index=result.rejected,
+        rejected_reason=np.array(result.reasons, dtype=np.str_),
+    )
+
+
+def reasons(result: Shard) -> dict[str, int]:
+    """How often each reason for rejection came up, most frequent first."""
+    names, counts = np.unique(np.array(result.reasons, dtype=np.str_), return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    return {str(names[i]): int(counts[i]) for i in order}

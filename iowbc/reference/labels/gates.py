@@ -1,0 +1,95 @@
+"""The physical gates of a label, judged on the whole robot and independent of the method that made it."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+
+from iowbc.errors import Rejected
+from iowbc.recipe.generator import LabelGates
+from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.self_collision import SelfCollision
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_polygon import support_edges, support_margin
+from iowbc.reference.labels.wrench_cone import sole_limits
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a label was found to be."""
+
+    torque: Array
+    """Torques of the support joints in equilibrium, shape (15,) [N·m]."""
+    margin: float
+    """Distance of the projected centre of mass inside the support polygon [m]."""
+    height: float
+    """Height reached [m]."""
+
+
+class Judge:
+    """Holds the limits and buffers; one judge serves many labels."""
+
+    def __init__(self, support: SupportModel, gates: LabelGates, height: Literal["pelvis", "com"]) -> None:
+        self.support, self.gates, self.height = support, gates, height
+        robot, model = support.robot, support.full
+        self.collision = SelfCollision(robot)
+        self.edges = support_edges(robot, support.problem)
+        self.cone, self.bound = sole_limits(robot, support.problem).rows()
+        self.soles = [model.getFrameId(site) for site in robot.soles]
+        self.torso, self.base = model.getFrameId(robot.torso), model.getFrameId(robot.base)
+        self.effort = support.problem.effort_fraction * robot.effort
+        self.forces = pinocchio.StdVec_Force()
+        for _ in range(model.njoints):
+            self.forces.append(pinocchio.Force.Zero())
+
+    def arms(self, sample: Sample) -> None:
+        """Rejects arms that collide with each other or the trunk, before anything is solved; legs at their default."""
+        support = self.support
+        q = support.whole(support.start(), sample.arm)
+        pinocchio.forwardKinematics(support.full, support.full_data, q)
+        if self.collision.clearance(support.full_data.oMi)[0] < self.gates.collision_clearance:
+            raise Rejected("arms collide")
+
+    def label(self, sample: Sample, posture: Posture) -> Evidence:
+        """Passes a label or raises `Rejected`. The support model must be locked to the sample."""
+        support, gates, robot = self.support, self.gates, self.support.robot
+        model, data = support.full, support.full_data
+        q = support.whole(posture.configuration, sample.arm)
+        if not (np.isfinite(q).all() and np.isfinite(posture.wrench).all()):
+            raise Rejected("not finite")
+        for sole, wrench in zip(self.soles, posture.wrench, strict=True):
+            frame = model.frames[sole]
+            self.forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(wrench))
+        torque = pinocchio.computeStaticTorque(model, data, q, self.forces).copy()
+        pinocchio.framesForwardKinematics(model, data, q)
+        com = pinocchio.centerOfMass(model, data, q)
+        for sole, place in zip(self.soles, support.stance, strict=True):
+            error = place.actInv(data.oMf[sole])
+            if np.linalg.norm(error.translation) > gates.foot_position:
+                raise Rejected("feet")
+            if np.linalg.norm(pinocchio.log3(error.rotation)) > gates.foot_rotation:
+                raise Rejected("feet")
+        height = float(com[2] if self.height == "com" else data.oMf[self.base].translation[2])
+        if abs(height - sample.height) > gates.height:
+            raise Rejected("height")
+        turned = pinocchio.log3(sample.torso_rotation().T @ data.oMf[self.torso].rotation)
+        if np.linalg.norm(turned) > gates.orientation:
+            raise Rejected("orientation")
+        if np.abs(torque[:6]).max() > gates.equilibrium:
+            raise Rejected("equilibrium")
+        if (np.abs(torque[6:]) > self.effort + gates.equilibrium).any():
+            raise Rejected("torque")
+        if (posture.wrench @ self.cone.T > self.bound + gates.wrench).any():
+            raise Rejected("friction or centre of pressure")
+        if (q[7:] < robot.lower).any() or (q[7:] > robot.upper).any():
+            raise Rejected("joint limits")
+        margin = float(support_margin(self.edges, com[:2]))
+        if margin < gates.support_margin:
+            raise Rejected("support margin")
+        if self.collision.clearance(data.oMi)[0] < gates.collision_clearance:
+            raise Rejected("self-collision")
+        return Evidence(torque[6 + robot.support], margin, height)

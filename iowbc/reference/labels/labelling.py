@@ -1,0 +1,90 @@
+"""Labels samples by number: what runs in each worker process."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.robot.description import load_robot
+
+Array = NDArray[Any]
+
+
+class Solver(Protocol):
+    """What a worker process holds: it draws samples and labels them one at a time."""
+
+    def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
+        """The samples of these numbers."""
+
+    def solve(self, index: int, sample: Sample) -> dict[str, Array]:
+        """Arrays of one label, the same shapes for every sample. Raises `Rejected` with a reason."""
+
+
+class Method(Protocol):
+    """A way to find the support posture of a sample."""
+
+    def solve(self, sample: Sample) -> Posture:
+        """The posture; raises `Rejected`."""
+
+
+@dataclass(frozen=True)
+class LabelTask:
+    """How to make a labeller in a worker process."""
+
+    robot: Path
+    """The robot's folder."""
+    recipe: ReferenceGenerator
+    seed: int
+    method: Literal["static", "ocp"]
+
+    def prepare(self) -> "Labeller":
+        """Builds the models; called once in each worker."""
+        return Labeller(self)
+
+
+class Labeller:
+    """Draws, solves and judges samples."""
+
+    def __init__(self, task: LabelTask) -> None:
+        robot, recipe = load_robot(task.robot), task.recipe
+        self.plan = SamplePlan(robot, recipe, task.seed)
+        self.support = SupportModel(robot, recipe.problem)
+        self.judge = Judge(self.support, recipe.gates, recipe.height)
+        self.method = make_method(task.method, self.support, recipe)
+
+    def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
+        """The samples of these numbers."""
+        return self.plan.draw(indices)
+
+    def solve(self, index: int, sample: Sample) -> dict[str, Array]:
+        """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""
+        self.judge.arms(sample)
+        posture = self.method.solve(sample)
+        evidence = self.judge.label(sample, posture)
+        return {
+            "support": posture.support,
+            "base_position": posture.configuration[:3],
+            "base_quaternion": np.roll(posture.configuration[3:7], 1),
+            "wrench": posture.wrench,
+            "torque": evidence.torque,
+            "margin": np.asarray(evidence.margin),
+            "reached": np.asarray(evidence.height),
+        }
+
+
+def make_method(name: Literal["static", "ocp"], support: SupportModel, recipe: ReferenceGenerator) -> Method:
+    """The named way to find postures; crocoddyl is loaded only where it is used."""
+    if name == "static":
+        from iowbc.reference.labels.static import StaticMethod
+
+        return StaticMethod(support, recipe.height)
+    from iowbc.reference.labels.optimal_control import OptimalControlMethod
+
+    return OptimalControlMethod(support, recipe)

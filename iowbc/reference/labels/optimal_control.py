@@ -1,0 +1,136 @@
+"""The multi-contact optimal control problem over a horizon (paper eq. 4), with the arms locked, solved by BoxFDDP.
+
+Full dynamics and both feet in contact. The robot starts at rest in a posture that meets the command by kinematics, and
+settles into the one that is held with the least cost; the label is a node before the end of the horizon, where neither
+the start nor the end bends it any more.
+"""
+
+from typing import Any
+
+import crocoddyl
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+
+from iowbc.errors import Rejected
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.costs import posture_weights
+from iowbc.reference.labels.kinematic_start import KinematicStart
+from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.wrench_cone import sole_limits
+from iowbc.reference.labels.wrench_distribution import distribute
+
+Array = NDArray[Any]
+
+STOP = 1e-10
+"""Expected improvement at which the solver ends; crocoddyl's own 5e-5 leaves flat postures where they started."""
+FACETS = 4
+"""Sides of the friction pyramid."""
+
+
+class OptimalControlMethod:
+    """Solves samples one after the other; a label does not depend on the samples before it."""
+
+    def __init__(self, support: SupportModel, recipe: ReferenceGenerator) -> None:
+        self.support, self.recipe, self.problem, self.ocp = support, recipe, recipe.problem, recipe.ocp
+        self.state = crocoddyl.StateMultibody(support.model)
+        self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
+        if self.actuation.nu != len(support.robot.support):
+            raise ValueError(f"crocoddyl sees {self.actuation.nu} actuated joints, not {len(support.robot.support)}")
+        self.rest = np.concatenate([support.start(), np.zeros(support.model.nv)])
+        self.kinematic = KinematicStart(support, recipe.height)
+        self.posture = posture_weights(support.robot, recipe.problem)
+        self.limits = sole_limits(support.robot, recipe.problem)
+
+    def solve(self, sample: Sample) -> Posture:
+        """The posture at the label's node, with the sole wrenches that hold it at rest. Raises `Rejected`."""
+        self.support.lock(sample)
+        states = self.trajectory(sample)
+        if not np.isfinite(np.concatenate(states)).all():
+            raise Rejected("not converged")
+        if np.linalg.norm(states[-1][self.support.model.nq :]) > self.ocp.settled:
+            raise Rejected("not settled")
+        configuration = states[round(self.ocp.label_at * self.ocp.nodes)][: self.support.model.nq]
+        return Posture(configuration, distribute(self.support, configuration, self.limits))
+
+    def trajectory(self, sample: Sample) -> list[Array]:
+        """States (configuration, velocity) at the nodes. The support model must be locked to the sample."""
+        start = np.concatenate([self.kinematic.posture(sample), np.zeros(self.support.model.nv)])
+        contacts = self._contacts()
+        running = self._action(self._costs(sample, terminal=False), contacts, self.ocp.step)
+        terminal = self._action(self._costs(sample, terminal=True), contacts, 0.0)
+        problem = crocoddyl.ShootingProblem(start, [running] * self.ocp.nodes, terminal)
+        problem.nthreads = 1  # the processes are the parallelism; its own threads would wait in loops for each other
+        states = [start] * (self.ocp.nodes + 1)
+        solver = crocoddyl.SolverBoxFDDP(problem)
+        solver.th_stop = STOP
+        solver.solve(states, list(problem.quasiStatic(states[:-1])), self.ocp.iterations, False)
+        return list(solver.xs)
+
+    def _action(self, costs: Any, contacts: Any, step: float) -> Any:
+        dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(
+            self.state, self.actuation, contacts, costs, 0.0, True
+        )
+        action = crocoddyl.IntegratedActionModelEuler(dynamics, step)
+        action.u_lb, action.u_ub = -self.support.effort, self.support.effort
+        return action
+
+    def _contacts(self) -> Any:
+        contacts = crocoddyl.ContactModelMultiple(self.state, self.actuation.nu)
+        for sole, place in zip(self.support.soles, self.support.stance, strict=True):
+            contact = crocoddyl.ContactModel6D(
+                self.state, sole, place, pinocchio.LOCAL, self.actuation.nu, np.array(self.ocp.contact_gains)
+            )
+            contacts.addContact(f"sole_{sole}", contact)
+        return contacts
+
+    def _costs(self, sample: Sample, *, terminal: bool) -> Any:
+        """The running cost, or that of the end: no torques or contact forces, velocities held to rest."""
+        state, nu, problem, support = self.state, self.actuation.nu, self.problem, self.support
+        factor = self.ocp.terminal_factor if terminal else 1.0
+        velocity = self.ocp.terminal_velocity_weight / factor if terminal else self.ocp.velocity_weight
+        costs = crocoddyl.CostModelSum(state, nu)
+
+        def add(name: str, residual: Any, weights: Array) -> None:
+            activation = crocoddyl.ActivationModelWeightedQuad(weights)
+            costs.addCost(name, crocoddyl.CostModelResidual(state, activation, residual), factor)
+
+        of_com = self.recipe.height == "com"
+        com_height, base_height = (problem.height_weight, 0.0) if of_com else (0.0, problem.height_weight)
+        place = np.array([0.0, 0.0, sample.height])
+        plane = np.array([problem.com_weight, problem.com_weight, com_height])
+        add("centre of mass", crocoddyl.ResidualModelCoMPosition(state, place, nu), plane)
+        lift = crocoddyl.ResidualModelFrameTranslation(state, support.base, place, nu)
+        add("base height", lift, np.array([0.0, 0.0, base_height]))
+        turn = crocoddyl.ResidualModelFrameRotation(state, support.torso, sample.torso_rotation(), nu)
+        add("torso", turn, np.full(3, problem.torso_weight))
+        weights = np.concatenate([np.zeros(6), self.posture, np.full(support.model.nv, velocity)])
+        add("posture", crocoddyl.ResidualModelState(state, self.rest, nu), weights)
+        self._add_limits(costs, factor)
+        if not terminal:
+            add("torque", crocoddyl.ResidualModelControl(state, nu), np.full(nu, problem.torque_weight))
+            self._add_cones(costs)
+        return costs
+
+    def _add_limits(self, costs: Any, factor: float) -> None:
+        support, nv = self.support, self.support.model.nv
+        free = np.full(nv, np.inf)
+        angle = self.rest[7 : support.model.nq]
+        lower = np.concatenate([-free[:6], support.lower - angle, -free])
+        upper = np.concatenate([free[:6], support.upper - angle, free])
+        barrier = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(lower, upper))
+        residual = crocoddyl.ResidualModelState(self.state, self.rest, self.actuation.nu)
+        cost = crocoddyl.CostModelResidual(self.state, barrier, residual)
+        costs.addCost("joint limits", cost, factor * self.ocp.limit_weight)
+
+    def _add_cones(self, costs: Any) -> None:
+        limits = self.limits
+        size = 2.0 * np.array([limits.half_length, limits.half_width])
+        cone = crocoddyl.WrenchCone(np.eye(3), limits.friction, size, FACETS, True, limits.smallest_load, np.inf)
+        bounds = crocoddyl.ActivationBounds(cone.lb, cone.ub)
+        for sole in self.support.soles:
+            residual = crocoddyl.ResidualModelContactWrenchCone(self.state, sole, cone, self.actuation.nu)
+            activation = crocoddyl.ActivationModelQuadraticBarrier(bounds)
+            cost = crocoddyl.CostModelResidual(self.state, activation, residual)
+            costs.addCost(f"wrench of sole {sole}", cost, self.ocp.cone_weight)

@@ -1,0 +1,171 @@
+"""Which arms and commands are labelled: a scrambled Sobol sequence, with edges, nominal arms and mirror images."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from iowbc.control.arms import ArmKinematics
+from iowbc.recipe.generator import Interval, ReferenceGenerator
+from iowbc.reference.labels.sample import Sample
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import interaction_mirror
+
+Array = NDArray[Any]
+
+ABOVE_STRAIGHT = 1.1
+"""Heights up to this part of the straight-legged one may be tried; the feasible map finds the true bound."""
+COMMAND_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
+"""Height and pitch stay, roll and yaw change sign."""
+
+
+class SamplePlan:
+    """Sample number i as a function of the recipe and the seed alone.
+
+    After the drawn samples comes the grid of the feasible map, with two arm postures: the default one, which leans with
+    the trunk, and one that keeps the wrists where they are ahead of an upright trunk, as wrist commands do.
+    """
+
+    def __init__(self, robot: Robot, recipe: ReferenceGenerator, seed: int) -> None:
+        self.robot, self.recipe = robot, recipe
+        sampling, region = recipe.sampling, recipe.feasible
+        self.drawn = sampling.samples
+        self.mirrored = int(sampling.mirrored_share * self.drawn)
+        self.original = self.drawn - self.mirrored
+        self.heights = np.linspace(sampling.height.low, sampling.height.high, region.heights)
+        self.pitches = np.linspace(sampling.pitch.low, sampling.pitch.high, region.pitches)
+        arms = robot.interaction
+        self.rest, self.lower, self.upper = robot.default_position[arms], robot.lower[arms], robot.upper[arms]
+        self.uniform_lower, self.uniform_upper = _arm_ranges(robot, recipe)
+        self.kinematics = ArmKinematics(robot, posture_gain=0.0)
+        self.mirror = interaction_mirror(robot)
+        self.grid_arms = np.stack([np.tile(self.rest, (len(self.pitches), 1)), self._carrying()])
+        self.grid_shape = (len(self.grid_arms), len(self.pitches), len(self.heights))
+        default = float(np.clip(robot.default_height, self.heights[0], self.heights[-1]))
+        self.nominal = default, float(np.clip(0.0, self.pitches[0], self.pitches[-1]))
+        self.count = self.drawn + int(np.prod(self.grid_shape))
+        dimensions = 6 + 6 + len(arms) + 2
+        self.unit: Array = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
+            int(np.ceil(np.log2(max(self.original, 2))))
+        )
+
+    def group(self, index: int) -> int:
+        """Samples of one group are mirror images of each other and stay on one side of the held-out split."""
+        return index - self.original if self.original <= index < self.drawn else index
+
+    def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
+        """The samples of these numbers; each depends on its own number only."""
+        found: dict[int, Sample] = {}
+        wanted = np.array([self.group(int(index)) for index in indices], dtype=np.int64)
+        sources = np.unique(wanted[wanted < self.original])
+        if len(sources):
+            found = dict(zip(sources.tolist(), self._originals(self.unit[sources]), strict=True))
+        return [self._one(int(index), int(source), found) for index, source in zip(indices, wanted, strict=True)]
+
+    def _one(self, index: int, source: int, originals: dict[int, Sample]) -> Sample:
+        if index >= self.drawn:
+            arms, row, column = np.unravel_index(index - self.drawn, self.grid_shape)
+            command = np.array([self.heights[column], self.pitches[row], 0.0, 0.0])
+            return Sample(self.grid_arms[arms, row], command, np.zeros(2))
+        sample = originals[source]
+        if index < self.original:
+            return sample
+        return Sample(self.mirror(sample.arm), COMMAND_MIRROR * sample.command, sample.payload[::-1].copy())
+
+    def _carrying(self) -> Array:
+        """Arms that keep the wrists at their default place in the heading frame, one posture a pitch, (pitches, 14)."""
+        wrist, _ = self.kinematics.forward(self.rest[None])
+        upright, origin = self.kinematics.torso_in_heading(np.zeros((1, 3)), np.zeros(1))
+        place = np.einsum("nij,nsj->nsi", upright, wrist) + origin[:, None]
+        everywhere = np.repeat(place, len(self.pitches), axis=0)
+        target = self.kinematics.into_torso(np.zeros((len(self.pitches), 3)), self.pitches, everywhere)
+        arms: Array = self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
+        return arms
+
+    def _originals(self, unit: Array) -> list[Sample]:
+        command = self._commands(unit)
+        arm = self._arms(unit, command)
+        payload = _scale(unit[:, -2:], self.recipe.sampling.payload)
+        return [Sample(a, c, p) for a, c, p in zip(arm, command, payload, strict=True)]
+
+    def _commands(self, unit: Array) -> Array:
+        """Height, pitch, roll, yaw, shape (n, 4); some moved onto an edge of height or pitch."""
+        sampling = self.recipe.sampling
+        ranges = (sampling.height, sampling.pitch, sampling.roll, sampling.yaw)
+        command = np.stack([_scale(unit[:, i], interval) for i, interval in enumerate(ranges)], axis=1)
+        chooser = unit[:, 4]
+        if sampling.boundary_share > 0.0:
+            edge = np.floor(4.0 * chooser / sampling.boundary_share).astype(int)
+            for number, (column, value) in enumerate(
+                ((0, sampling.height.low), (0, sampling.height.high), (1, sampling.pitch.low), (1, sampling.pitch.high))
+            ):
+                command[edge == number, column] = value
+        return command
+
+    def _arms(self, unit: Array, command: Array) -> Array:
+        """Arm postures, shape (n, 14): nominal, by wrist positions in the heading or the torso frame, or uniform."""
+        sampling, region = self.recipe.sampling, self.recipe.sampling.wrists
+        chooser, place, turn = unit[:, 5], unit[:, 6:12], unit[:, 12:-2]
+        arm = self.uniform_lower + turn * (self.uniform_upper - self.uniform_lower)
+        nominal = chooser < sampling.nominal_share
+        kind = (chooser - sampling.nominal_share) / max(1.0 - sampling.nominal_share, 1e-12)
+        heading = ~nominal & (kind < sampling.heading_share)
+        by_wrist = ~nominal & (kind < sampling.heading_share + sampling.torso_share)
+        arm[nominal] = self.rest
+        corner = np.stack(
+            [_scale(place[:, i], interval) for i, interval in enumerate((region.x, region.y, region.z))], axis=1
+        )
+        shift = region.asymmetry * (2.0 * place[:, 3:] - 1.0)
+        target = np.stack([corner + shift, corner - shift], axis=1) * np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]])
+        waist = np.zeros((len(unit), 3))
+        leaning = self.kinematics.into_torso(waist, command[:, 1], target)
+        target = np.where(heading[:, None, None], leaning, target)
+        start = np.clip(self.rest + region.redundancy * (2.0 * turn - 1.0), self.lower, self.upper)
+        if by_wrist.any():
+            arm[by_wrist] = self.kinematics.solve(start[by_wrist], target[by_wrist])
+        return np.asarray(arm)
+
+
+def check_ranges(robot: Robot, recipe: ReferenceGenerator) -> None:
+    """Raises ValueError where a sampling range makes no sense for this robot."""
+    _arm_ranges(robot, recipe)
+    straight = dict(zip(robot.joints, np.clip(0.0, robot.lower, robot.upper).tolist(), strict=True))
+    tallest = -ABOVE_STRAIGHT * float(robot.tree.forward(straight, robot.base, robot.soles[0])[0][2])
+    height = recipe.sampling.height
+    if height.low <= 0.0 or height.high > tallest:
+        raise ValueError(
+            f"rg.sampling.height: {height.low} to {height.high} m; {robot.name} stands between 0 and {tallest:.2f} m"
+        )
+    for name in ("pitch", "roll", "yaw"):
+        interval = getattr(recipe.sampling, name)
+        if interval is not None and (interval.low < -np.pi / 2 or interval.high > np.pi / 2):
+            raise ValueError(
+                f"rg.sampling.{name}: {interval.low} to {interval.high} rad; valid is within ±{np.pi / 2:.4f} rad"
+            )
+    if recipe.sampling.payload is not None and recipe.sampling.payload.low < 0.0:
+        raise ValueError(f"rg.sampling.payload: a mass of {recipe.sampling.payload.low} kg; valid is 0 or more")
+
+
+def _arm_ranges(robot: Robot, recipe: ReferenceGenerator) -> tuple[Array, Array]:
+    names = [robot.joints[index] for index in robot.interaction]
+    lower, upper = robot.lower[robot.interaction].copy(), robot.upper[robot.interaction].copy()
+    for name, interval in recipe.sampling.joint_ranges.items():
+        if name not in names:
+            raise ValueError(f"rg.sampling.joint_ranges: no arm joint {name!r}; {robot.name} has {', '.join(names)}")
+        place = names.index(name)
+        if interval.low < lower[place] or interval.high > upper[place]:
+            raise ValueError(
+                f"rg.sampling.joint_ranges.{name}: {interval.low} to {interval.high} rad passes the joint's range "
+                f"{lower[place]} to {upper[place]} rad"
+            )
+        lower[place], upper[place] = interval.low, interval.high
+    return lower, upper
+
+
+def _scale(unit: Array, interval: Interval | None) -> Array:
+    """Numbers in [0, 1) spread over an interval; zeros without one."""
+    if interval is None:
+        return np.zeros_like(unit)
+    spread: Array = interval.low + unit * (interval.high - interval.low)
+    return spread

@@ -1,0 +1,218 @@
+"""Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample."""
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from iowbc.errors import Interrupted, Rejected
+from iowbc.reference.labels.labelling import Solver
+from iowbc.reference.labels.shards import Shard, merge, read_shard, write_shard
+
+CRASHED = "solver crashed"
+POLL = 0.2
+"""Seconds between looks at the interruption flag."""
+STARTS_WITHOUT_WORK = 3
+"""Workers that may die before their first sample until the pool gives up."""
+PARENT_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of prctl(2)."""
+IDLE = -1
+
+
+class Task(Protocol):
+    """A picklable recipe for a solver."""
+
+    def prepare(self) -> Solver:
+        """Makes the solver; called once in each worker."""
+
+
+@dataclass
+class _Worker:
+    process: SpawnProcess
+    connection: Connection
+    current: Any
+    """Shared number of the sample in work."""
+    chunk: int | None = None
+
+
+@dataclass
+class _Book:
+    """Which chunks remain, and which samples brought a worker down."""
+
+    waiting: list[int]
+    crashed: dict[int, list[int]] = field(default_factory=dict)
+    barren: int = 0
+
+
+def label_all(
+    task: Task,
+    indices: Sequence[int],
+    *,
+    folder: Path,
+    key: str,
+    chunk_size: int,
+    workers: int,
+    interrupted: Callable[[], bool],
+    progress: Callable[[int, int], None],
+) -> Shard:
+    """Labels the samples with these numbers. The result does not depend on the number of workers.
+
+    Shards in `folder` that belong to `key` are reused, others made anew. Raises `Interrupted` when `interrupted()`
+    turns true, RuntimeError when a worker fails in Python or cannot start.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
+    paths = [folder / f"{number:05d}.npz" for number in range(len(chunks))]
+    done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
+    book = _Book([number for number in range(len(chunks)) if number not in done])
+    ready = sum(len(chunks[number]) for number in done)
+    progress(ready, len(indices))
+    team = [_hire(task, key) for _ in range(min(max(workers, 1), len(book.waiting)))]
+    try:
+        while len(done) < len(chunks):
+            if interrupted():
+                raise Interrupted
+            for worker in team:
+                _assign(worker, book, chunks, paths)
+            for worker in _with_news(team):
+                number = _receive(worker)
+                if number is None:
+                    _bury(worker, book)
+                    team[team.index(worker)] = _hire(task, key)
+                    continue
+                shard = read_shard(paths[number], key, chunks[number])
+                if shard is None:
+                    raise RuntimeError(
+                        f"{paths[number]}: the shard just written cannot be read back; is the disk full?"
+                    )
+                done[number], worker.chunk = shard, None
+                ready += len(chunks[number])
+                progress(ready, len(indices))
+    finally:
+        for worker in team:
+            worker.process.kill()
+            worker.process.join()
+            worker.connection.close()
+    return merge([done[number] for number in range(len(chunks))])
+
+
+def _hire(task: Task, key: str) -> _Worker:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    current = context.Value("q", IDLE, lock=False)
+    process = context.Process(target=_work, args=(task, key, theirs, current, os.getpid()), daemon=True)
+    with _single_threaded():
+        process.start()
+    theirs.close()
+    return _Worker(process, ours, current)
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Linear algebra in workers uses one thread each: the processes are the parallelism."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _assign(worker: _Worker, book: _Book, chunks: Sequence[Sequence[int]], paths: Sequence[Path]) -> None:
+    if worker.chunk is not None or not book.waiting:
+        return
+    worker.chunk = book.waiting.pop(0)
+    job = (worker.chunk, chunks[worker.chunk], book.crashed.get(worker.chunk, []), paths[worker.chunk])
+    with suppress(BrokenPipeError, ConnectionResetError):  # of a dead worker _receive hears
+        worker.connection.send(job)
+
+
+def _with_news(team: Sequence[_Worker]) -> list[_Worker]:
+    ready = wait([worker.connection for worker in team], timeout=POLL)
+    return [worker for worker in team if worker.connection in ready]
+
+
+def _receive(worker: _Worker) -> int | None:
+    """The chunk that is done; None when the worker died."""
+    try:
+        number, failure = worker.connection.recv()
+    except (EOFError, ConnectionResetError):
+        return None
+    if failure:
+        raise RuntimeError(f"a labelling worker failed:\n{failure}")
+    return int(number)
+
+
+def _bury(worker: _Worker, book: _Book) -> None:
+    """Notes the sample on which a worker died, and puts its chunk back in the queue."""
+    worker.process.join()
+    worker.connection.close()
+    sample = int(worker.current.value)
+    if worker.chunk is None or sample == IDLE:
+        book.barren += 1
+        if book.barren >= STARTS_WITHOUT_WORK:
+            raise RuntimeError(
+                f"labelling workers end before their first sample (exit code {worker.process.exitcode}); "
+                "try `iowbc doctor`, which checks that crocoddyl and pinocchio fit together"
+            )
+    else:
+        book.crashed.setdefault(worker.chunk, []).append(sample)
+    if worker.chunk is not None:
+        book.waiting.insert(0, worker.chunk)
+
+
+def _work(task: Task, key: str, connection: Connection, current: Any, parent: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        return
+    number = None
+    try:
+        solver = task.prepare()
+        while True:
+            number, indices, crashed, path = connection.recv()
+            write_shard(path, key, _label_chunk(solver, indices, crashed, current))
+            connection.send((number, ""))
+    except (EOFError, BrokenPipeError):
+        return
+    except Exception:
+        connection.send((number, traceback.format_exc()))
+
+
+def _label_chunk(solver: Solver, indices: Sequence[int], crashed: Sequence[int], current: Any) -> Shard:
+    kept: list[int] = []
+    labels: list[dict[str, Any]] = []
+    rejected: list[int] = []
+    reasons: list[str] = []
+    for index, sample in zip(indices, solver.draw(np.array(indices)), strict=True):
+        if index in crashed:
+            rejected.append(index)
+            reasons.append(CRASHED)
+            continue
+        current.value = index
+        try:
+            labels.append(solver.solve(index, sample))
+            kept.append(index)
+        except Rejected as reason:
+            rejected.append(index)
+            reasons.append(str(reason))
+    current.value = IDLE
+    names = labels[0].keys() if labels else ()
+    stacked = {name: np.stack([label[name] for label in labels]) for name in names}
+    return Shard(np.array(kept, dtype=np.int64), stacked, np.array(rejected, dtype=np.int64), reasons)

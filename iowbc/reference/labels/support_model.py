@@ -1,0 +1,89 @@
+"""The robot with its arms locked: base and support branch that carry the inertia of arms and payloads."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+
+from iowbc.recipe.generator import Problem
+from iowbc.reference.labels.sample import Sample, mean_stance
+from iowbc.robot.description import Robot
+from iowbc.robot.pinocchio_model import build_model
+
+Array = NDArray[Any]
+
+
+class SupportModel:
+    """Base and support joints in the robot's order; `lock` sets what arms and payloads add."""
+
+    def __init__(self, robot: Robot, problem: Problem) -> None:
+        self.robot, self.problem = robot, problem
+        self.full = build_model(robot)
+        self.full_data = self.full.createData()
+        self._arms = [self.full.getJointId(robot.joints[index]) for index in robot.interaction]
+        self._neutral = pinocchio.neutral(self.full)
+        self.model = pinocchio.buildReducedModel(self.full, self._arms, self._neutral)
+        expected = [robot.joints[index] for index in robot.support]
+        if list(self.model.names)[2:] != expected:
+            raise ValueError(
+                f"{robot.folder}: the support joints must stand in the MJCF's order: {self.model.names[2:]}"
+            )
+        self.data = self.model.createData()
+        self.soles = [self.model.getFrameId(site) for site in robot.soles]
+        self.torso = self.model.getFrameId(robot.torso)
+        self.base = self.model.getFrameId(robot.base)
+        self._full_torso = self.full.getJointId(self.model.names[self.torso_joint])
+        self._wrists = [self.full.frames[self.full.getFrameId(site)] for site in robot.wrists]
+        self._hands = [self.full.inertias[wrist.parentJoint].copy() for wrist in self._wrists]
+        places = mean_stance(problem.stance_width)
+        self.stance = [pinocchio.SE3(np.eye(3), place) for place in places]
+        margin = problem.limit_margin
+        self.lower, self.upper = robot.lower[robot.support] + margin, robot.upper[robot.support] - margin
+        self.effort = problem.effort_fraction * robot.effort[robot.support]
+
+    @property
+    def torso_joint(self) -> int:
+        """Index of the joint that moves the torso."""
+        return int(self.model.frames[self.torso].parentJoint)
+
+    def lock(self, sample: Sample) -> None:
+        """Hangs the masses on the wrists, and gives the torso the inertia of the arms in their posture."""
+        for wrist, empty, mass in zip(self._wrists, self._hands, sample.payload, strict=True):
+            load = pinocchio.Inertia(float(mass), wrist.placement.translation, np.zeros((3, 3)))
+            self.full.inertias[wrist.parentJoint] = empty + load if mass > 0.0 else empty
+        q = self._neutral.copy()
+        q[7 + self.robot.interaction] = sample.arm
+        pinocchio.forwardKinematics(self.full, self.full_data, q)
+        torso = self.full_data.oMi[self._full_torso]
+        inertia = self.full.inertias[self._full_torso].copy()
+        for joint in self._arms:
+            inertia += torso.actInv(self.full_data.oMi[joint]).act(self.full.inertias[joint])
+        self.model.inertias[self.torso_joint] = inertia
+
+    def whole(self, configuration: Array, arm: Array) -> Array:
+        """Configuration of the full model (36,) from the reduced one (22,) and the arms (14,)."""
+        q = np.empty(self.full.nq)
+        q[:7] = configuration[:7]
+        q[7 + self.robot.support] = configuration[7:]
+        q[7 + self.robot.interaction] = arm
+        return q
+
+    def start(self) -> Array:
+        """The default posture with the soles in their places, shape (22,)."""
+        q: Array = pinocchio.neutral(self.model)
+        q[7:] = self.robot.default_position[self.robot.support]
+        pinocchio.framesForwardKinematics(self.model, self.data, q)
+        soles = [self.data.oMf[sole].translation for sole in self.soles]
+        q[:3] = -0.5 * (soles[0] + soles[1])
+        return q
+
+    def external(self, wrench: Array) -> Any:
+        """Ground wrenches (2, 6) as pinocchio's list of forces in the joints' frames."""
+        forces = pinocchio.StdVec_Force()
+        for _ in range(self.model.njoints):
+            forces.append(pinocchio.Force.Zero())
+        for sole, values in zip(self.soles, wrench, strict=True):
+            frame = self.model.frames[sole]
+            forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))
+        return forces

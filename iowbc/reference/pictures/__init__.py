@@ -1,0 +1,1 @@
+"""Figures of labels, fit and postures."""

@@ -1,0 +1,129 @@
+"""A picture of rendered postures over height and torso pitch: what the robot can hold."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from iowbc.errors import Rejected
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.labelling import make_method
+from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.robot.description import Robot
+
+Array = NDArray[Any]
+
+HEIGHTS, PITCHES = 4, 7
+"""Postures down and across."""
+SIZE = 260
+"""Edge of a rendered posture [pixel]."""
+AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.9, (0.1, 0.0, 0.58)
+"""Camera [degree, degree, m, m]."""
+SHAPES = 1000
+"""Room for shapes in a scene."""
+EMPTY = 235
+"""Grey of a command without a label."""
+
+
+def draw_strip(
+    path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan, context: Callable[[int, int], Any]
+) -> None:
+    """Labels a small grid by the static method and draws it in the OpenGL context that `context(width, height)` makes.
+
+    The arms are in the default posture, or keep the wrists ahead of the pelvis where that one has no label.
+    """
+    support = SupportModel(robot, recipe.problem)
+    method, judge = make_method("static", support, recipe), Judge(support, recipe.gates, recipe.height)
+    heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
+    columns = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
+    studio = _Studio(robot, context)
+    try:
+        figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(HEIGHTS, PITCHES)
+        for row, height in enumerate(heights):
+            for column, place in enumerate(columns):
+                axis, pitch = axes[row, column], plan.pitches[place]
+                axis.axis("off")
+                axis.set_title(f"{height:.2f} m, {pitch:+.2f} rad", fontsize=8)
+                command = np.array([height, pitch, 0.0, 0.0])
+                reason = ""
+                for arms in plan.grid_arms[:, place]:
+                    sample = Sample(arms, command, np.zeros(2))
+                    try:
+                        posture = method.solve(sample)
+                        judge.label(sample, posture)
+                    except Rejected as rejected:
+                        reason = str(rejected)
+                        continue
+                    axis.imshow(studio.picture(sample, posture))
+                    break
+                else:
+                    axis.imshow(np.full((SIZE, SIZE, 3), EMPTY, dtype=np.uint8))
+                    axis.text(0.5, 0.5, reason, ha="center", va="center", transform=axis.transAxes, fontsize=8)
+        figure.savefig(path, dpi=110)
+    finally:
+        studio.close()
+
+
+class _Studio:
+    """The robot on a plain floor, drawn off screen."""
+
+    def __init__(self, robot: Robot, context: Callable[[int, int], Any]) -> None:
+        self.robot = robot
+        self._gl = context(SIZE, SIZE)
+        self.model = _scene(robot)
+        self.data = mujoco.MjData(self.model)
+        self._pictures = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._pictures)
+        self._scene = mujoco.MjvScene(self.model, SHAPES)
+        self._camera = mujoco.MjvCamera()
+        self._camera.azimuth, self._camera.elevation, self._camera.distance = AZIMUTH, ELEVATION, DISTANCE
+        self._camera.lookat[:] = LOOK_AT
+
+    def picture(self, sample: Sample, posture: Posture) -> Array:
+        """The posture as an image, shape (SIZE, SIZE, 3)."""
+        robot, data = self.robot, self.data
+        data.qpos[:3] = posture.configuration[:3]
+        data.qpos[3:7] = np.roll(posture.configuration[3:7], 1)
+        data.qpos[7 + robot.support] = posture.support
+        data.qpos[7 + robot.interaction] = sample.arm
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_camlight(self.model, data)
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(
+            self.model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), self._camera, everything, self._scene
+        )
+        frame = mujoco.MjrRect(0, 0, SIZE, SIZE)
+        image = np.empty((SIZE, SIZE, 3), dtype=np.uint8)
+        mujoco.mjr_render(frame, self._scene, self._pictures)
+        mujoco.mjr_readPixels(image, None, frame, self._pictures)
+        return image[::-1]
+
+    def close(self) -> None:
+        """Frees the pictures and the context."""
+        self._pictures.free()
+        self._gl.free()
+
+
+def _scene(robot: Robot) -> Any:
+    spec = mujoco.MjSpec.from_file(str(robot.mjcf))
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = SIZE, SIZE
+    spec.visual.headlight.ambient, spec.visual.headlight.diffuse = (0.45, 0.45, 0.45), (0.5, 0.5, 0.5)
+    floor = spec.worldbody.add_geom()
+    floor.type, floor.size, floor.rgba = mujoco.mjtGeom.mjGEOM_PLANE, (3.0, 3.0, 0.1), (0.93, 0.94, 0.96, 1.0)
+    sky = spec.add_texture()
+    sky.type, sky.builtin = mujoco.mjtTexture.mjTEXTURE_SKYBOX, mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+    sky.rgb1, sky.rgb2, sky.width, sky.height = (1.0, 1.0, 1.0), (0.86, 0.89, 0.93), 64, 384
+    light = spec.worldbody.add_light()
+    light.pos, light.dir, light.castshadow = (1.0, -1.0, 3.0), (-0.3, 0.3, -1.0), True
+    light.diffuse, light.specular = (0.35, 0.35, 0.35), (0.1, 0.1, 0.1)
+    return spec.compile()

@@ -1,0 +1,89 @@
+"""Which (height, pitch) can be held: by labels on a grid and around it, and where the fitted network moves gently."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.control.feasible_map import FeasibleMap, build_map
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.reference.fit.network_inputs import base_columns
+from iowbc.reference.labels.dataset import Dataset
+from iowbc.reference.labels.plan import SamplePlan
+
+Array = NDArray[Any]
+
+ARMS_COLLIDE = "arms collide"
+"""A reason that says nothing of height and pitch."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """The map of what has labels, and what it was made from, on the grid (pitches, heights)."""
+
+    map: FeasibleMap
+    held: NDArray[np.bool_]
+    """Whether one of the grid's two arm postures has a label."""
+    share: Array
+    """Share of the samples around a command that have a label; -1 where there were too few."""
+
+
+@dataclass(frozen=True)
+class GentleRegion:
+    """The map of what has labels and a gentle reference, and what it was made from, on the grid (pitches, heights)."""
+
+    map: FeasibleMap
+    jump: Array
+    """Largest move of a joint for one step, not passed by the recipe's share of the arms [rad]."""
+
+
+def measure_region(plan: SamplePlan, dataset: Dataset) -> Region:
+    """The map of commands that have labels. Raises ValueError when it is empty."""
+    recipe = plan.recipe.feasible
+    on_grid = dataset.index >= plan.drawn
+    found = np.zeros(plan.grid_shape, dtype=bool)
+    found.ravel()[dataset.index[on_grid] - plan.drawn] = True
+    held: NDArray[np.bool_] = np.any(found, axis=0, keepdims=False)
+    told = dataset.rejected_reason != ARMS_COLLIDE
+    kept = _around(plan, dataset.command[~on_grid])
+    tried = kept + _around(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])
+    enough = tried >= recipe.enough
+    share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
+    feasible = held & (~enough | (share >= recipe.kept_share))
+    return Region(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), held, share)
+
+
+def measure_gentle_region(
+    plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array, payload: Array
+) -> GentleRegion:
+    """The part of a map where the network moves gently with height and pitch, for arms (n, 14) with payloads (n, 2).
+
+    Raises ValueError when it is empty.
+    """
+    recipe, smooth = plan.recipe.feasible, plan.recipe.fit.smoothness
+    chosen = np.linspace(0, len(arms) - 1, min(recipe.arms, len(arms))).astype(int)
+    arms, payload = arms[chosen], payload[chosen]
+    jump = np.empty((len(plan.pitches), len(plan.heights)))
+
+    def reference(height: float, pitch: float) -> Array:
+        command = np.tile([height, pitch, 0.0, 0.0], (len(arms), 1))
+        return network(arms, base_columns(plan.recipe, command, payload))
+
+    for row, pitch in enumerate(plan.pitches):
+        for column, height in enumerate(plan.heights):
+            here = reference(height, pitch)
+            lower = np.abs(reference(height - smooth.height_step, pitch) - here).max(axis=1)
+            leaner = np.abs(reference(height, pitch - smooth.pitch_step) - here).max(axis=1)
+            jump[row, column] = np.quantile(np.maximum(lower, leaner), recipe.gentle_share)
+    height, pitch = np.meshgrid(plan.heights, plan.pitches)
+    feasible = held.contains(height, pitch) & (jump <= recipe.jump)
+    return GentleRegion(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), jump)
+
+
+def _around(plan: SamplePlan, command: Array) -> Array:
+    """Number of commands (n, 4) within the window of each grid point, shape (pitches, heights)."""
+    height, pitch = plan.recipe.feasible.window
+    near_pitch = np.abs(command[:, 1] - plan.pitches[:, None]) <= pitch
+    near_height = np.abs(command[:, 0] - plan.heights[:, None]) <= height
+    return near_pitch.astype(np.float64) @ near_height.T.astype(np.float64)

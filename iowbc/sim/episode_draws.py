@@ -1,0 +1,139 @@
+"""Draws what is random in an episode."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc import counter_random as random
+from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.robot.description import Robot
+
+Array = NDArray[Any]
+Indices = NDArray[np.int64]
+Keys = NDArray[np.uint64]
+
+GRAVITY = 9.81
+
+SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale")
+"""Factors on impulses, pushes and sensor noise, and on how far the object's mass may rise above the lower end of its
+range. One unless held at another value; zero switches off."""
+PUSH_SHARE = "partner_share/push"
+"""Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
+
+
+class Table:
+    """Distributions side by side, a column each number; drawn in one sweep, for many small draws cost more."""
+
+    def __init__(self, entries: Mapping[str, tuple[Distribution, int]]) -> None:
+        """`entries`: distribution and width of each quantity by name."""
+        self._entries = dict(entries)
+        widths = [width for _, width in entries.values()]
+        ends = np.cumsum(widths).tolist()
+        self.width = ends[-1]
+        self.columns = {name: slice(end - width, end) for name, end, width in zip(entries, ends, widths, strict=True)}
+        kinds = [distribution for distribution, _ in entries.values()]
+        off = np.array([not kind.enabled for kind in kinds])
+        nominal = np.array([kind.nominal for kind in kinds])
+        low = np.where(off, nominal, [kind.low for kind in kinds])
+        high = np.where(off, nominal, [kind.high for kind in kinds])
+        self._owner = np.repeat(np.arange(len(kinds)), widths)
+        self.nominal, self._low = nominal[self._owner], low[self._owner]
+        self._span = (high - low)[self._owner]
+        logarithmic = np.array([kind.shape == "log-uniform" and kind.enabled for kind in kinds])
+        self._logarithmic = np.flatnonzero(logarithmic[self._owner])
+        self._ratio = 1.0 + self._span[self._logarithmic] / self._low[self._logarithmic]
+        self._normal = [name for name, (kind, _) in entries.items() if kind.shape == "normal" and kind.enabled]
+        self._probability = np.array([kind.probability for kind in kinds])
+
+    def draw(self, key: Keys) -> Array:
+        """A row for each key, (k, width)."""
+        chances = random.uniform(key, "episode", self.width + len(self._probability))
+        row = self._low + self._span * chances[:, : self.width]
+        logarithmic = self._logarithmic
+        row[:, logarithmic] = self._low[logarithmic] * self._ratio ** chances[:, logarithmic]
+        for name in self._normal:
+            distribution, width = self._entries[name]
+            row[:, self.columns[name]] = random.draw(key, name, distribution, width)
+        undrawn = chances[:, self.width :] >= self._probability
+        drawn: Array = np.where(undrawn[:, self._owner], self.nominal, row)
+        return drawn
+
+
+class Draws:
+    """The quantities drawn for n environments, by name; arrays (n,) or (n, k)."""
+
+    def __init__(self, recipe: Recipe, scenes: list[Scene], robot: Robot, links: int) -> None:
+        self.recipe = recipe
+        n = len(scenes)
+        self._table = Table(_entries(recipe, len(robot.joints), links))
+        self._pushing = np.array([scene.kind == "push" for scene in scenes])
+        self._with_object = np.array([scene.object is not None for scene in scenes])
+        self._nominal_mass = np.array([scene.object.mass if scene.object else 0.0 for scene in scenes])
+        self._smallest_mass = np.array([scene.object.smallest_mass if scene.object else 0.0 for scene in scenes])
+        self._strength = np.array([scene.grasp.strength for scene in scenes])
+        self._rows = np.tile(self._table.nominal, (n, 1))
+        self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES}
+        for name, place in self._table.columns.items():
+            if name != PUSH_SHARE:
+                single = place.stop - place.start == 1
+                self.values[name] = self._rows[:, place.start] if single else self._rows[:, place]
+        self.values["object_mass"] = self._nominal_mass.copy()
+        self.values["slip_force"] = self._strength.copy()
+        self._lightest = recipe.randomization.object_mass_scale.low
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All quantities."""
+        return tuple(self.values)
+
+    def draw(self, which: Indices, key: Keys, fixed: Mapping[str, Array]) -> None:
+        """Draws anew for some environments, from the keys of their episodes; `fixed` (n,) holds values, NaN draws."""
+        values = self.values
+        for name in SWITCHES:
+            values[name][which] = 1.0
+        if not self.recipe.sensing.enabled:
+            values["noise_scale"][which] = 0.0
+        row = self._table.draw(key)
+        share, push_share = self._table.columns["partner_share"], self._table.columns[PUSH_SHARE]
+        pushing = self._pushing[which]
+        row[pushing, share] = row[pushing, push_share]
+        self._rows[which] = row
+        for name, held in fixed.items():
+            if name != "object_mass":
+                self._hold(name, which, held)
+        above = values["object_mass_scale"][which] - self._lightest
+        mass = self._nominal_mass[which] * (self._lightest + above * values["load_scale"][which])
+        values["object_mass"][which] = mass
+        if "object_mass" in fixed:
+            self._hold("object_mass", which, fixed["object_mass"])
+        mass = np.maximum(values["object_mass"][which], self._smallest_mass[which])
+        values["object_mass"][which] = mass * self._with_object[which]
+        values["slip_force"][which] = values["surface_friction"][which] * self._strength[which]
+
+    def _hold(self, name: str, which: Indices, values: Array) -> None:
+        held = which[~np.isnan(values[which])]
+        target = self.values[name]
+        target[held] = values[held] if target.ndim == 1 else values[held, None]
+
+
+def _entries(recipe: Recipe, joints: int, links: int) -> dict[str, tuple[Distribution, int]]:
+    """Distribution and width of each quantity that is drawn."""
+    randomization, partner = recipe.randomization, recipe.partner
+    widths = {"object_com_offset": 3, "link_mass_scale": links, "link_inertia_scale": links}
+    widths |= dict.fromkeys(("joint_friction", "motor_damping", "kp_scale", "kd_scale", "encoder_bias"), joints)
+    entries = {name: (value, widths.get(name, 1)) for name, value in randomization if isinstance(value, Distribution)}
+    if not randomization.enabled:
+        entries = {name: (_off(value), width) for name, (value, width) in entries.items()}
+    shares = {"partner_share": partner.share, PUSH_SHARE: partner.push_share}
+    entries |= {name: (value if partner.enabled else _off(value), 1) for name, value in shares.items()}
+    for name in ("stiffness", "damping", "delay", "pace", "noise"):
+        entries[f"partner_{name}"] = (getattr(partner, name), 1)
+    return entries
+
+
+def _off(distribution: Distribution) -> Distribution:
+    return distribution.model_copy(update={"enabled": False})

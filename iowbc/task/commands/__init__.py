@@ -1,0 +1,1 @@
+"""Where commands come from: drawn in training, scripted in trials."""

@@ -1,0 +1,83 @@
+"""Where commands come from: drawn goals in training, scripts in trials; rate-limited, clamped to what is feasible."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc import counter_random as random
+from iowbc.control.command import COMMAND, VELOCITY, approach, rate_limits
+from iowbc.control.references import ReferenceLayer
+from iowbc.recipe.task.task import Task
+from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpolate, nominal_command
+from iowbc.task.commands.script import CommandScript
+from iowbc.task.curriculum import difficulty
+from iowbc.task.memory import Memory
+
+Array = NDArray[np.floating[Any]]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+
+class Commander:
+    """Sets goal and command of n environments, in their memory."""
+
+    def __init__(
+        self,
+        task: Task,
+        references: ReferenceLayer,
+        scripts: Sequence[CommandScript | None],
+        holding: Mask,
+        period: float,
+    ) -> None:
+        """`holding`: environments that begin with an object in the hands, (n,)."""
+        commands = task.commands
+        self._nominal, self._start = nominal_command(commands), np.where(holding, commands.holding_start, 1.0)[:, None]
+        self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
+        self._largest_step = rate_limits(commands.rates) * period
+        self.scripted = np.array([script is not None for script in scripts])
+        self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
+        self._times, self._values = _knots(scripts)
+
+    def start(self, which: Indices, memory: Memory, key: random.Keys) -> None:
+        """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
+        or with an object in the hands on the way to it."""
+        memory.draws[which] = 0
+        self._draw(which, memory, key)
+        command = self._references.startable(self._nominal + self._start[which] * (memory.goal[which] - self._nominal))
+        command[:, VELOCITY] = 0.0
+        scripted = self.scripted[which]
+        if scripted.any():
+            memory.goal[which[scripted]] = self._scripted(memory)[which[scripted]]
+            command[scripted] = memory.goal[which[scripted]]
+        memory.command[which] = self._references.clamp(command)
+
+    def advance(self, memory: Memory, key: random.Keys) -> None:
+        """Goals and commands of the next control step; `key` of the episodes, (n,)."""
+        due = np.flatnonzero((memory.steps >= memory.goal_until) & self._drawn)
+        if len(due):
+            self._draw(due, memory, key[due])
+        if self._any_script:
+            memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
+        memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
+
+    def _draw(self, which: Indices, memory: Memory, key: random.Keys) -> None:
+        drawn = random.absorb(key, memory.draws[which])
+        hardness = difficulty(self._curriculum, memory.level[which])
+        memory.goal[which] = draw_goals(self._commands, drawn, hardness)
+        held = draw_holding_time(self._commands, drawn)
+        memory.goal_until[which] = memory.steps[which] + np.ceil(held / self._period).astype(np.int64)
+        memory.draws[which] += 1
+
+    def _scripted(self, memory: Memory) -> Array:
+        return interpolate(self._times, self._values, memory.steps * self._period)
+
+
+def _knots(scripts: Sequence[CommandScript | None]) -> tuple[Array, Array]:
+    """Knots of all scripts, padded with their last one: times (n, k) [s] and commands (n, k, 11)."""
+    knots = [script.knots() if script is not None else (np.zeros(2), np.zeros((2, len(COMMAND)))) for script in scripts]
+    longest = max(len(times) for times, _ in knots)
+    times = np.stack([np.pad(t, (0, longest - len(t)), mode="edge") for t, _ in knots])
+    values = np.stack([np.pad(v, ((0, longest - len(v)), (0, 0)), mode="edge") for _, v in knots])
+    return times, values

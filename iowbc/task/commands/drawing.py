@@ -1,0 +1,75 @@
+"""Drawing commands in training: 11-D goals, and how long each is held."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc import counter_random as random
+from iowbc.control.command import COMMAND, HEIGHT, PITCH
+from iowbc.recipe.task.commands import Commands
+from iowbc.task.curriculum import Difficulty
+
+Array = NDArray[np.floating[Any]]
+
+
+def nominal_command(commands: Commands) -> Array:
+    """Standing still in the nominal posture, (11,)."""
+    command = np.zeros(len(COMMAND))
+    command[HEIGHT], command[PITCH] = commands.nominal_height, commands.nominal_pitch
+    return command
+
+
+def draw_goals(commands: Commands, key: random.Keys, difficulty: Difficulty) -> Array:
+    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty."""
+    goals = np.empty((len(key), len(COMMAND)))
+    goals[:, :3] = _velocities(commands, key, difficulty)
+    goals[:, 3:] = _posture(commands, key, difficulty.posture)
+    return goals
+
+
+def draw_holding_time(commands: Commands, key: random.Keys) -> Array:
+    """Time until the next goal, t ~ U(resampling), (n,) [s]."""
+    low, high = commands.resampling
+    held: Array = low + (high - low) * random.uniform(key, "command/time", 1)[:, 0]
+    return held
+
+
+def _velocities(commands: Commands, key: random.Keys, difficulty: Difficulty) -> Array:
+    """v_x, v_y, ω ~ U(range)·scale; a share stands, a share walks straight, short velocities are lengthened."""
+    u = random.uniform(key, "command/velocity", 5)
+    low, high = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate]).T
+    velocity = (low + (high - low) * u[:, :3]) * difficulty.velocity[:, None]
+    velocity[:, 1:] *= (u[:, 3] >= commands.straight_share)[:, None]
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    short = (speed > 0.0) & (speed < commands.smallest_speed)
+    velocity[:, :2] *= np.where(short, commands.smallest_speed / np.where(short, speed, 1.0), 1.0)[:, None]
+    walking_share = (1.0 - commands.standing_share) * np.minimum(difficulty.velocity, 1.0)
+    moving: Array = velocity * (u[:, 4] < walking_share)[:, None]
+    return moving
+
+
+def _posture(commands: Commands, key: random.Keys, scale: Array) -> Array:
+    """H, α ~ U(range) and Δp = shared + single offsets, drawn in towards the nominal posture by `scale`; (n, 8)."""
+    u = random.uniform(key, "command/posture", 2 + 3 + 6 + 1)
+    low, high = np.array([commands.height, commands.pitch]).T
+    nominal = np.array([commands.nominal_height, commands.nominal_pitch])
+    away = np.empty((len(key), 8))
+    away[:, :2] = low + (high - low) * u[:, :2] - nominal
+    shared = np.array(commands.common_offset) * (2.0 * u[:, 2:5] - 1.0)
+    single = np.tile(commands.single_offset, 2) * (2.0 * u[:, 5:11] - 1.0)
+    away[:, 2:] = np.tile(shared, 2) + single
+    away *= (scale * (u[:, 11] >= commands.nominal_share))[:, None]
+    away[:, :2] += nominal
+    return away
+
+
+def interpolate(times: Array, values: Array, now: Array) -> Array:
+    """Scripted commands at a time: knots (n, k) [s] and (n, k, 11), now (n,) [s]; held after the last knot. (n, 11)."""
+    rows = np.arange(len(now))
+    after = np.clip((times <= now[:, None]).sum(axis=1), 1, times.shape[1] - 1)
+    start, end = times[rows, after - 1], times[rows, after]
+    span = np.where(end > start, end - start, 1.0)
+    part = np.clip((now - start) / span, 0.0, 1.0)[:, None]
+    between: Array = values[rows, after - 1] * (1.0 - part) + values[rows, after] * part
+    return between

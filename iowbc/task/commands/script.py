@@ -1,0 +1,78 @@
+"""Scripted command sequences: the same walk for every policy that is compared."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.control.command import COMMAND
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CommandSegment:
+    """A stretch of a sequence: the command moves to `command` over `ramp` and then holds."""
+
+    duration: float
+    """How long the segment lasts, its ramp included [s]."""
+    command: tuple[float, ...]
+    """The 11 values that hold at the segment's end."""
+    ramp: float = 0.0
+    """Time of the linear passage from the previous segment's values [s]."""
+
+    def __post_init__(self) -> None:
+        if len(self.command) != len(COMMAND):
+            raise ValueError(f"a command has {len(COMMAND)} values ({', '.join(COMMAND)}), got {len(self.command)}")
+        if not np.all(np.isfinite(self.command)):
+            raise ValueError(f"a command must be finite, got {self.command}")
+        if not 0.0 <= self.ramp <= self.duration:
+            raise ValueError(f"ramp must lie between 0 and the duration of {self.duration} s, got {self.ramp} s")
+
+
+@dataclass(frozen=True)
+class CommandScript:
+    """Segments in order; after the last one its command holds. The first segment starts at its own command."""
+
+    segments: tuple[CommandSegment, ...]
+
+    def __post_init__(self) -> None:
+        if not self.segments:
+            raise ValueError("a command script needs at least one segment")
+
+    @property
+    def duration(self) -> float:
+        """Total time of the segments [s]."""
+        return sum(segment.duration for segment in self.segments)
+
+    def at(self, time: float) -> Array:
+        """The command at a time from the start [s], shape (11,)."""
+        times, values = self.knots()
+        return np.array([np.interp(time, times, column) for column in values.T])
+
+    def knots(self) -> tuple[Array, Array]:
+        """The piecewise linear command as times (k,) [s] and values (k, 11)."""
+        times, values = [0.0], [np.array(self.segments[0].command)]
+        start = 0.0
+        for segment in self.segments:
+            target = np.array(segment.command)
+            times += [start + segment.ramp, start + segment.duration]
+            values += [target, target]
+            start += segment.duration
+        return np.array(times), np.array(values)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """Plain lists and numbers, read back by `from_json`."""
+        return [{"duration": s.duration, "ramp": s.ramp, "command": list(s.command)} for s in self.segments]
+
+    @classmethod
+    def from_json(cls, segments: Sequence[Mapping[str, Any]]) -> "CommandScript":
+        """Inverse of `as_json`."""
+        return cls(
+            tuple(
+                CommandSegment(float(s["duration"]), tuple(map(float, s["command"])), float(s["ramp"]))
+                for s in segments
+            )
+        )

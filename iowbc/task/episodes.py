@@ -1,0 +1,51 @@
+"""One planned episode: scene, seed, what is held fixed, and the commands it plays."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from iowbc.task.commands.script import CommandScript
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A trial. Everything random in it follows from its seed, so that every policy meets the same trial."""
+
+    scene: str
+    """Name of the scene."""
+    seed: int
+    """Seed of all that is drawn in the episode."""
+    duration: float
+    """Time limit [s]."""
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    """Randomised quantities held at a value, by name."""
+    script: CommandScript | None = None
+    """The commands; without, they are drawn as in training."""
+
+    def __post_init__(self) -> None:
+        if self.duration <= 0.0:
+            raise ValueError(f"an episode lasts a positive time, got {self.duration} s")
+        if self.seed < 0:
+            raise ValueError(f"an episode's seed is not negative, got {self.seed}")
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values, read back by `from_json`."""
+        return {
+            "scene": self.scene,
+            "seed": self.seed,
+            "duration": self.duration,
+            "fixed": dict(self.fixed),
+            "script": None if self.script is None else self.script.as_json(),
+        }
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> "Episode":
+        """Inverse of `as_json`."""
+        script = None if values["script"] is None else CommandScript.from_json(values["script"])
+        return cls(
+            scene=str(values["scene"]),
+            seed=int(values["seed"]),
+            duration=float(values["duration"]),
+            fixed={str(name): float(value) for name, value in values["fixed"].items()},
+            script=script,
+        )

@@ -1,0 +1,1 @@
+"""A single environment as a `gymnasium.Env`."""

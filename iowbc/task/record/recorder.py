@@ -1,0 +1,111 @@
+"""What is written down of each step: signals, counters, and why episodes end."""
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.control.command import HEIGHT, PITCH, VELOCITY
+from iowbc.sim.state import SimulationState
+from iowbc.task.memory import Memory
+from iowbc.task.motion import Motion
+from iowbc.task.record.signals import COUNTERS, REASONS
+from iowbc.task.rewards import smooth
+from iowbc.task.rewards.total import TERMS, Scored
+from iowbc.task.vector.shared import Buffers
+
+Array = NDArray[np.floating[Any]]
+Mask = NDArray[np.bool_]
+
+COLUMN = {name: index for index, name in enumerate(COUNTERS)}
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Why episodes end in a step, each (n,). What diverged neither fell nor dropped anything."""
+
+    fallen: Mask
+    dropped: Mask
+    time_limit: Mask
+    diverged: Mask
+
+    @classmethod
+    def none(cls, n: int) -> Self:
+        """Nothing ends."""
+        return cls(*np.zeros((4, n), np.bool_))
+
+    @property
+    def failed(self) -> Mask:
+        """Fell or dropped the object."""
+        return self.fallen | self.dropped
+
+    @property
+    def done(self) -> Mask:
+        """Ended for whatever reason."""
+        return self.fallen | self.dropped | self.time_limit | self.diverged
+
+    @property
+    def truncated(self) -> Mask:
+        """Reached the time limit, and nothing worse."""
+        return self.time_limit & ~(self.fallen | self.dropped | self.diverged)
+
+    def reasons(self) -> dict[str, Mask]:
+        """Exactly one reason for each that ended."""
+        return {
+            "fallen": self.fallen,
+            "dropped": self.dropped & ~self.fallen,
+            "time_limit": self.truncated,
+            "diverged": self.diverged,
+        }
+
+
+def write_signals(
+    buffers: Buffers, state: SimulationState, moved: Motion, memory: Memory, ending: Ending, period: float
+) -> None:
+    """The signals of the step just made, of `period` [s]; see `iowbc.task.record.signals.SIGNALS`."""
+    command = memory.command
+    columns = {
+        "heading": moved.heading,
+        "heading_reference": memory.heading_reference,
+        "torso_pitch": moved.torso_pitch,
+        "torso_pitch_command": command[:, PITCH],
+        "pelvis_height": moved.height,
+        "height_command": command[:, HEIGHT],
+        "saturation": smooth.saturation(state.saturation),
+        "slipped": (state.has_object[:, None] & ~state.grasped).any(axis=1),
+        "fallen": ending.fallen,
+        "dropped": ending.dropped,
+        "diverged": ending.diverged,
+        "power": smooth.power(state.joint_torque, state.joint_velocity),
+        "phase": memory.phase,
+        "level": memory.level,
+        "time": memory.steps * period,
+    }
+    for name, values in columns.items():
+        buffers[f"signal/{name}"][:, 0] = values
+    buffers["signal/system_velocity"][:] = moved.system_velocity
+    buffers["signal/commanded_velocity"][:] = command[:, VELOCITY]
+    buffers["signal/grip_force"][:] = state.grip_force.reshape(-1, 6)
+    buffers["signal/partner_force"][:] = state.partner_force
+    buffers["signal/base_position"][:] = state.base_position
+    buffers["signal/foot_contact"][:] = state.foot_contact
+
+
+def count_step(buffers: Buffers, scored: Scored) -> None:
+    """Adds a step to the counters."""
+    counters = buffers["counters"]
+    counters[:, : len(TERMS)] += scored.terms
+    counters[:, COLUMN["steps"]] += 1.0
+    counters[:, COLUMN["tracking"]] += scored.tracking.mean(axis=1)
+
+
+def count_endings(buffers: Buffers, ending: Ending, which: NDArray[np.intp]) -> None:
+    """Adds the episodes that ended, (k,), to the counters."""
+    counters = buffers["counters"]
+    counters[which, COLUMN["episodes"]] += 1.0
+    counters[which, COLUMN["length"]] += buffers["episode_length"][which]
+    counters[which, COLUMN["return"]] += buffers["episode_return"][which]
+    reasons = ending.reasons()
+    for name in REASONS:
+        counters[which, COLUMN[name]] += reasons[name][which]

@@ -1,0 +1,54 @@
+"""The signals and counters that an environment batch leaves for its parent each step."""
+
+from iowbc.task.rewards.total import TERMS
+from iowbc.task.vector.shared import Fields
+
+SIGNALS = {
+    "system_velocity": 3,
+    "commanded_velocity": 3,
+    "heading": 1,
+    "heading_reference": 1,
+    "torso_pitch": 1,
+    "torso_pitch_command": 1,
+    "pelvis_height": 1,
+    "height_command": 1,
+    "saturation": 1,
+    "grip_force": 6,
+    "partner_force": 3,
+    "slipped": 1,
+    "fallen": 1,
+    "dropped": 1,
+    "diverged": 1,
+    "base_position": 3,
+    "power": 1,
+    "phase": 1,
+    "foot_contact": 2,
+    "level": 1,
+    "time": 1,
+}
+"""Signals with their sizes: values of the step just made, before an automatic reset. v_sys and the commanded velocity
+(v_x, v_y, ω) in the heading frame [m/s, rad/s], heading and its reference [rad], torso pitch [rad], height that H
+speaks of [m], saturated fraction of all joints, forces of left and right grip and of the partner in the world frame
+[N], flags, base position in the world frame [m], power [W], gait phase in [0, 1), feet in contact, curriculum level,
+time in the episode [s]."""
+
+REASONS = ("fallen", "dropped", "time_limit", "diverged")
+"""Why an episode ended."""
+COUNTERS = (*(f"reward/{term}" for term in TERMS), "steps", "tracking", "episodes", "length", "return", *REASONS)
+"""Columns of the statistics: sums since they were last read. Length in steps."""
+
+
+def buffer_fields(observation: int, action: int) -> Fields:
+    """Everything that passes between a batch and its parent."""
+    return {
+        "action": ((action,), "float32"),
+        "observation": ((observation,), "float32"),
+        "terminal_observation": ((observation,), "float32"),
+        "reward": ((), "float32"),
+        "done": ((), "bool"),
+        "truncated": ((), "bool"),
+        "episode_return": ((), "float64"),
+        "episode_length": ((), "int64"),
+        "counters": ((len(COUNTERS),), "float64"),
+        **{f"signal/{name}": ((size,), "float64") for name, size in SIGNALS.items()},
+    }

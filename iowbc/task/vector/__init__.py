@@ -1,0 +1,1 @@
+"""Many environments over worker processes, as a vector environment."""

@@ -1,0 +1,108 @@
+"""What a process needs to know to build its part of the environments."""
+
+import json
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import load_robot
+from iowbc.task.batch import Batch, full_layout
+from iowbc.task.episodes import Episode
+from iowbc.task.record.signals import buffer_fields
+from iowbc.task.scenes import scene_of
+from iowbc.task.vector.shared import Buffers, Fields
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All environments of a vector environment."""
+
+    recipe: Recipe
+    robot: Path
+    """Folder of the robot's description."""
+    rg: Path | None
+    """Folder of the fitted reference generator."""
+    count: int
+    """Number of environments."""
+    seed: int
+    episodes: tuple[Episode, ...] | None = None
+    """What each environment plays; without, episodes are drawn as in training."""
+    divergences: Path | None = None
+    """Folder in which diverged simulations are kept for replay."""
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise ValueError(f"a vector environment has at least one environment, got {self.count}")
+        if self.episodes is not None and len(self.episodes) != self.count:
+            raise ValueError(f"{len(self.episodes)} episodes for {self.count} environments: give one to each")
+
+    @property
+    def scenes(self) -> list[str]:
+        """Name of each environment's scene."""
+        if self.episodes is not None:
+            return [episode.scene for episode in self.episodes]
+        return scene_of(self.count, self.recipe.task.scenes)
+
+    def buffer_fields(self) -> Fields:
+        """What passes between the environments and the learner."""
+        return buffer_fields(full_layout(self.recipe).size, len(load_robot(self.robot).support))
+
+    def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
+        """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
+        return Batch(
+            self.recipe,
+            self.robot,
+            self.rg,
+            environments=np.arange(first, last),
+            scenes=self.scenes[first:last],
+            seed=self.seed,
+            buffers=buffers,
+            episodes=None if self.episodes is None else self.episodes[first:last],
+            divergences=self.divergences,
+        )
+
+    def as_json(self) -> str:
+        """Text from which `from_json` makes the same setup."""
+        return json.dumps(
+            {
+                "recipe": self.recipe.model_dump(mode="json"),
+                "robot": str(self.robot),
+                "rg": _text(self.rg),
+                "count": self.count,
+                "seed": self.seed,
+                "episodes": None if self.episodes is None else [episode.as_json() for episode in self.episodes],
+                "divergences": _text(self.divergences),
+            }
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Inverse of `as_json`."""
+        values = json.loads(text)
+        episodes = values["episodes"]
+        return cls(
+            recipe=Recipe.model_validate(values["recipe"]),
+            robot=Path(values["robot"]),
+            rg=_path(values["rg"]),
+            count=values["count"],
+            seed=values["seed"],
+            episodes=None if episodes is None else tuple(Episode.from_json(episode) for episode in episodes),
+            divergences=_path(values["divergences"]),
+        )
+
+
+def shares(count: int, parts: int) -> list[tuple[int, int]]:
+    """First and last environment (excluded) of each of `parts` nearly equal groups."""
+    return list(pairwise(round(part * count / parts) for part in range(parts + 1)))
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path.resolve())
+
+
+def _path(text: str | None) -> Path | None:
+    return None if text is None else Path(text)

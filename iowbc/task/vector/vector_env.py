@@ -1,0 +1,207 @@
+"""The vector environment: a stable-baselines3 `VecEnv` over worker processes with many environments each."""
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.batch import Batch, full_layout
+from iowbc.task.episodes import Episode
+from iowbc.task.record.signals import REASONS, SIGNALS
+from iowbc.task.record.statistics import Statistics
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.snapshots import join, split
+from iowbc.task.vector.workers import Alone, Crew, Workers
+
+Array = NDArray[Any]
+Indices = None | int | Iterable[int]
+
+PATIENCE = 15.0
+"""How long a step may take before a worker counts as hung [s]; a step takes milliseconds."""
+
+
+class VectorEnv(VecEnv):  # type: ignore[misc]
+    """Environments of a recipe. Rows of observations are [s_t | s_priv], see `layout`; actions are residuals a."""
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        robot: Path,
+        *,
+        rg: Path | None,
+        num_envs: int,
+        workers: int,
+        seed: int,
+        episodes: Sequence[Episode] | None = None,
+        divergences: Path | None = None,
+        patience: float = PATIENCE,
+    ) -> None:
+        """`robot`: folder of its description. `rg`: folder of the fitted reference generator; without one θ_S_ref is
+        the default posture. `workers`: processes; 0 steps the environments in this one. `episodes`: one an
+        environment, played anew after every reset. `divergences`: folder for simulations that diverged.
+
+        The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
+        raises.
+        """
+        trials = None if episodes is None else tuple(episodes)
+        self.setup = Setup(recipe, robot, rg, num_envs, seed, trials, divergences)
+        self.layout = full_layout(recipe)
+        self._scenes = self.setup.scenes
+        self._crew: Crew = Workers(self.setup, workers, patience) if workers else Alone(self.setup)
+        self._buffers = self._crew.buffers
+        self.signals: dict[str, Array] = {name: self._buffers[f"signal/{name}"] for name in SIGNALS}
+        """Values of the last step, before an automatic reset, (num_envs, k); see `iowbc.task.record.signals`."""
+        self._statistics = Statistics(1.0 / recipe.task.control_frequency)
+        self._began = time.monotonic()
+        bound, actions = recipe.task.action.bound, self._buffers["action"].shape[1]
+        super().__init__(
+            num_envs,
+            spaces.Box(-np.inf, np.inf, (self.layout.size,), np.float32),
+            spaces.Box(-bound, bound, (actions,), np.float32),
+        )
+
+    @property
+    def batch(self) -> Batch:
+        """The environments themselves, where they are stepped in this process."""
+        if not isinstance(self._crew, Alone):
+            raise AttributeError(
+                "the environments live in worker processes; make the vector environment with workers=0"
+            )
+        return self._crew.batch
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begins an episode everywhere; after `seed` with those seeds."""
+        seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
+        self._call("reset", [(None if seeds is None else seeds[first:last],) for first, last in self._crew.groups])
+        self._reset_seeds()
+        self._reset_options()
+        return self._buffers["observation"].copy()
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Begins a step; actions (num_envs, actions). Raises ValueError where one is not finite."""
+        given = np.asarray(actions, np.float32)
+        if given.shape != self._buffers["action"].shape:
+            raise ValueError(f"actions have shape {given.shape}, expected {self._buffers['action'].shape}")
+        if not np.isfinite(given).all():
+            rows = np.flatnonzero(~np.isfinite(given).all(axis=1))
+            raise ValueError(f"actions of environments {rows.tolist()} are not finite, the first is {given[rows[0]]}")
+        self._buffers["action"][:] = given
+        self._crew.ask("step")
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Results of the step: observations, rewards, dones, infos; ended environments have begun anew."""
+        self._crew.answers()
+        buffers = self._buffers
+        done = buffers["done"].copy()
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for index in np.flatnonzero(done).tolist():
+            infos[index] = self._ending(index)
+        return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
+
+    def _ending(self, index: int) -> dict[str, Any]:
+        """What stable-baselines3 wants to know of an episode's end, and why it ended."""
+        buffers, truncated = self._buffers, bool(self._buffers["truncated"][index])
+        reason = "time_limit" if truncated else next(r for r in REASONS if r in SIGNALS and self.signals[r][index, 0])
+        return {
+            "terminal_observation": buffers["terminal_observation"][index].copy(),
+            "TimeLimit.truncated": truncated,
+            "end": reason,
+            "episode": {
+                "r": float(buffers["episode_return"][index]),
+                "l": int(buffers["episode_length"][index]),
+                "t": round(time.monotonic() - self._began, 6),
+            },
+        }
+
+    def statistics(self) -> dict[str, float]:
+        """Figures since the last call; see `Statistics`."""
+        return self._statistics.read(self._buffers["counters"], self._levels())
+
+    def drawn(self) -> dict[str, Array]:
+        """Everything that was drawn for the current episodes, by name, (num_envs,) or (num_envs, k)."""
+        return join(self._call("drawn"))
+
+    def curriculum(self) -> dict[str, Any]:
+        """How far the curriculum is, for JSON: the levels in each scene, ascending."""
+        levels = self._levels()
+        scenes = np.array(self._scenes)
+        return {"levels": {name: sorted(levels[scenes == name].tolist()) for name in dict.fromkeys(self._scenes)}}
+
+    def set_curriculum(self, curriculum: Mapping[str, Any]) -> None:
+        """Spreads the levels of another vector environment's `curriculum` over the environments of each scene."""
+        known: Mapping[str, Sequence[float]] = curriculum["levels"]
+        every = sorted(level for levels in known.values() for level in levels)
+        scenes, levels = np.array(self._scenes), np.empty(self.num_envs)
+        for name in dict.fromkeys(self._scenes):
+            rows = np.flatnonzero(scenes == name)
+            levels[rows] = np.quantile(known.get(name) or every, (np.arange(len(rows)) + 0.5) / len(rows))
+        self._call("set_levels", [(levels[first:last],) for first, last in self._crew.groups])
+
+    def state(self) -> dict[str, Array]:
+        """Everything that the future depends on; the same however many workers there are."""
+        return join(self._call("snapshot")) | {"statistics": self._statistics.carried.copy()}
+
+    def restore(self, state: Mapping[str, Array]) -> None:
+        """Inverse of `state`: the environments then take bit for bit the same course."""
+        own = dict(state)
+        self._statistics.carried[:] = own.pop("statistics")
+        parts = split(own, [self._scenes[first:last] for first, last in self._crew.groups])
+        self._call("restore", [(part,) for part in parts])
+        self._reset_seeds()
+
+    def close(self) -> None:
+        """Ends the worker processes."""
+        self._crew.close()
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """`render_mode`, `scene`, `level`, or an attribute of this vector environment, for each environment."""
+        rows = self._get_indices(indices)
+        if attr_name == "render_mode":
+            return [None for _ in rows]
+        if attr_name == "scene":
+            return [self._scenes[row] for row in rows]
+        if attr_name == "level":
+            levels = self._levels()
+            return [float(levels[row]) for row in rows]
+        if attr_name in ("observation_space", "action_space", "layout"):
+            return [getattr(self, attr_name) for _ in rows]
+        raise AttributeError(
+            f"environments have no attribute {attr_name!r}; there are scene, level, layout, render_mode"
+        )
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Sets the curriculum `level` of environments, from their next episode on."""
+        if attr_name != "level":
+            raise AttributeError(f"{attr_name!r} of an environment cannot be set; `level` can")
+        levels = self._levels()
+        levels[list(self._get_indices(indices))] = value
+        self._call("set_levels", [(levels[first:last],) for first, last in self._crew.groups])
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """`drawn()`: what was drawn for the episode of each environment, by name."""
+        if method_name != "drawn" or method_args or method_kwargs:
+            raise AttributeError(f"environments have no method {method_name!r} with these arguments; there is drawn()")
+        drawn = self.drawn()
+        return [{name: values[row] for name, values in drawn.items()} for row in self._get_indices(indices)]
+
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Indices = None
+    ) -> list[bool]:
+        """Never: the environments are arrays."""
+        return [False for _ in self._get_indices(indices)]
+
+    def _levels(self) -> Array:
+        return np.concatenate(self._call("levels"))
+
+    def _call(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
+        self._crew.ask(request, arguments)
+        return self._crew.answers()

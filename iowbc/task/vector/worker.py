@@ -1,0 +1,68 @@
+"""A worker process: builds its environments, then does what it is asked until its parent is gone."""
+
+import contextlib
+import ctypes
+import faulthandler
+import gc
+import os
+import pickle
+import signal
+import sys
+import traceback
+from multiprocessing.connection import Connection
+from typing import IO
+
+PARENT_DEATH_SIGNAL = 1
+"""prctl's option PR_SET_PDEATHSIG: the kernel sends the signal when the parent dies."""
+ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
+"""With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
+whether to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
+
+
+def main() -> None:
+    """Entry point of the process; see `iowbc.task.vector.workers` for the other end."""
+    parent, bound, pipe, memory, log = (int(argument) for argument in sys.argv[1:])
+    for ignored in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(ignored, signal.SIG_IGN)
+    if bound:
+        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        return
+    with contextlib.suppress(OSError):  # a worker that wakes must not keep its parent from waking the others
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    file = os.fdopen(log, "w")
+    faulthandler.enable(file=file)
+    faulthandler.register(signal.SIGUSR1, file=file)
+    connection = Connection(pipe)
+    try:
+        _serve(connection, memory)
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        pass
+    finally:
+        _leave(connection, file)
+
+
+def _serve(connection: Connection, memory: int) -> None:
+    """Answers requests: a method of the batch by name, with its arguments."""
+    try:
+        from iowbc.task.vector.setup import Setup
+        from iowbc.task.vector.shared import attach_shared
+
+        text, first, last = connection.recv()
+        setup = Setup.from_json(text)
+        batch = setup.batch(first, last, attach_shared(memory, setup.buffer_fields(), setup.count).rows(first, last))
+        gc.freeze()  # what lives as long as the process need not be looked through at every collection
+        connection.send((True, None))
+        while True:
+            request, arguments = connection.recv()
+            connection.send_bytes(pickle.dumps((True, getattr(batch, request)(*arguments))))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        raise
+    except BaseException:
+        connection.send((False, traceback.format_exc()))
+
+
+def _leave(connection: Connection, file: IO[str]) -> None:
+    connection.close()
+    file.flush()
+    os._exit(0)

@@ -1,0 +1,224 @@
+"""The parent's end of the worker processes: starts them, asks them, notices when one dies or hangs, and ends them."""
+
+import json
+import os
+import pickle
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Protocol
+
+from iowbc.errors import WorkerFailed
+from iowbc.task.batch import Batch
+from iowbc.task.vector import worker
+from iowbc.task.vector.setup import Setup, shares
+from iowbc.task.vector.shared import Buffers, create_shared, private_buffers
+
+STARTING = 60.0
+"""How long workers may take to build their environments [s]."""
+LEAVING = 2.0
+"""How long workers may take to leave by themselves [s]."""
+SLICE = 0.5
+"""Patience is counted in waits of this length [s], so that a suspended machine does not use it up."""
+DUMPING = 0.5
+"""Time that a hung worker gets to write down where it is [s]."""
+QUIET_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Set to one in workers, whose parallelism is the processes."""
+
+
+class Crew(Protocol):
+    """Whoever steps the environments, in consecutive groups."""
+
+    groups: list[tuple[int, int]]
+    """First and last environment (excluded) of each group."""
+    buffers: Buffers
+    """What all environments read and write."""
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+        """Begins a method of every group's batch, each with its own arguments."""
+
+    def answers(self) -> list[Any]:
+        """What the methods returned, in the order of the groups."""
+
+    def close(self) -> None:
+        """Ends it all."""
+
+
+class Alone:
+    """All environments in this process."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.groups = [(0, setup.count)]
+        self.buffers = private_buffers(setup.buffer_fields(), setup.count)
+        self.batch: Batch = setup.batch(0, setup.count, self.buffers)
+        self._answer: Any = None
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+        """See `Crew`."""
+        self._answer = getattr(self.batch, request)(*(arguments[0] if arguments else ()))
+
+    def answers(self) -> list[Any]:
+        """See `Crew`."""
+        return [self._answer]
+
+    def close(self) -> None:
+        """See `Crew`."""
+
+
+@dataclass
+class Member:
+    """One worker process."""
+
+    process: subprocess.Popen[bytes]
+    connection: Connection
+    log: int
+    """File descriptor to which the worker writes where it is when it crashes or hangs."""
+
+
+class Workers:
+    """Environments spread over worker processes, which share memory with this one."""
+
+    def __init__(self, setup: Setup, count: int, patience: float) -> None:
+        """`patience`: how long a request may take before a worker counts as hung [s]."""
+        self.groups = shares(setup.count, min(count, setup.count))
+        self._patience = patience
+        fields = setup.buffer_fields()
+        memory, self.buffers = create_shared(fields, setup.count)
+        self._members: list[Member] = []
+        self._pipes: dict[int, int] = {}
+        self._poll = select.poll()
+        self._ended = weakref.finalize(self, _end, self._members, os.getpid())
+        self._asked: set[int] = set()
+        self._answers: list[Any] = [None for _ in self.groups]
+        try:
+            for _ in self.groups:
+                member = _start(memory)
+                self._pipes[member.connection.fileno()] = len(self._members)
+                self._poll.register(member.connection.fileno(), select.POLLIN)
+                self._members.append(member)
+            for index, ((first, last), member) in enumerate(zip(self.groups, self._members, strict=True)):
+                member.connection.send((setup.as_json(), first, last))
+                self._asked.add(index)
+            self._wait(STARTING)
+        except BaseException:
+            self.close()
+            raise
+        finally:
+            os.close(memory)
+
+    @property
+    def processes(self) -> list[int]:
+        """Process numbers of the workers."""
+        return [member.process.pid for member in self._members]
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+        """See `Crew`. Answers that an interruption left lying are thrown away first."""
+        if not self._ended.alive:
+            raise WorkerFailed("the worker processes have ended; make a new vector environment")
+        self._wait(self._patience)
+        given = arguments or [()] * len(self._members)
+        messages = [pickle.dumps((request, own)) for own in given]
+        for index, (member, message) in enumerate(zip(self._members, messages, strict=True)):
+            try:
+                member.connection.send_bytes(message)
+            except (BrokenPipeError, ConnectionResetError):
+                self._fail(index)
+            self._asked.add(index)
+
+    def answers(self) -> list[Any]:
+        """See `Crew`. Raises WorkerFailed."""
+        self._wait(self._patience)
+        return self._answers
+
+    def close(self) -> None:
+        """See `Crew`. Workers leave when their pipe closes; those that do not are killed."""
+        self._ended()
+
+    def _wait(self, patience: float) -> None:
+        left = patience
+        while self._asked:
+            ready = {self._pipes[pipe] for pipe, _ in self._poll.poll(1e3 * SLICE)}
+            for index in sorted(ready & self._asked):
+                self._receive(index)
+            left -= 0.0 if ready else SLICE
+            if left <= 0.0 and self._asked:
+                self._fail(min(self._asked), hung=patience)
+
+    def _receive(self, index: int) -> None:
+        try:
+            fine, answer = self._members[index].connection.recv()
+        except (EOFError, ConnectionResetError):
+            self._fail(index)
+        if not fine:
+            self._fail(index, text=answer)
+        self._answers[index] = answer
+        self._asked.discard(index)
+
+    def _fail(self, index: int, *, text: str = "", hung: float | None = None) -> None:
+        member = self._members[index]
+        first, last = self.groups[index]
+        who = f"worker {index} (process {member.process.pid}, environments {first} to {last - 1})"
+        if hung is not None:
+            member.process.send_signal(signal.SIGUSR1)
+            time.sleep(DUMPING)
+            what = f"has not answered for {hung:g} s"
+        elif text:
+            what = "failed"
+        else:
+            try:
+                what = f"died with exit status {member.process.wait(LEAVING)}"
+            except subprocess.TimeoutExpired:
+                what = "closed its pipe"
+        text = text or _read(member.log)
+        self.close()
+        raise WorkerFailed(f"{who} {what}\n{text.rstrip() or 'it left no traceback; see its output above'}")
+
+
+def _start(memory: int) -> Member:
+    """A new worker process; SIGINT and SIGTERM are blocked from its first moment, for the parent decides the end."""
+    ours, theirs = socket.socketpair()
+    log = os.memfd_create("iowbc-worker-log", os.MFD_CLOEXEC)
+    bound = threading.current_thread() is threading.main_thread()
+    descriptors = (theirs.fileno(), memory, log)
+    environment = os.environ | dict.fromkeys(QUIET_THREADS, "1")
+    arguments = [json.dumps(sys.path), os.getpid(), int(bound), *descriptors]
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-c", worker.ASKED, *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            pass_fds=descriptors,
+            env=environment,
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        theirs.close()
+    return Member(process, Connection(ours.detach()), log)
+
+
+def _end(members: list[Member], owner: int) -> None:
+    if os.getpid() != owner:
+        return
+    for member in members:
+        member.connection.close()
+    deadline = time.monotonic() + LEAVING
+    for member in members:
+        try:
+            member.process.wait(max(deadline - time.monotonic(), 0.0))
+        except subprocess.TimeoutExpired:
+            member.process.kill()
+            member.process.wait()
+        os.close(member.log)
+    members.clear()
+
+
+def _read(log: int) -> str:
+    return os.pread(log, os.fstat(log).st_size, 0).decode(errors="replace")
