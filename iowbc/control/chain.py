@@ -4,6 +4,7 @@ Rows are last in memory, so that NumPy's loops are long, and a turn about a coor
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,16 @@ def mix(vectors: Array, axis: int, cosine: Array, sines: Array) -> None:
     pair += crossed
 
 
+@dataclass(frozen=True)
+class Weights:
+    """Masses of the bodies of equally long chains."""
+
+    moment: Array
+    """First moment of mass of each body in its frame, (hinges, 3, chains, 1) [kg·m]."""
+    carried: Array
+    """Mass from each body outward, (hinges, chains, 1 or n) [kg]."""
+
+
 class Chain:
     """Equally long chains side by side, such as two arms."""
 
@@ -66,11 +77,14 @@ class Chain:
             self._after.append(_unless_identity(fixed @ aside))
         self._quarter = np.stack([-self._sign, self._sign], axis=1)
 
-    def carry(self, angle: Array, vectors: Array, columns: int = 0) -> None:
+    def carry(self, angle: Array, vectors: Array, columns: int = 0, weights: Weights | None = None) -> None:
         """Takes vectors from the last bodies' frames to the bases', in place.
 
         `angle` (hinges, chains, n) [rad]; `vectors` (3, k, chains, n), of which the last is a point and the others are
         directions. The first `columns` of them, one a hinge, are filled with the point's Jacobian instead.
+
+        With `weights` the last is not a point but a first moment of mass: that of what hangs on the last bodies, to
+        which each body on the way adds its own. A point is the moment of a unit mass.
         """
         cosine, sines = cosine_and_sines(np.multiply(angle, self._sign, order="C"))
         vectors[:, :columns] = 0.0
@@ -78,13 +92,15 @@ class Chain:
             axis, plane = self._axis[j], PLANES[self._axis[j]]
             first = min(columns, j + 1)
             carried = vectors[:, first:]
+            if weights is not None:
+                carried[:, -1] += weights.moment[j]
             _apply(self._before[j], carried)
             mix(carried, axis, cosine[j], sines[j])
             if columns:
                 first = j
                 np.multiply(vectors[plane, -1][::-1], self._quarter[j], out=vectors[plane, j])
             _apply(self._after[j], vectors[:, first:])
-            vectors[:, -1] += self._offset[j]
+            vectors[:, -1] += self._offset[j] if weights is None else weights.carried[j] * self._offset[j]
 
     def fetch(self, angle: Array, points: Array) -> None:
         """Takes points (3, k, chains, n) from the bases' frames to the last bodies', in place; inverse of `carry`."""

@@ -14,6 +14,8 @@ from iowbc.robot.mjcf import Tree, read_tree
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
 
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s²], as MuJoCo and pinocchio have it by default."""
 ROW_KEYS = frozenset({"kp", "kd", "velocity", "default", "scale", "mirrored"})
 
 

@@ -58,6 +58,10 @@ class Body:
     """Shapes of class `body`: those that can collide with other links."""
     feet: Array
     """Ground contact points of class `foot`: x and y in the body frame, shape (points, 2) [m]."""
+    mass: float = 0.0
+    """[kg]."""
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    """Centre of mass in the body frame, shape (3,) [m]."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,22 @@ class Tree:
             found.append(self.bodies[name])
             name = self.bodies[name].parent
         return tuple(reversed(found))
+
+    def burden(self, name: str) -> tuple[float, Array]:
+        """Mass [kg] of a body with all that is fixed to it, and their first moment of mass, (3,) [kg·m], in its frame.
+
+        Raises ValueError where something that hangs on it moves on a hinge of its own.
+        """
+        body = self.bodies[name]
+        mass, moment = body.mass, body.mass * body.centre
+        for child in self.bodies.values():
+            if child.parent == name:
+                if child.hinge is not None:
+                    raise ValueError(f"{child.hinge.name} moves a part of {name!r}: no fixed burden")
+                more, further = self.burden(child.name)
+                mass += more
+                moment = moment + more * child.position + rotations.matrix(child.quaternion) @ further
+        return mass, moment
 
     def forward(self, joint_position: dict[str, float], start: str, site: str) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of a site in the frame of body `start`."""
@@ -124,7 +144,7 @@ def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Ite
     name = element.attrib.get("name")
     if name is None:
         raise ValueError(f"{path}: a body inside {parent or 'the world'!r} has no name")
-    joint = element.find("joint")
+    joint, inertial = element.find("joint"), element.find("inertial")
     yield Body(
         name=name,
         parent=parent,
@@ -140,6 +160,8 @@ def _bodies(element: ElementTree.Element, parent: str | None, path: Path) -> Ite
                 if geom.attrib.get("class") == "foot"
             ]
         ).reshape(-1, 2),
+        mass=0.0 if inertial is None else float(inertial.attrib["mass"]),
+        centre=np.zeros(3) if inertial is None else _numbers(inertial, "pos", "0 0 0"),
     )
     for child in element.findall("body"):
         yield from _bodies(child, name, path)

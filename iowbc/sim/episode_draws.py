@@ -16,8 +16,6 @@ Array = NDArray[Any]
 Indices = NDArray[np.int64]
 Keys = NDArray[np.uint64]
 
-GRAVITY = 9.81
-
 SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale")
 """Factors on impulses, pushes and sensor noise, and on how far the object's mass may rise above the lower end of its
 range. One unless held at another value; zero switches off."""

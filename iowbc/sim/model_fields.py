@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.recipe.simulation.scene import Scene
-from iowbc.sim.episode_draws import GRAVITY
+from iowbc.robot.description import GRAVITY
 from iowbc.sim.model_index import Layout
 from iowbc.sim.objects import TORSION, inertia_per_mass
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from iowbc.recipe.simulation.partner import Partner as Recipe
 from iowbc.recipe.simulation.scene import Scene
+from iowbc.robot.description import GRAVITY
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.episode_draws import GRAVITY
 from iowbc.sim.state import SimulationState
 
 Array = NDArray[Any]

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
-from iowbc.robot.description import Robot
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim import partner, sensing
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.disturbance import Blows
 from iowbc.sim.divergence import Divergence
-from iowbc.sim.episode_draws import GRAVITY, Draws
+from iowbc.sim.episode_draws import Draws
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.world import World
 

@@ -14,14 +14,9 @@ from iowbc.export.folder import write_folder
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import Robot, load_robot, robot_folder
+from iowbc.robot.description import Robot
 
 HISTORY = 25
-
-
-@pytest.fixture(scope="session")
-def robot() -> Robot:
-    return load_robot(robot_folder("g1"))
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""The G1, its models in MuJoCo and pinocchio, and random postures."""
+"""Models of the G1 in MuJoCo and pinocchio, and random postures."""
 
 from typing import Any
 
@@ -6,15 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from iowbc.robot.description import Robot, load_robot, robot_folder
+from iowbc.robot.description import Robot
 from iowbc.robot.pinocchio_model import build_model
 
 CONFIGURATIONS = 100
-
-
-@pytest.fixture(scope="session")
-def robot() -> Robot:
-    return load_robot(robot_folder("g1"))
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ from iowbc.reference.labels.costs import posture_weights
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.reference.labels.wrench_cone import sole_limits
+from iowbc.robot.description import GRAVITY
 
 Array = NDArray[Any]
 
@@ -49,7 +50,7 @@ class StaticMethod:
         self.angle_rows = np.eye(self.joints, self.size, 6)
         self.cone_rows = np.concatenate([np.zeros((len(self.cone), self.velocities)), self.cone], axis=1)
         total = sum(inertia.mass for inertia in support.full.inertias)
-        self.weight = 9.81 * total
+        self.weight = GRAVITY * total
 
     def solve(self, sample: Sample) -> Posture:
         """The label of a sample. Raises `Rejected` with "infeasible" or "not converged"."""

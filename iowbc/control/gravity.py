@@ -1,0 +1,53 @@
+"""Torques with which the arms carry their own weight, and a load in the hands: a feed-forward for their motors."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.control.chain import Chain, Weights
+from iowbc.robot.description import GRAVITY, Robot
+
+Array = NDArray[Any]
+
+
+class ArmGravity:
+    """Static torques of both arms, many robots at once. Holds constants only."""
+
+    def __init__(self, robot: Robot) -> None:
+        chains = [robot.tree.chain(body, robot.torso) for body in robot.wrist_bodies]
+        self._arms, self._waist = Chain(chains), Chain([robot.tree.chain(robot.torso, robot.base)])
+        hinges = self._arms.length
+        self._moment, self._mass = np.zeros((hinges, 3, 2, 1)), np.zeros((hinges, 2, 1))
+        for side, chain in enumerate(chains):
+            for place, body in enumerate(chain):
+                last = place == hinges - 1
+                mass, moment = robot.tree.burden(body.name) if last else (body.mass, body.mass * body.centre)
+                self._moment[place, :, side, 0] = moment
+                self._mass[: place + 1, side] += mass
+        self._grip = robot.grip_offset.T[:, :, None]
+
+    def torque(self, arms: Array, waist: Array, gravity: Array, load: Array | None = None) -> Array:
+        """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
+
+        `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or referred to; `gravity` (n, 3): its
+        direction in the base frame, (0, 0, -1) when upright; `load` (n, 2): mass that hangs on each grip point [kg].
+
+        The torque of hinge i is -(a_i × Σ_k m_k (c_k - o_i))·g over the links k from i outward, with its axis a_i and
+        origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
+        """
+        count, hinges = len(arms), self._arms.length
+        moments = np.empty((3, hinges + 1, 2, count))
+        carried = self._mass
+        moments[:, hinges] = 0.0
+        if load is not None:
+            moments[:, hinges] = self._grip * load.T
+            carried = carried + load.T
+        weights = Weights(self._moment, carried)
+        self._arms.carry(arms.reshape(count, 2, hinges).transpose(2, 1, 0), moments, hinges, weights)
+        axes = np.zeros((3, 4, 1, count))
+        axes[range(3), range(3)] = 1.0
+        self._waist.carry(waist.T[:, None], axes)
+        down = np.einsum("xkn,nx->kn", axes[:, :3, 0], GRAVITY * gravity)
+        torque: Array = -np.einsum("xjsn,xn->nsj", moments[:, :hinges], down)
+        return torque.reshape(count, -1)
