@@ -1,6 +1,5 @@
 """The yardstick: a bare loop of `mj_step` over the models and states of a vector environment, and nothing else."""
 
-import os
 import time
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -12,9 +11,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.processes import single_threaded
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
-from iowbc.task.vector.workers import QUIET_THREADS
 
 Array = NDArray[Any]
 
@@ -98,11 +97,11 @@ class BareLoops:
         context = get_context("spawn")
         self._pipes: list[Connection] = []
         self._processes = []
-        os.environ.update(dict.fromkeys(QUIET_THREADS, "1"))
         for first, last in groups:
             ours, theirs = context.Pipe()
             process = context.Process(target=_serve, args=(theirs, setup, first, last, periods), daemon=True)
-            process.start()
+            with single_threaded():
+                process.start()
             theirs.close()
             self._pipes.append(ours)
             self._processes.append(process)

@@ -1,6 +1,5 @@
 """`iowbc bench rg`: how fast support postures are labelled, by both methods, on one core and on several."""
 
-import os
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from iowbc.processes import available_cores
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.labelling import LabelTask
@@ -58,7 +58,7 @@ def main(
     """
     recipe = recipe or Recipe(name="bench")
     folder = robot or robot_folder(recipe.robot)
-    cores = len(os.sched_getaffinity(0))
+    cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})
     plan = SamplePlan(load_robot(folder), recipe.rg, recipe.seed)
     say(f"{recipe.name}: {cores} cores, kept labels a second")

@@ -1,6 +1,5 @@
 """`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against usual vector environments."""
 
-import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +16,7 @@ from iowbc.benchmarks.bare_loop import BareLoops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.other_physics import compare
 from iowbc.benchmarks.standing_generator import write_standing_generator
+from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.task import SceneShares
 from iowbc.robot.description import load_robot, robot_folder
@@ -53,7 +53,7 @@ def main(
     """
     recipe = recipe or Recipe(name="bench")
     folder = robot or robot_folder(recipe.robot)
-    cores = len(os.sched_getaffinity(0))
+    cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})
     only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
     recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})

@@ -15,8 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.machine import available_cores
 from iowbc.pipeline.store.runs import Runs
+from iowbc.processes import available_cores
 
 Verdict = Literal["good", "doubtful", "bad"]
 STYLES = {"good": "green", "doubtful": "yellow", "bad": "bold red"}

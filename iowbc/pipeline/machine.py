@@ -1,26 +1,13 @@
-"""This machine: cores, name, boot, installed versions."""
+"""This machine: name, boot, installed versions."""
 
 import functools
 import importlib.metadata
-import os
 import platform
 import socket
 from pathlib import Path
 
 RECORDED_PACKAGES = ("crocoddyl", "mujoco", "numpy", "onnxruntime", "pin", "stable-baselines3", "torch")
 """Versions of these are kept with every artifact."""
-
-
-def available_cores() -> int:
-    """Cores that this process may use: its affinity, cut to the container's quota."""
-    cores = len(os.sched_getaffinity(0))
-    try:
-        quota, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
-        if quota != "max":
-            cores = min(cores, max(1, round(int(quota) / int(period))))
-    except (OSError, ValueError):
-        pass
-    return cores
 
 
 def host() -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from iowbc.errors import Damaged, Interrupted, PipelineFailed, StageFailed
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
-from iowbc.pipeline.machine import available_cores, host, versions
+from iowbc.pipeline.machine import host, versions
 from iowbc.pipeline.planner import Planner, Step, changed_code
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
@@ -16,6 +16,7 @@ from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.store import Artifact
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
+from iowbc.processes import available_cores
 from iowbc.recipe.reading.writing import as_yaml
 
 

@@ -18,6 +18,7 @@ from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
+from iowbc.processes import SINGLE_THREADED
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.reading.loading import LoadedRecipe
 from iowbc.recipe.reading.writing import as_yaml
@@ -165,7 +166,7 @@ def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
             stdout=log,
             stderr=log,
             start_new_session=True,
-            env={**os.environ, "OMP_NUM_THREADS": "1"},
+            env=os.environ | SINGLE_THREADED,
         )
 
 

@@ -1,12 +1,12 @@
 """Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample."""
 
-import ctypes
 import multiprocessing
 import os
 import signal
+import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from iowbc.errors import Interrupted, Rejected
+from iowbc.processes import die_with_parent, single_threaded
 from iowbc.reference.labels.labelling import Solver
 from iowbc.reference.labels.shards import Shard, merge, read_shard, write_shard
 
@@ -24,8 +25,6 @@ POLL = 0.2
 """Seconds between looks at the interruption flag."""
 STARTS_WITHOUT_WORK = 3
 """Workers that may die before their first sample until the pool gives up."""
-PARENT_DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of prctl(2)."""
 IDLE = -1
 
 
@@ -110,27 +109,12 @@ def _hire(task: Task, key: str) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     current = context.Value("q", IDLE, lock=False)
-    process = context.Process(target=_work, args=(task, key, theirs, current, os.getpid()), daemon=True)
-    with _single_threaded():
+    bound = threading.current_thread() is threading.main_thread()
+    process = context.Process(target=_work, args=(task, key, theirs, current, os.getpid(), bound), daemon=True)
+    with single_threaded():
         process.start()
     theirs.close()
     return _Worker(process, ours, current)
-
-
-@contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Linear algebra in workers uses one thread each: the processes are the parallelism."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _assign(worker: _Worker, book: _Book, chunks: Sequence[Sequence[int]], paths: Sequence[Path]) -> None:
@@ -176,12 +160,10 @@ def _bury(worker: _Worker, book: _Book) -> None:
         book.waiting.insert(0, worker.chunk)
 
 
-def _work(task: Task, key: str, connection: Connection, current: Any, parent: int) -> None:
+def _work(task: Task, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
-    if os.getppid() != parent:
-        return
+    die_with_parent(parent, bound=bound)
     number = None
     try:
         solver = task.prepare()

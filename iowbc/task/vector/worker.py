@@ -1,7 +1,6 @@
 """A worker process: builds its environments, then does what it is asked until its parent is gone."""
 
 import contextlib
-import ctypes
 import faulthandler
 import gc
 import os
@@ -12,8 +11,8 @@ import traceback
 from multiprocessing.connection import Connection
 from typing import IO
 
-PARENT_DEATH_SIGNAL = 1
-"""prctl's option PR_SET_PDEATHSIG: the kernel sends the signal when the parent dies."""
+from iowbc.processes import die_with_parent
+
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
 """With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
 whether to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
@@ -24,10 +23,7 @@ def main() -> None:
     parent, bound, pipe, memory, log = (int(argument) for argument in sys.argv[1:])
     for ignored in (signal.SIGINT, signal.SIGTERM):
         signal.signal(ignored, signal.SIG_IGN)
-    if bound:
-        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:
-        return
+    die_with_parent(parent, bound=bool(bound))
     with contextlib.suppress(OSError):  # a worker that wakes must not keep its parent from waking the others
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     file = os.fdopen(log, "w")

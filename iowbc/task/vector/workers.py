@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 from iowbc.errors import WorkerFailed
+from iowbc.processes import SINGLE_THREADED
 from iowbc.task.batch import Batch
 from iowbc.task.vector import worker
 from iowbc.task.vector.setup import Setup, shares
@@ -30,8 +31,6 @@ SLICE = 0.5
 """Patience is counted in waits of this length [s], so that a suspended machine does not use it up."""
 DUMPING = 0.5
 """Time that a hung worker gets to write down where it is [s]."""
-QUIET_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Set to one in workers, whose parallelism is the processes."""
 
 
 class Crew(Protocol):
@@ -188,7 +187,7 @@ def _start(memory: int) -> Member:
     log = os.memfd_create("iowbc-worker-log", os.MFD_CLOEXEC)
     bound = threading.current_thread() is threading.main_thread()
     descriptors = (theirs.fileno(), memory, log)
-    environment = os.environ | dict.fromkeys(QUIET_THREADS, "1")
+    environment = os.environ | SINGLE_THREADED
     arguments = [json.dumps(sys.path), os.getpid(), int(bound), *descriptors]
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:

@@ -1,0 +1,52 @@
+"""Processes of our own: they die with their parent, have one thread of linear algebra each, and fit this machine."""
+
+import ctypes
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+SINGLE_THREADED = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment variables of a process whose linear algebra uses one thread: the processes are the parallelism."""
+PARENT_DEATH_SIGNAL = 1
+"""prctl's option PR_SET_PDEATHSIG: the kernel sends the signal when the thread that started the process ends."""
+
+
+def available_cores() -> int:
+    """Cores that this process may use: its affinity, cut to the container's quota."""
+    cores = len(os.sched_getaffinity(0))
+    try:
+        quota, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
+        if quota != "max":
+            cores = min(cores, max(1, round(int(quota) / int(period))))
+    except (OSError, ValueError):
+        pass
+    return cores
+
+
+def die_with_parent(parent: int, *, bound: bool = True) -> None:
+    """Ends this process when its parent, process number `parent`, is gone: at once where it already is.
+
+    `bound`: let the kernel kill it. Only a process that the parent's main thread started may ask for that, for what
+    counts is the end of the thread.
+    """
+    if bound:
+        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """Processes that are started inside have one thread of linear algebra each."""
+    before = {name: os.environ.get(name) for name in SINGLE_THREADED}
+    os.environ.update(SINGLE_THREADED)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
