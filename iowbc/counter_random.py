@@ -6,15 +6,12 @@ environments are spread over processes.
 
 import zlib
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Keys
 from iowbc.recipe.simulation.distribution import Distribution
-
-Array = NDArray[Any]
-Keys = NDArray[np.uint64]
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MULTIPLIERS = (np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
@@ -66,28 +63,12 @@ def uniform(key: Keys, stream: str, width: int) -> Array:
     return unit
 
 
-def normal(key: Keys, stream: str, width: int) -> Array:
-    """x ~ N(0, 1), shape (n, width); Box and Muller, both outputs of a pair used."""
-    half = (width + 1) // 2
-    u = uniform(key, stream, 2 * half)
-    radius = np.sqrt(-2.0 * np.log1p(-u[:, :half]))
-    angle = 2.0 * np.pi * u[:, half:]
-    return np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=1)[:, :width]
-
-
-NORMAL_INTERVAL = 1.959964
-"""Half-width, in standard deviations, of the interval that holds 95 % of a normal variable."""
-
-
 def draw(key: Keys, stream: str, distribution: Distribution, width: int = 1) -> Array:
     """x drawn from a recipe's distribution, shape (n, width); `probability` decides once for all of a row."""
     low, high = distribution.low, distribution.high
     if not distribution.enabled:
         return np.full((len(key), width), distribution.nominal)
-    if distribution.shape == "normal":
-        middle, deviation = 0.5 * (low + high), 0.5 * (high - low) / NORMAL_INTERVAL
-        value = np.clip(middle + deviation * normal(key, stream, width), low, high)
-    elif distribution.shape == "log-uniform":
+    if distribution.shape == "log-uniform":
         value = low * (high / low) ** uniform(key, stream, width)
     else:
         value = low + (high - low) * uniform(key, stream, width)

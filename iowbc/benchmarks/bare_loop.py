@@ -53,7 +53,7 @@ def record(setup: Setup, first: int, last: int, periods: int) -> Course:
     """Lets environments of one scene play from a reset and keeps what they asked of MuJoCo."""
     batch = setup.batch(first, last, private_buffers(setup.buffer_fields(), last - first))
     batch.reset(np.arange(first, last, dtype=np.uint64) + np.uint64(setup.seed))
-    (world,) = batch.simulation._worlds
+    (world,) = batch.simulation.worlds
     models = [batch.simulation.physics_model(index)[0] for index in range(batch.n)]
     physics = setup.recipe.simulation.physics
     substeps = round(batch.period / physics.timestep)
@@ -61,7 +61,7 @@ def record(setup: Setup, first: int, last: int, periods: int) -> Course:
     for period in range(periods):
         batch.buffers["action"][:] = wander(period, setup.count, batch.buffers["action"].shape[1])[first:last]
         batch.step()
-        states[period] = world._before
+        states[period] = world.before
         _with_forces(world, states[period])
     return Course(models, states, substeps)
 

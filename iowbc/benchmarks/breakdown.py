@@ -48,7 +48,7 @@ class _Timed:
 
 def watch_physics(batch: Any, watch: Stopwatch) -> None:
     """Times MuJoCo in the environments of a batch, as `physics`."""
-    for world in batch.simulation._worlds:
+    for world in batch.simulation.worlds:
         world.batch = _Timed(world.batch)
         watch.watch(world.batch, "step", "physics")
 

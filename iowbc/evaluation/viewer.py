@@ -23,6 +23,7 @@ from iowbc.learning.acting import load_policy
 from iowbc.recipe.evaluation import Segment, Video
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE, SCENES
+from iowbc.sim.rendering.appearance import Appearance
 from iowbc.task.episodes import Episode
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -145,17 +146,16 @@ def _play_in_viewer(environment: VectorEnv, recipe: Recipe, policy: Acting, inte
     """One episode in real time in a window. Raises Interrupted when the window is closed."""
     import mujoco.viewer  # needs a window system as soon as it is imported
 
-    model, data = environment.batch.simulation.render_model(0)
-    with mujoco.viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False) as viewer:
+    appearance = Appearance(environment.batch.simulation, 0)
+    data = appearance.data
+    with mujoco.viewer.launch_passive(appearance.model, data, show_left_ui=False, show_right_ui=False) as viewer:
         start = time.monotonic()
 
         def look(seconds: float) -> None:
             if not viewer.is_running():
                 raise Interrupted("the viewer was closed")
-            _, current = environment.batch.simulation.render_model(0)
             with viewer.lock():
-                data.qpos[:], data.qvel[:] = current.qpos, current.qvel
-                mujoco.mj_forward(model, data)
+                appearance.update()
                 viewer.cam.lookat[:] = data.qpos[:3]
             viewer.sync()
             time.sleep(max(0.0, start + seconds - time.monotonic()))

@@ -1,12 +1,8 @@
 """A line of past values that is read some fraction of periods back."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
+from iowbc.arrays import Array, Indices
 
 
 class DelayLine:

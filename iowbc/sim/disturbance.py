@@ -1,19 +1,13 @@
-"""Blows at random times: impulses on the object's centre of mass (paper III-D), pushes on the robot's base."""
-
-from typing import Any
+"""Disturbances at random times: impulses on the object's centre of mass (paper III-D), pushes on the robot's base."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc import counter_random as random
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.distribution import Distribution
 
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
-Keys = NDArray[np.uint64]
 
-
-class Blows:
+class Disturbance:
     """Constant forces of a short duration, in n environments; times, sizes and directions from the episode's key."""
 
     def __init__(

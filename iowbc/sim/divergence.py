@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from iowbc.arrays import Array
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.robot.description import Robot
+from iowbc.sim.world import World
 
 
 @dataclass(frozen=True)
@@ -36,3 +38,13 @@ class Divergence:
             arrays = {name: stored[name] for name in stored.files if name != "about"}
             about = json.loads(str(stored["about"]))
         return cls(arrays=arrays, **about)
+
+
+def replay(robot: Robot, recipe: Recipe, divergence: Divergence, substeps: int) -> bool:
+    """Whether the recorded period diverges again; it does, with the same physics and robot."""
+    scene, arrays = getattr(recipe.scenes, divergence.scene), divergence.arrays
+    world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), substeps)
+    world.recall(0, arrays)
+    diverged = np.zeros(1, bool)
+    world.step(arrays["target"][None], arrays["wrench"][None], arrays["push"][None], diverged)
+    return bool(diverged[0])

@@ -1,24 +1,17 @@
 """Draws what is random in an episode."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc import counter_random as random
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.holding import SWITCHES
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import Robot
 
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
-Keys = NDArray[np.uint64]
-
-SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale")
-"""Factors on impulses, pushes and sensor noise, and on how far the object's mass may rise above the lower end of its
-range. One unless held at another value; zero switches off."""
 PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
 
@@ -28,7 +21,6 @@ class Table:
 
     def __init__(self, entries: Mapping[str, tuple[Distribution, int]]) -> None:
         """`entries`: distribution and width of each quantity by name."""
-        self._entries = dict(entries)
         widths = [width for _, width in entries.values()]
         ends = np.cumsum(widths).tolist()
         self.width = ends[-1]
@@ -44,7 +36,6 @@ class Table:
         logarithmic = np.array([kind.shape == "log-uniform" and kind.enabled for kind in kinds])
         self._logarithmic = np.flatnonzero(logarithmic[self._owner])
         self._ratio = 1.0 + self._span[self._logarithmic] / self._low[self._logarithmic]
-        self._normal = [name for name, (kind, _) in entries.items() if kind.shape == "normal" and kind.enabled]
         self._probability = np.array([kind.probability for kind in kinds])
 
     def draw(self, key: Keys) -> Array:
@@ -53,9 +44,6 @@ class Table:
         row = self._low + self._span * chances[:, : self.width]
         logarithmic = self._logarithmic
         row[:, logarithmic] = self._low[logarithmic] * self._ratio ** chances[:, logarithmic]
-        for name in self._normal:
-            distribution, width = self._entries[name]
-            row[:, self.columns[name]] = random.draw(key, name, distribution, width)
         undrawn = chances[:, self.width :] >= self._probability
         drawn: Array = np.where(undrawn[:, self._owner], self.nominal, row)
         return drawn

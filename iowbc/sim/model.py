@@ -26,8 +26,8 @@ SOLVERS = {"newton": mujoco.mjtSolver.mjSOL_NEWTON, "cg": mujoco.mjtSolver.mjSOL
 CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 
 
-def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> Any:
-    """The editable description. With `look`, everything that is for the eye; without, only what moves or touches."""
+def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, dressed: bool) -> Any:
+    """The editable description. With `dressed`, everything that is for the eye; without, only what moves or touches."""
     spec = mujoco.MjSpec.from_file(str(robot.mjcf))
     option = spec.option
     option.timestep = physics.timestep
@@ -44,7 +44,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
             geom.priority = 1
         else:
             geom.contype, geom.conaffinity = _touches(geom, physics.body_contact)
-    if not look:
+    if not dressed:
         for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
             spec.delete(geom)
     spec.worldbody.add_geom(
@@ -54,7 +54,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
     if scene.object is not None:
         ground_bit = GROUND_BIT if scene.kind == "lift" else 0
         touched = physics.body_contact != "nothing"
-        add_object(spec, robot, scene, ground_bit=ground_bit, touched=touched, look=look)
+        add_object(spec, robot, scene, ground_bit=ground_bit, touched=touched, dressed=dressed)
     spec.add_sensor(
         name="contact_forces",
         type=mujoco.mjtSensor.mjSENS_FORCE,
@@ -66,7 +66,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, look: bool) -> A
 
 def compile_scene(robot: Robot, physics: Physics, scene: Scene) -> Any:
     """The model that is stepped. Its one sensor makes MuJoCo compute `cfrc_ext`, which holds all contact forces."""
-    return scene_spec(robot, physics, scene, look=False).compile()
+    return scene_spec(robot, physics, scene, dressed=False).compile()
 
 
 def _add_motors(spec: Any, robot: Robot) -> None:

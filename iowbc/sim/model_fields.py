@@ -4,15 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.model_index import Layout
 from iowbc.sim.objects import TORSION, inertia_per_mass
-
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "dof_damping", "dof_frictionloss", "geom_friction"),

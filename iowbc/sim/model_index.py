@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Indices, as_slice
 from iowbc.robot.description import Robot
-
-Indices = NDArray[np.int64]
 
 BASE = slice(0, 7)
 BASE_LINEAR = slice(0, 3)
@@ -89,14 +87,6 @@ class Layout:
             momentum_speeds=slice(3, 6 + count),
             object_geom=geoms.get("object"),
         )
-
-
-def as_slice(indices: Indices) -> slice | Indices:
-    """Indices at equal distances as a slice, of which NumPy takes views and which it copies several times faster."""
-    steps = np.unique(np.diff(indices)) if len(indices) > 1 else np.ones(1, np.int64)
-    if not len(indices) or len(steps) != 1 or steps[0] < 1:
-        return indices
-    return slice(int(indices[0]), int(indices[-1]) + 1, int(steps[0]))
 
 
 def _pair(indices: dict[str, int], left: str, right: str) -> Indices | None:

@@ -26,10 +26,10 @@ RUBBER = (0.13, 0.13, 0.14, 1.0)
 WOOD = (0.62, 0.47, 0.30, 1.0)
 
 
-def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, touched: bool, look: bool) -> None:
+def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, touched: bool, dressed: bool) -> None:
     """Body `object` with the scene's nominal mass, its joints, its grips or the palms that touch it.
 
-    `touched`: links other than the palms may touch it too.
+    `touched`: links other than the palms may touch it too; `dressed`: with what is for the eye.
     """
     thing = scene.object
     if thing is None:
@@ -51,10 +51,10 @@ def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, touche
         group=3 if ring else 2,
         rgba=WOOD if scene.kind == "push" else CARDBOARD,
     )
-    if look and ring:
+    if dressed and ring:
         _add_ring(body, thing)
     if scene.kind == "push":
-        _add_wheels(body, thing, look)
+        _add_wheels(body, thing, dressed)
     else:
         body.add_freejoint(name="object_joint")
     if by_contact:
@@ -113,12 +113,12 @@ def _add_palms(spec: Any, robot: Robot, scene: Scene) -> None:
         )
 
 
-def _add_wheels(body: Any, thing: Object, look: bool) -> None:
+def _add_wheels(body: Any, thing: Object, dressed: bool) -> None:
     """Planar motion and turning; rolling resistance is the dry friction of these joints."""
     for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0))):
         body.add_joint(name=f"object_{name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     body.add_joint(name="object_yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0.0, 0.0, 1.0))
-    if not look:
+    if not dressed:
         return
     x, y, z = 0.5 * np.asarray(thing.size)
     for along in (-0.85, 0.85):

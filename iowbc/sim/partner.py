@@ -4,19 +4,14 @@ Planar vectors are rows x and y of arrays (2, n). All is real sums, products and
 environments there are; NumPy's complex products do not.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.partner import Partner as Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import SimulationState
-
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
 
 NOISE_WIDTH = 2
 """Columns of noise that the partner takes each step."""

@@ -1,27 +1,16 @@
 """What the sensors deliver: the truth with bias, noise and latency."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices, Mask
 from iowbc.recipe.simulation.sensing import Sensing as Recipe
 from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.state import JOINTS, MeasuredState, SimulationState
+from iowbc.sim.state import MeasuredState, SimulationState
 
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-
-POSITION, VELOCITY = slice(0, JOINTS), slice(JOINTS, 2 * JOINTS)
-ANGULAR, GRAVITY = slice(2 * JOINTS, 2 * JOINTS + 3), slice(2 * JOINTS + 3, 2 * JOINTS + 6)
-ROBOT = slice(0, 2 * JOINTS + 6)
 PLACE, ORIENTATION = slice(0, 3), slice(3, 7)
 SPEED, TURNING = slice(7, 10), slice(10, 13)
 OBJECT_WIDTH = 13
-NOISE_WIDTH = ROBOT.stop + OBJECT_WIDTH
-"""Columns of noise that sensing takes each step."""
 NOT_SEEN = np.zeros(OBJECT_WIDTH)
 NOT_SEEN[ORIENTATION.start] = 1.0
 """What is delivered without an object: identity, at rest at the base."""
@@ -30,37 +19,54 @@ CONJUGATE_SIGNS = np.array([1, 1, 1, 1, -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1
 """The matrix, row by row, with which the conjugate of a quaternion multiplies another from the left."""
 
 
+class Columns:
+    """Where the measurements of a robot with some number of joints lie in a row, before those of the object."""
+
+    def __init__(self, joints: int) -> None:
+        self.position, self.velocity = slice(0, joints), slice(joints, 2 * joints)
+        self.angular, self.gravity = slice(2 * joints, 2 * joints + 3), slice(2 * joints + 3, 2 * joints + 6)
+        self.robot = slice(0, 2 * joints + 6)
+        self.width = self.robot.stop + OBJECT_WIDTH
+
+
 class Sensing:
     """Sensors of n environments; two delay lines, one for joints and inertial unit, one for the object's tracking."""
 
-    def __init__(self, recipe: Recipe, has_object: Mask, longest_latency: int) -> None:
+    def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int) -> None:
         n = len(has_object)
+        self._columns = columns = Columns(joints)
         self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
         self._world = np.zeros((n, 3, 3))
-        self._robot, self._object = np.zeros((n, ROBOT.stop)), np.zeros((n, OBJECT_WIDTH))
-        self._robot_line = DelayLine(n, ROBOT.stop, longest_latency)
+        width = columns.robot.stop
+        self._robot, self._object = np.zeros((n, width)), np.zeros((n, OBJECT_WIDTH))
+        self._robot_line = DelayLine(n, width, longest_latency)
         self._object_line = DelayLine(n, OBJECT_WIDTH, longest_latency)
-        self._bias = np.zeros((n, JOINTS))
-        self._deviation = np.zeros((n, NOISE_WIDTH))
-        self._nominal = _deviations(recipe)
-        self.rows = np.zeros((n, NOISE_WIDTH))
-        seen = self.rows[:, ROBOT.stop :]
+        self._bias = np.zeros((n, joints))
+        self._deviation = np.zeros((n, columns.width))
+        self._nominal = _deviations(recipe, columns)
+        self.rows = np.zeros((n, columns.width))
+        seen = self.rows[:, width:]
         self.measured = MeasuredState(
-            joint_position=self.rows[:, POSITION],
-            joint_velocity=self.rows[:, VELOCITY],
-            base_angular_velocity=self.rows[:, ANGULAR],
-            projected_gravity=self.rows[:, GRAVITY],
+            joint_position=self.rows[:, columns.position],
+            joint_velocity=self.rows[:, columns.velocity],
+            base_angular_velocity=self.rows[:, columns.angular],
+            projected_gravity=self.rows[:, columns.gravity],
             object_position=seen[:, PLACE],
             object_quaternion=seen[:, ORIENTATION],
             object_linear_velocity=seen[:, SPEED],
             object_angular_velocity=seen[:, TURNING],
         )
 
+    @property
+    def noise_width(self) -> int:
+        """Columns of noise that sensing takes each step."""
+        return self._columns.width
+
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """Fills the past of some environments with their present."""
         self._bias[which] = drawn["encoder_bias"][which]
         self._deviation[which] = self._nominal * drawn["noise_scale"][which, None]
-        self._deviation[which, ROBOT.stop :] *= state.has_object[which, None]
+        self._deviation[which, self._columns.robot.stop :] *= state.has_object[which, None]
         self._robot_line.set_latency(which, drawn["sensor_latency"][which])
         self._object_line.set_latency(which, drawn["object_latency"][which])
         self._sense(state)
@@ -74,24 +80,24 @@ class Sensing:
         self._object_line.push(self._object)
 
     def deliver(self, noise: Array) -> None:
-        """Refreshes `measured`; `noise` (n, NOISE_WIDTH) standard normal."""
-        rows = self.rows
+        """Refreshes `measured`; `noise` (n, noise_width) standard normal."""
+        rows, columns = self.rows, self._columns
         np.multiply(noise, self._deviation, out=rows)
-        rows[:, ROBOT] += self._robot_line.read()
-        rows[:, POSITION] += self._bias
+        rows[:, columns.robot] += self._robot_line.read()
+        rows[:, columns.position] += self._bias
         if not self._see_object:
             self.measured.object_quaternion[:, 0] = 1.0
             return
-        rows[:, ROBOT.stop :] += self._object_line.read()
+        rows[:, columns.robot.stop :] += self._object_line.read()
         quaternion = self.measured.object_quaternion
         quaternion /= np.sqrt(np.vecdot(quaternion, quaternion))[:, None]
 
     def _sense(self, state: SimulationState) -> None:
-        robot, thing = self._robot, self._object
-        robot[:, POSITION] = state.joint_position
-        robot[:, VELOCITY] = state.joint_velocity
-        robot[:, ANGULAR] = state.base_angular_velocity
-        np.negative(state.base_rotation[:, 2], out=robot[:, GRAVITY])
+        robot, thing, columns = self._robot, self._object, self._columns
+        robot[:, columns.position] = state.joint_position
+        robot[:, columns.velocity] = state.joint_velocity
+        robot[:, columns.angular] = state.base_angular_velocity
+        np.negative(state.base_rotation[:, 2], out=robot[:, columns.gravity])
         if not self._see_object:
             return
         world, turning = self._world, state.base_angular_velocity
@@ -124,12 +130,12 @@ class Sensing:
         return own
 
 
-def _deviations(recipe: Recipe) -> Array:
-    """Standard deviation of each column, (NOISE_WIDTH,); a rotation by η changes a unit quaternion by η / 2."""
-    deviation = np.zeros(NOISE_WIDTH)
-    deviation[POSITION], deviation[VELOCITY] = recipe.joint_position, recipe.joint_velocity
-    deviation[ANGULAR], deviation[GRAVITY] = recipe.angular_velocity, recipe.gravity
-    seen = deviation[ROBOT.stop :]
+def _deviations(recipe: Recipe, columns: Columns) -> Array:
+    """Standard deviation of each column, (width,); a rotation by η changes a unit quaternion by η / 2."""
+    deviation = np.zeros(columns.width)
+    deviation[columns.position], deviation[columns.velocity] = recipe.joint_position, recipe.joint_velocity
+    deviation[columns.angular], deviation[columns.gravity] = recipe.angular_velocity, recipe.gravity
+    seen = deviation[columns.robot.stop :]
     seen[PLACE], seen[ORIENTATION] = recipe.object_position, 0.5 * recipe.object_orientation
     seen[SPEED], seen[TURNING] = recipe.object_velocity, recipe.object_angular_velocity
     return deviation

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
+from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import GRAVITY, Robot
-from iowbc.sim import partner, sensing
+from iowbc.sim import partner
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.disturbance import Blows
+from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.divergence import Divergence
 from iowbc.sim.episode_draws import Draws
+from iowbc.sim.sensing import Sensing
+from iowbc.sim.snapshots import by_environment, by_world
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.world import World
-
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
 
 
 class Simulation:
@@ -52,25 +52,28 @@ class Simulation:
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         substeps = _substeps(self.period, recipe.physics.timestep)
-        self._worlds = [
+        self._scenes = tuple(dict.fromkeys(self.scene_names))
+        self.worlds = tuple(
             World(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), substeps)
-            for name in dict.fromkeys(self.scene_names)
-        ]
-        links = self._worlds[0].layout.links
+            for name in self._scenes
+        )
+        links = self.worlds[0].layout.links
         self._draws = Draws(recipe, models, robot, links.stop - links.start)
         self.hold(fixed or {})
         self._key = random.environment_key(seed, self.envs)
         self._episode_key = self._key.copy()
         self.episode = np.zeros(n, np.int64)
         self.clock = np.zeros(n, np.int64)
-        self.state = SimulationState.empty(n)
+        self.state = SimulationState.empty(n, len(robot.joints))
         self.state.has_object[:] = [model.object is not None for model in models]
         self.target = np.tile(robot.default_position, (n, 1))
         self.feed = np.zeros((n, 3))
         self._partner = partner.Partner(recipe.partner, models, self.period)
-        self._sensing = sensing.Sensing(recipe.sensing, self.state.has_object, recipe.randomization.longest_latency)
+        self._sensing = Sensing(
+            recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency
+        )
         self._targets = DelayLine(n, len(robot.joints), recipe.randomization.longest_latency)
-        self._impulses = Blows(
+        self._impulses = Disturbance(
             n,
             name="impulse",
             enabled=recipe.impulses.enabled,
@@ -80,7 +83,7 @@ class Simulation:
             period=self.period,
             level=False,
         )
-        self._pushes = Blows(
+        self._pushes = Disturbance(
             n,
             name="push",
             enabled=recipe.pushes.enabled,
@@ -94,7 +97,7 @@ class Simulation:
         self._handover = (
             np.array([model.grasp.handover if model.kind == "lift" else 0.0 for model in models]) / self.period
         )
-        width = sensing.NOISE_WIDTH + partner.NOISE_WIDTH
+        width = self._sensing.noise_width + partner.NOISE_WIDTH
         self._noise = np.zeros((n, width + width % 2))
         self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
         self.divergence_count = 0
@@ -167,7 +170,7 @@ class Simulation:
         """One control period."""
         state, drawn = self.state, self.drawn
         wrench, diverged = state.external_force, state.diverged
-        self._partner.wrench(self.feed, self._noise[:, sensing.NOISE_WIDTH :], state, wrench)
+        self._partner.wrench(self.feed, self._noise[:, self._sensing.noise_width :], state, wrench)
         wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
         self._hand_over(wrench)
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
@@ -176,7 +179,7 @@ class Simulation:
         target = self._targets.read()
         self.clock += 1
         diverged[:] = False
-        for world in self._worlds:
+        for world in self.worlds:
             place = world.place
             failed = diverged[place]
             world.step(target[place], wrench[place], state.push_force[place], failed)
@@ -197,11 +200,11 @@ class Simulation:
 
     def _deliver(self) -> None:
         self._noise = random.noise(self._episode_key, self.clock.view(np.uint64), self._noise.shape[1])
-        self._sensing.deliver(self._noise[:, : sensing.NOISE_WIDTH])
+        self._sensing.deliver(self._noise[:, : self._sensing.noise_width])
 
     def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
         """Worlds that some environments belong to, with their indices in the world and in `which`."""
-        for world in self._worlds:
+        for world in self.worlds:
             chosen = np.flatnonzero(np.isin(which, world.rows))
             if len(chosen):
                 yield world, np.searchsorted(world.rows, which[chosen]), chosen
@@ -240,28 +243,31 @@ class Simulation:
         return own | {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
 
     def snapshot(self) -> dict[str, Array]:
-        """Copies of everything that the future depends on; `restore` continues bit for bit."""
+        """Copies of everything that the future depends on, a row an environment; `restore` continues bit for bit."""
         saved = {name: values.copy() for name, values in self._memory().items()}
-        for index, world in enumerate(self._worlds):
+        for index, world in enumerate(self.worlds):
             saved |= {f"world{index}/{name}": values for name, values in world.snapshot().items()}
-        return saved
+        return by_environment(saved, self._scenes)
 
-    def restore(self, saved: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes."""
+    def restore(self, rows: Mapping[str, Array]) -> None:
+        """Inverse of `snapshot`, into a simulation of the same robot, recipe, environments and scenes; other entries
+        are passed over."""
+        saved = by_world(rows, self._scenes)
         self.hold({name.removeprefix("fixed/"): values for name, values in saved.items() if name.startswith("fixed/")})
         for name, values in self._memory().items():
             if name not in saved or saved[name].shape != values.shape:
                 found = saved[name].shape if name in saved else "nothing"
                 raise ValueError(f"snapshot of another simulation: {name} is {found}, expected {values.shape}")
             values[...] = saved[name]
-        for index, world in enumerate(self._worlds):
+        for index, world in enumerate(self.worlds):
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
         for part in (self._partner, self._sensing, self._targets):
             part.restored()
 
-    def _world_of(self, env: int) -> tuple[World, int]:
-        for world in self._worlds:
+    def world_of(self, env: int) -> tuple[World, int]:
+        """The world of an environment, and its index there."""
+        for world in self.worlds:
             found = np.flatnonzero(world.rows == env)
             if len(found):
                 return world, int(found[0])
@@ -269,13 +275,8 @@ class Simulation:
 
     def physics_model(self, env: int) -> tuple[Any, Any]:
         """Copies of the MuJoCo model and data with which an environment is stepped."""
-        world, index = self._world_of(env)
+        world, index = self.world_of(env)
         return world.batch.get_model(index), world.batch.get_data(index)
-
-    def render_model(self, env: int) -> tuple[Any, Any]:
-        """A model of the environment for the eye, one for all of its scene, and data in its present state."""
-        world, index = self._world_of(env)
-        return world.look(index)
 
     def partner_handle(self, env: int) -> Array:
         """Where the partner takes hold, (3,) [m]."""
@@ -288,7 +289,7 @@ class Simulation:
 
     def hand_position(self, env: int) -> Array:
         """Positions of the grips, (2, 3) [m]."""
-        world, index = self._world_of(env)
+        world, index = self.world_of(env)
         return world.hand_position(index)
 
 

@@ -3,13 +3,11 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.sim.model_index import Layout
-
-Array = NDArray[Any]
 
 
 class Squeeze:

@@ -6,10 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-JOINTS = 29
+from iowbc.arrays import Array, Mask
 
 
 class _Arrays:
@@ -89,10 +86,10 @@ class SimulationState(_Arrays):
     """Simulation left the numbers in this control period, and stands where it was before; to be reset, (n,)."""
 
     @classmethod
-    def empty(cls, n: int) -> Self:
-        """Arrays for n environments, upright at the origin."""
+    def empty(cls, n: int, joints: int) -> Self:
+        """Arrays for n environments of a robot with so many joints, upright at the origin."""
         mask = {
-            "saturation": (JOINTS,),
+            "saturation": (joints,),
             "foot_contact": (2,),
             "has_object": (),
             "grasped": (2,),
@@ -100,10 +97,10 @@ class SimulationState(_Arrays):
             "diverged": (),
         }
         real = {
-            "joint_position": (JOINTS,),
-            "joint_velocity": (JOINTS,),
-            "joint_acceleration": (JOINTS,),
-            "joint_torque": (JOINTS,),
+            "joint_position": (joints,),
+            "joint_velocity": (joints,),
+            "joint_acceleration": (joints,),
+            "joint_torque": (joints,),
             "base_quaternion": (4,),
             "base_rotation": (3, 3),
             "torso_rotation": (3, 3),

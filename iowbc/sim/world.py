@@ -1,27 +1,21 @@
 """The environments of one scene: a model, and a batch of simulations of it stepped in one call."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices, Mask, as_slice
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.sim.model import compile_scene
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout, as_slice
-from iowbc.sim.rendering.appearance import look_model
+from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.state import SimulationState
-
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 POSITION = mujoco.mjtStage.mjSTAGE_POS.value
 VELOCITY = mujoco.mjtStage.mjSTAGE_VEL.value
@@ -40,17 +34,15 @@ class World:
     """
 
     def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, substeps: int) -> None:
-        self.scene, self.rows, self._substeps, self._robot = scene, rows, substeps, robot
+        self.scene, self.physics, self.rows, self.substeps, self._robot = scene, physics, rows, substeps, robot
         self.place: slice | Indices = as_slice(rows)
         self.model = compile_scene(robot, physics, scene)
         self.layout = Layout.of(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1, persistent=True)
         self.fields = ModelFields(self.batch, self.layout, scene)
-        self._physics = physics
-        self._look: Any = None
         self._limit = AT_LIMIT * robot.effort
         bind = self.batch.bind
-        self._qpos, self._qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
+        self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
         self._acceleration, self._torque, self._external = bind("qacc"), bind("actuator_force"), bind("cfrc_ext")
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
@@ -60,7 +52,7 @@ class World:
         self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
-        self._before = self.batch.state.copy()
+        self.before = self.batch.state.copy()
         self._mass_cache()
 
     def _mass_cache(self) -> None:
@@ -75,13 +67,13 @@ class World:
         ids, joint_position, pitch, yaw = ids[order], joint_position[order], pitch[order], yaw[order]
         self.batch.reset(ids, stage=NOTHING)
         self.fields.write(ids, {name: values[order] for name, values in drawn.items()})
-        self._qpos[ids, :3] = (0.0, 0.0, 1.0)
-        self._qpos[ids, 3:7] = rotations.from_euler(np.zeros_like(pitch), pitch, yaw)
-        self._qpos[ids, self.layout.joints] = joint_position
+        self.qpos[ids, :3] = (0.0, 0.0, 1.0)
+        self.qpos[ids, 3:7] = rotations.from_euler(np.zeros_like(pitch), pitch, yaw)
+        self.qpos[ids, self.layout.joints] = joint_position
         self.control[ids] = joint_position
         self.batch.forward(ids, stage=POSITION)
         drop = self._lowest_sole(ids)
-        self._qpos[ids, 2] -= drop
+        self.qpos[ids, 2] -= drop
         if self.layout.object_position is not None:
             self._place_object(ids, drop, yaw, self.layout.object_position.start)
         self._connected[ids] = 1.0
@@ -110,12 +102,12 @@ class World:
         if self.scene.kind == "push":
             front = np.max(in_heading[:, :, 0], axis=1) + radius + self.scene.gap
             middle[:, 0] = front + self.fields.half_size(ids)[:, 0]
-            self._qpos[ids, start : start + 2] = rotations.rotate(turn, middle)[:, :2]
-            self._qpos[ids, start + 2] = yaw
+            self.qpos[ids, start : start + 2] = rotations.rotate(turn, middle)[:, :2]
+            self.qpos[ids, start + 2] = yaw
             return
         middle[:, 2] -= self.scene.grasp.height
-        self._qpos[ids, start : start + 3] = rotations.rotate(turn, middle)
-        self._qpos[ids, start + 3 : start + 7] = turn
+        self.qpos[ids, start : start + 3] = rotations.rotate(turn, middle)
+        self.qpos[ids, start + 3 : start + 7] = turn
         if self.layout.palms is None:
             self.fields.place_grips(ids, in_heading - middle[:, None])
         else:
@@ -133,7 +125,7 @@ class World:
     def step(self, target: Array, wrench: Array, push: Array, diverged: Mask) -> None:
         """One control period with joint targets held; `wrench` (n, 6) on the object's and `push` (n, 3) on the base's
         centre of mass. Marks in `diverged` the simulations that left the numbers and puts them back."""
-        np.copyto(self._before, self.batch.state)
+        np.copyto(self.before, self.batch.state)
         np.copyto(self.control, target)
         if self._squeeze is not None:
             self._squeeze.add(self.control)
@@ -141,27 +133,27 @@ class World:
         if self.layout.object is not None:
             self._applied[:, self.layout.object] = wrench
         try:
-            self.batch.step(nstep=self._substeps, stage=VELOCITY)
+            self.batch.step(nstep=self.substeps, stage=VELOCITY)
         except SimulationError as error:
             diverged[error.ids] = True
         self._check(diverged)
 
     def _check(self, diverged: Mask) -> None:
         """Marks what warned, or moves too fast or not in numbers, and puts it back to the start of the period."""
-        counts, fastest = self._warning_counts, self._physics.fastest
-        calm = self._qvel.max() < fastest and self._qvel.min() > -fastest
+        counts, fastest = self._warning_counts, self.physics.fastest
+        calm = self.qvel.max() < fastest and self.qvel.min() > -fastest
         if calm and np.array_equal(counts, self._warnings) and not diverged.any():
             return
         diverged |= (counts != self._warnings).any(axis=1)
-        diverged |= ~(np.abs(self._qvel).max(axis=1) < fastest)
+        diverged |= ~(np.abs(self.qvel).max(axis=1) < fastest)
         np.copyto(self._warnings, counts)
         ids = np.flatnonzero(diverged)
-        self.batch.state[ids] = self._before[ids]
+        self.batch.state[ids] = self.before[ids]
         self.batch.forward(ids)
 
     def record(self, index: int) -> dict[str, Array]:
         """What a simulation was at the start of the last control period: its state row and its model's own fields."""
-        return {"state": self._before[index]} | self.fields.of(index)
+        return {"state": self.before[index]} | self.fields.of(index)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
         """Lets go the hands whose grip carries more than its slip force, (all environments,) [N]."""
@@ -182,7 +174,7 @@ class World:
 
     def gather(self, state: SimulationState) -> None:
         """Writes the simulations' rows of the state."""
-        place, layout, qpos, qvel = self.place, self.layout, self._qpos, self._qvel
+        place, layout, qpos, qvel = self.place, self.layout, self.qpos, self.qvel
         state.base_position[place] = qpos[:, :3]
         state.base_quaternion[place] = qpos[:, 3:7]
         state.base_rotation[place] = self._body_rotation[:, layout.base].reshape(-1, 3, 3)
@@ -202,7 +194,7 @@ class World:
         state.foot_velocity[place] = spatial[..., 3:] + rotations.cross(spatial[..., :3], sole - com[:, None])
         force = self._external[:, layout.feet, 3:]
         state.foot_force[place] = force
-        state.foot_contact[place] = force[:, :, 2] > self._physics.contact_force
+        state.foot_contact[place] = force[:, :, 2] > self.physics.contact_force
         velocity = self._robot_velocity()
         if layout.object is None:
             state.system_velocity[place] = velocity
@@ -212,10 +204,10 @@ class World:
     def _robot_velocity(self) -> Array:
         """Velocity of the robot's centre of mass, (n, 3) [m/s]: momentum, in the first rows of M qvel, by mass."""
         momentum = self._inertia.take(self.layout.momentum, axis=1)
-        momentum *= self._qvel[:, None, self.layout.momentum_speeds]
+        momentum *= self.qvel[:, None, self.layout.momentum_speeds]
         velocity = momentum.sum(axis=2)
         velocity /= self.robot_mass[:, None]
-        velocity += self._qvel[:, BASE_LINEAR]
+        velocity += self.qvel[:, BASE_LINEAR]
         moved: Array = velocity
         return moved
 
@@ -244,19 +236,6 @@ class World:
         """Positions of the grips of one simulation, (2, 3) [m]."""
         hands: Array = self._sites[index, self.layout.grips].copy()
         return hands
-
-    def look(self, index: int) -> tuple[Any, Any]:
-        """The model for the eye, made at the first call, and new data in the state of a simulation."""
-        if self._look is None:
-            self._look = look_model(self._robot, self._physics, self.scene)
-        data = mujoco.MjData(self._look)
-        data.qpos[:], data.qvel[:] = self._qpos[index], self._qvel[index]
-        if self.layout.object_geom is not None:
-            self._look.geom("object").size[:] = self.fields.half_size(np.array([index]))[0]
-        mujoco.mj_kinematics(self._look, data)
-        mujoco.mj_comPos(self._look, data)
-        mujoco.mj_camlight(self._look, data)
-        return self._look, data
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""

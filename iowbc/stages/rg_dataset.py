@@ -23,7 +23,6 @@ def run(job: Job) -> None:
     from iowbc.reference.pictures.postures import draw_strip
     from iowbc.reference.region import measure_region
     from iowbc.robot.description import load_robot
-    from iowbc.sim.rendering.backend import context
 
     recipe, seed = job.recipe.rg, job.recipe.seed
     robot = load_robot(job.robot)
@@ -98,7 +97,7 @@ def run(job: Job) -> None:
     figures.mkdir(exist_ok=True)
     dataset_figures(figures, plan, dataset, region, rejected, check)
     try:
-        draw_strip(figures / "postures.png", robot, recipe, plan, context)
+        draw_strip(figures / "postures.png", robot, recipe, plan)
     except NoRenderer as error:
         job.report.say(f"no picture of postures: {error}")
     if check is not None and check.metrics["crosscheck_p90"] > recipe.crosscheck.p90_limit:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
+from iowbc.arrays import Keys, as_slice
 from iowbc.control import gait
 from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE
 from iowbc.control.observation import FullLayout, Sensed, observation_layout, observe, privileged_layout
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
-from iowbc.sim.model_index import as_slice
 from iowbc.sim.simulation import Simulation
 from iowbc.task.commands.commander import Commander
 from iowbc.task.curriculum import Difficulty, difficulty, initial_level, next_level
@@ -26,7 +26,6 @@ from iowbc.task.privileged import privileged
 from iowbc.task.record.recorder import Ending, count_endings, count_step, write_signals
 from iowbc.task.rewards.total import RewardFunction, Scored, Step
 from iowbc.task.vector.shared import Buffers
-from iowbc.task.vector.snapshots import by_scene, by_world
 
 Array = NDArray[Any]
 Indices = NDArray[np.intp]
@@ -271,7 +270,7 @@ class Batch:
         memory.object_place[which] = 0.0
         memory.object_place[which] = (moved.object_offset - self._object_place())[which] * self._held[which, None]
 
-    def _time_limits(self, which: Indices, key: random.Keys) -> NDArray[np.int64]:
+    def _time_limits(self, which: Indices, key: Keys) -> NDArray[np.int64]:
         """Time limits of new episodes, (k,) [control steps]."""
         low, high = self.recipe.task.episode_duration
         seconds = low + (high - low) * random.uniform(key, "episode/duration", 1)[:, 0]
@@ -345,7 +344,7 @@ class Batch:
         }
         saved = {f"task/{name}": values.copy() for name, values in own.items()}
         saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.arrays.items()}
-        return saved | by_scene(self.simulation.snapshot(), list(dict.fromkeys(self.scenes.tolist())))
+        return saved | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`: the environments then take bit for bit the same course."""
@@ -355,7 +354,7 @@ class Batch:
         for name, values in self.buffers.arrays.items():
             values[:] = saved[f"buffer/{name}"]
         self.simulation.reseed(self._key)
-        self.simulation.restore(by_world(saved, list(dict.fromkeys(self.scenes.tolist()))))
+        self.simulation.restore(saved)
 
 
 def fixed_values(episodes: Sequence[Episode]) -> dict[str, Array]:

@@ -28,11 +28,11 @@ def test_the_camera_follows_the_robot(start, monkeypatch):
     monkeypatch.setattr(look, "installed_meshes", lambda robot: iter(()))
     simulation = start(Recipe(), ["free"])
     with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
-        before = renderer._camera.lookat.copy()
+        before = renderer.camera.lookat.copy()
         simulation.state.base_position[0, 0] += 10.0
         for _ in range(60):
             renderer.frame()
-        assert renderer._camera.lookat[0] > before[0] + 9.0
+        assert renderer.camera.lookat[0] > before[0] + 9.0
 
 
 def test_forces_are_drawn_as_arrows(start, monkeypatch):
@@ -58,7 +58,9 @@ def test_the_object_is_handed_over_without_an_arrow_of_a_disturbance(start, calm
 
 
 def _arrows(renderer, colour):
-    colours = np.array([renderer._scene.geoms[index].rgba for index in range(renderer._scene.ngeom)])
+    colours = np.array(
+        [renderer._offscreen.scene.geoms[index].rgba for index in range(renderer._offscreen.scene.ngeom)]
+    )
     return int(np.sum(np.all(np.isclose(colours, colour), axis=1)))
 
 

@@ -8,7 +8,7 @@ from iowbc.recipe.section import Section
 
 
 class Distribution(Section):
-    """x ~ U(low, high), or its logarithm uniform, or normal with 95 % in [low, high]; or else the nominal value."""
+    """x ~ U(low, high), or its logarithm uniform; or else the nominal value."""
 
     low: float
     """Lower end of the range."""
@@ -16,8 +16,8 @@ class Distribution(Section):
     """Upper end of the range."""
     nominal: float
     """Value where the entry is disabled or not drawn."""
-    shape: Literal["uniform", "log-uniform", "normal"] = "uniform"
-    """Uniform between the ends, uniform in the logarithm, or normal around the middle, cut off at the ends."""
+    shape: Literal["uniform", "log-uniform"] = "uniform"
+    """Uniform between the ends, or uniform in the logarithm."""
     probability: float = Field(default=1.0, ge=0.0, le=1.0)
     """Chance that a value is drawn; otherwise it is the nominal one."""
     enabled: bool = True

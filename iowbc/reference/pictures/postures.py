@@ -1,6 +1,5 @@
 """A picture of rendered postures over height and torso pitch: what the robot can hold."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,6 @@ import mujoco
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
@@ -18,8 +16,7 @@ from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
-
-Array = NDArray[Any]
+from iowbc.sim.rendering.offscreen import Image, Offscreen
 
 HEIGHTS, PITCHES = 4, 7
 """Postures down and across."""
@@ -27,16 +24,12 @@ SIZE = 260
 """Edge of a rendered posture [pixel]."""
 AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.9, (0.1, 0.0, 0.58)
 """Camera [degree, degree, m, m]."""
-SHAPES = 1000
-"""Room for shapes in a scene."""
 EMPTY = 235
 """Grey of a command without a label."""
 
 
-def draw_strip(
-    path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan, context: Callable[[int, int], Any]
-) -> None:
-    """Labels a small grid by the static method and draws it in the OpenGL context that `context(width, height)` makes.
+def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: SamplePlan) -> None:
+    """Labels a small grid by the static method and draws it. Raises NoRenderer where nothing can be drawn.
 
     The arms are in the default posture, or keep the wrists ahead of the pelvis where that one has no label.
     """
@@ -44,7 +37,7 @@ def draw_strip(
     method, judge = make_method("static", support, recipe), Judge(support, recipe.gates, recipe.height)
     heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
     columns = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
-    studio = _Studio(robot, context)
+    studio = _Studio(robot)
     try:
         figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
         FigureCanvasAgg(figure)
@@ -71,25 +64,21 @@ def draw_strip(
                     axis.text(0.5, 0.5, reason, ha="center", va="center", transform=axis.transAxes, fontsize=8)
         figure.savefig(path, dpi=110)
     finally:
-        studio.close()
+        studio.offscreen.close()
 
 
 class _Studio:
     """The robot on a plain floor, drawn off screen."""
 
-    def __init__(self, robot: Robot, context: Callable[[int, int], Any]) -> None:
-        self.robot = robot
-        self._gl = context(SIZE, SIZE)
-        self.model = _scene(robot)
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.model = robot, _scene(robot)
         self.data = mujoco.MjData(self.model)
-        self._pictures = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._pictures)
-        self._scene = mujoco.MjvScene(self.model, SHAPES)
-        self._camera = mujoco.MjvCamera()
-        self._camera.azimuth, self._camera.elevation, self._camera.distance = AZIMUTH, ELEVATION, DISTANCE
-        self._camera.lookat[:] = LOOK_AT
+        self.offscreen = Offscreen(
+            self.model, width=SIZE, height=SIZE, distance=DISTANCE, azimuth=AZIMUTH, elevation=ELEVATION
+        )
+        self.offscreen.camera.lookat[:] = LOOK_AT
 
-    def picture(self, sample: Sample, posture: Posture) -> Array:
+    def picture(self, sample: Sample, posture: Posture) -> Image:
         """The posture as an image, shape (SIZE, SIZE, 3)."""
         robot, data = self.robot, self.data
         data.qpos[:3] = posture.configuration[:3]
@@ -98,20 +87,7 @@ class _Studio:
         data.qpos[7 + robot.interaction] = sample.arm
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_camlight(self.model, data)
-        everything = mujoco.mjtCatBit.mjCAT_ALL.value
-        mujoco.mjv_updateScene(
-            self.model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), self._camera, everything, self._scene
-        )
-        frame = mujoco.MjrRect(0, 0, SIZE, SIZE)
-        image = np.empty((SIZE, SIZE, 3), dtype=np.uint8)
-        mujoco.mjr_render(frame, self._scene, self._pictures)
-        mujoco.mjr_readPixels(image, None, frame, self._pictures)
-        return image[::-1]
-
-    def close(self) -> None:
-        """Frees the pictures and the context."""
-        self._pictures.free()
-        self._gl.free()
+        return self.offscreen.draw(data)
 
 
 def _scene(robot: Robot) -> Any:

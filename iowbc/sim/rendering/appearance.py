@@ -14,6 +14,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
+from iowbc.sim.simulation import Simulation
 
 LIGHT_PARTS = (0.80, 0.81, 0.83, 1.0)
 DARK_PARTS = (0.16, 0.17, 0.19, 1.0)
@@ -33,9 +34,30 @@ class Mesh:
     """Origin of the mesh in the body's frame [m]."""
 
 
-def look_model(robot: Robot, physics: Physics, scene: Scene) -> Any:
+class Appearance:
+    """One environment of a simulation for the eye: a model with looks, and data that follow its state."""
+
+    def __init__(self, simulation: Simulation, env: int) -> None:
+        self._world, self._index = simulation.world_of(env)
+        self.model = dressed_model(simulation.robot, self._world.physics, self._world.scene)
+        self.data = mujoco.MjData(self.model)
+        self.update()
+
+    def update(self) -> Any:
+        """The data in the environment's present state: positions of bodies, cameras and lights."""
+        world, index, data = self._world, self._index, self.data
+        data.qpos[:], data.qvel[:] = world.qpos[index], world.qvel[index]
+        if world.layout.object_geom is not None:
+            self.model.geom("object").size[:] = world.fields.half_size(np.array([index]))[0]
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_comPos(self.model, data)
+        mujoco.mj_camlight(self.model, data)
+        return data
+
+
+def dressed_model(robot: Robot, physics: Physics, scene: Scene) -> Any:
     """Compiled model with the same positions and velocities as the stepped one, and looks."""
-    spec = scene_spec(robot, physics, scene, look=True)
+    spec = scene_spec(robot, physics, scene, dressed=True)
     _dress(spec)
     meshes = list(installed_meshes(robot))
     if meshes:

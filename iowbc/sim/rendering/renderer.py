@@ -1,18 +1,15 @@
 """Pictures of an environment: a camera that follows the robot, and arrows for the forces."""
 
-import weakref
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.sim.rendering.backend import context
+from iowbc.arrays import Array
+from iowbc.sim.rendering.appearance import Appearance
+from iowbc.sim.rendering.offscreen import Image, Offscreen
 from iowbc.sim.simulation import Simulation
-
-Array = NDArray[Any]
-Image = NDArray[np.uint8]
 
 METRES_PER_NEWTON = 0.004
 ARROW_RADIUS = 0.016
@@ -22,8 +19,6 @@ PARTNER, PUSH, GRIP, GROUND = (0.1, 0.6, 0.25, 1), (0.85, 0.1, 0.1, 1), (0.95, 0
 """Colours of forces: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet."""
 BESIDE = 0.09
 """Forces on hands and feet are drawn this far outside of them, where the limbs do not hide them [m]."""
-MARGIN = 200
-"""Room for arrows among the things to draw."""
 
 
 class SceneRenderer:
@@ -43,36 +38,23 @@ class SceneRenderer:
     ) -> None:
         """`distance` [m], `azimuth` (of the view, from the world's x axis), `elevation` [degrees] of the camera."""
         self._simulation, self._env, self._forces = simulation, env, forces
-        self._model, self._data = simulation.render_model(env)
-        most = self._model.vis.global_.offwidth, self._model.vis.global_.offheight
-        if width > most[0] or height > most[1]:
-            raise ValueError(f"a picture of {width} x {height} pixels is larger than {most[0]} x {most[1]}")
-        self._context = context(width, height)
-        self._finalizer = weakref.finalize(self, self._context.free)
-        self._pictures = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._pictures)
-        self._scene = mujoco.MjvScene(self._model, self._model.ngeom + MARGIN)
-        self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
-        self._option.geomgroup[3:] = 0
-        self._camera.distance, self._camera.azimuth, self._camera.elevation = distance, azimuth, elevation
-        self._camera.lookat[:] = self._aim()
-        self._area = mujoco.MjrRect(0, 0, width, height)
-        self._image = np.zeros((height, width, 3), np.uint8)
+        self._appearance = Appearance(simulation, env)
+        self._offscreen = Offscreen(
+            self._appearance.model,
+            width=width,
+            height=height,
+            distance=distance,
+            azimuth=azimuth,
+            elevation=elevation,
+        )
+        self.camera = self._offscreen.camera
+        self.camera.lookat[:] = self._aim()
 
     def frame(self) -> Image:
         """The environment as it is now, (height, width, 3)."""
-        self._model, self._data = self._simulation.render_model(self._env)
-        follow = 0.1 * (self._aim() - self._camera.lookat)
-        self._camera.lookat[:] += follow
-        self._context.make_current()
-        mujoco.mjv_updateScene(
-            self._model, self._data, self._option, None, self._camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene
-        )
-        if self._forces:
-            self._draw_forces()
-        mujoco.mjr_render(self._area, self._scene, self._pictures)
-        mujoco.mjr_readPixels(self._image, None, self._area, self._pictures)
-        return self._image[::-1].copy()
+        data = self._appearance.update()
+        self.camera.lookat[:] += 0.1 * (self._aim() - self.camera.lookat)
+        return self._offscreen.draw(data, self._draw_forces if self._forces else lambda: None)
 
     def _aim(self) -> Array:
         """Between the ground and the pelvis, on the side of the object."""
@@ -97,18 +79,18 @@ class SceneRenderer:
             self._arrow(state.foot_position[env, foot] + outward[foot], state.foot_force[env, foot], GROUND)
 
     def _arrow(self, start: Array, force: Array, colour: tuple[float, ...]) -> None:
-        if np.linalg.norm(force) < SMALLEST_FORCE or self._scene.ngeom >= self._scene.maxgeom:
+        scene = self._offscreen.scene
+        if np.linalg.norm(force) < SMALLEST_FORCE or scene.ngeom >= scene.maxgeom:
             return
-        geom = self._scene.geoms[self._scene.ngeom]
+        geom = scene.geoms[scene.ngeom]
         arrow = mujoco.mjtGeom.mjGEOM_ARROW.value
         mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32))
         mujoco.mjv_connector(geom, arrow, ARROW_RADIUS, start, start + METRES_PER_NEWTON * force)
-        self._scene.ngeom += 1
+        scene.ngeom += 1
 
     def close(self) -> None:
         """Frees the graphics memory."""
-        self._pictures.free()
-        self._finalizer()
+        self._offscreen.close()
 
     def __enter__(self) -> Self:
         return self

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
+from iowbc.arrays import Keys
 from iowbc.control.command import COMMAND, VELOCITY, approach, rate_limits
 from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.task.task import Task
@@ -40,7 +41,7 @@ class Commander:
         self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
         self._times, self._values = _knots(scripts)
 
-    def start(self, which: Indices, memory: Memory, key: random.Keys) -> None:
+    def start(self, which: Indices, memory: Memory, key: Keys) -> None:
         """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
         or with an object in the hands on the way to it."""
         memory.draws[which] = 0
@@ -53,7 +54,7 @@ class Commander:
             command[scripted] = memory.goal[which[scripted]]
         memory.command[which] = self._references.clamp(command)
 
-    def advance(self, memory: Memory, key: random.Keys) -> None:
+    def advance(self, memory: Memory, key: Keys) -> None:
         """Goals and commands of the next control step; `key` of the episodes, (n,)."""
         due = np.flatnonzero((memory.steps >= memory.goal_until) & self._drawn)
         if len(due):
@@ -62,7 +63,7 @@ class Commander:
             memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
         memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
 
-    def _draw(self, which: Indices, memory: Memory, key: random.Keys) -> None:
+    def _draw(self, which: Indices, memory: Memory, key: Keys) -> None:
         drawn = random.absorb(key, memory.draws[which])
         hardness = difficulty(self._curriculum, memory.level[which])
         memory.goal[which] = draw_goals(self._commands, drawn, hardness)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
+from iowbc.arrays import Keys
 from iowbc.control.command import COMMAND, HEIGHT, PITCH
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.curriculum import Difficulty
@@ -20,7 +21,7 @@ def nominal_command(commands: Commands) -> Array:
     return command
 
 
-def draw_goals(commands: Commands, key: random.Keys, difficulty: Difficulty) -> Array:
+def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty) -> Array:
     """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty."""
     goals = np.empty((len(key), len(COMMAND)))
     goals[:, :3] = _velocities(commands, key, difficulty)
@@ -28,14 +29,14 @@ def draw_goals(commands: Commands, key: random.Keys, difficulty: Difficulty) -> 
     return goals
 
 
-def draw_holding_time(commands: Commands, key: random.Keys) -> Array:
+def draw_holding_time(commands: Commands, key: Keys) -> Array:
     """Time until the next goal, t ~ U(resampling), (n,) [s]."""
     low, high = commands.resampling
     held: Array = low + (high - low) * random.uniform(key, "command/time", 1)[:, 0]
     return held
 
 
-def _velocities(commands: Commands, key: random.Keys, difficulty: Difficulty) -> Array:
+def _velocities(commands: Commands, key: Keys, difficulty: Difficulty) -> Array:
     """v_x, v_y, ω ~ U(range)·scale; a share stands, a share walks straight, short velocities are lengthened."""
     u = random.uniform(key, "command/velocity", 5)
     low, high = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate]).T
@@ -49,7 +50,7 @@ def _velocities(commands: Commands, key: random.Keys, difficulty: Difficulty) ->
     return moving
 
 
-def _posture(commands: Commands, key: random.Keys, scale: Array) -> Array:
+def _posture(commands: Commands, key: Keys, scale: Array) -> Array:
     """H, α ~ U(range) and Δp = shared + single offsets, drawn in towards the nominal posture by `scale`; (n, 8)."""
     u = random.uniform(key, "command/posture", 2 + 3 + 6 + 1)
     low, high = np.array([commands.height, commands.pitch]).T

@@ -1,9 +1,9 @@
-"""Where things lie in a compiled model."""
+"""Indices as slices."""
 
 import numpy as np
 import pytest
 
-from iowbc.sim.model_index import as_slice
+from iowbc.arrays import as_slice
 
 
 @pytest.mark.parametrize("indices", [[4], [3, 4, 5], [2, 9], [1, 4, 7]])

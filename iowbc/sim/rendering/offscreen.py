@@ -1,0 +1,64 @@
+"""Draws a model into an image, without a screen."""
+
+import weakref
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.sim.rendering.backend import context
+
+Image = NDArray[np.uint8]
+
+MARGIN = 200
+"""Room for arrows among the things to draw."""
+
+
+class Offscreen:
+    """Images of one size of a model. Use as a context manager, or `close` it."""
+
+    def __init__(
+        self, model: Any, *, width: int, height: int, distance: float, azimuth: float, elevation: float
+    ) -> None:
+        """`distance` [m], `azimuth` (of the view, from the world's x axis), `elevation` [degrees] of the camera."""
+        most = model.vis.global_.offwidth, model.vis.global_.offheight
+        if width > most[0] or height > most[1]:
+            raise ValueError(f"a picture of {width} x {height} pixels is larger than {most[0]} x {most[1]}")
+        self._model = model
+        self._context = context(width, height)
+        self._finalizer = weakref.finalize(self, self._context.free)
+        self._pictures = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._pictures)
+        self.scene = mujoco.MjvScene(model, model.ngeom + MARGIN)
+        self._option, self.camera = mujoco.MjvOption(), mujoco.MjvCamera()
+        self._option.geomgroup[3:] = 0
+        self.camera.distance, self.camera.azimuth, self.camera.elevation = distance, azimuth, elevation
+        self._area = mujoco.MjrRect(0, 0, width, height)
+        self._image = np.zeros((height, width, 3), np.uint8)
+
+    def draw(self, data: Any, add: Callable[[], None] = lambda: None) -> Image:
+        """The model in the state of `data`, (height, width, 3); `add` puts more into the scene before it is drawn."""
+        self._context.make_current()
+        mujoco.mjv_updateScene(
+            self._model, data, self._option, None, self.camera, mujoco.mjtCatBit.mjCAT_ALL.value, self.scene
+        )
+        add()
+        mujoco.mjr_render(self._area, self.scene, self._pictures)
+        mujoco.mjr_readPixels(self._image, None, self._area, self._pictures)
+        return self._image[::-1].copy()
+
+    def close(self) -> None:
+        """Frees the graphics memory."""
+        self._pictures.free()
+        self._finalizer()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
