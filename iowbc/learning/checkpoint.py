@@ -1,6 +1,5 @@
 """One atomic file with everything that a resumed training needs, bound to the stage's key."""
 
-import json
 import os
 import zlib
 from collections.abc import Callable, Mapping
@@ -14,18 +13,16 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 from torch import nn
 
+from iowbc.errors import Damaged
+
 Arrays = dict[str, NDArray[Any]]
 
 
-class _Damaged(Exception):
-    """A checkpoint's file that cannot be read, or does not hold what was written."""
-
-
-def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
+def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Replace the checkpoint at `path` and keep the one before beside it; a crash at any moment leaves one of them."""
     fresh = path.with_suffix(".fresh")
     contiguous = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
-    save_file(contiguous, fresh, metadata={"key": key, "state": json.dumps(state), "crc32": _checksum(contiguous)})
+    save_file(contiguous, fresh, metadata={"key": key, "crc32": _checksum(contiguous)})
     with fresh.open("rb") as file:
         os.fsync(file.fileno())
     if path.is_file():
@@ -38,8 +35,8 @@ def previous_checkpoint(path: Path) -> Path:
     return path.with_suffix(".previous")
 
 
-def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> tuple[Arrays, dict[str, Any]] | None:
-    """Arrays and state of the newest whole checkpoint of this key, or None; `say` is told of damaged ones.
+def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> Arrays | None:
+    """Arrays of the newest whole checkpoint of this key, or None; `say` is told of damaged ones.
 
     They are put aside as `<name>.damaged`, lest the next save keeps one of them as the previous checkpoint.
     """
@@ -47,7 +44,7 @@ def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> tuple[A
     for candidate in (path, previous_checkpoint(path)):
         try:
             found = _read(candidate, key)
-        except _Damaged:
+        except Damaged:
             damaged.append(candidate.name)
             os.replace(candidate, candidate.with_name(f"{candidate.name}.damaged"))
         if found is not None:
@@ -59,8 +56,8 @@ def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> tuple[A
     return found
 
 
-def _read(path: Path, key: str) -> tuple[Arrays, dict[str, Any]] | None:
-    """One file's arrays and state; None where there is none or it belongs to another key. Raises _Damaged."""
+def _read(path: Path, key: str) -> Arrays | None:
+    """One file's arrays; None where there is none or it belongs to another key. Raises Damaged."""
     if not path.is_file():
         return None
     try:
@@ -69,12 +66,11 @@ def _read(path: Path, key: str) -> tuple[Arrays, dict[str, Any]] | None:
             if metadata["key"] != key:
                 return None
             arrays: Arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-            state = json.loads(metadata["state"])
     except (OSError, SafetensorError, KeyError, ValueError) as reason:
-        raise _Damaged(path) from reason
+        raise Damaged(f"{path} is not readable: {reason}") from reason
     if metadata.get("crc32") not in (None, _checksum(arrays)):
-        raise _Damaged(path)
-    return arrays, state
+        raise Damaged(f"{path} differs from its checksum")
+    return arrays
 
 
 def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:

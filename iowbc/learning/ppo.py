@@ -1,6 +1,6 @@
 """PPO of stable-baselines3 as the recipe sets it up, its complete state, and the network it leaves behind."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,6 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import RolloutBuffer
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
@@ -91,30 +90,6 @@ def set_learning_rate(model: PPO, rate: float) -> None:
     """Use a step size from the next update on."""
     model.learning_rate = rate
     model._setup_lr_schedule()
-
-
-class AfterUpdate(BaseCallback):  # type: ignore[misc]
-    """Calls `do` with the training's own figures after every update, at the boundary between two rollouts."""
-
-    def __init__(self, do: Callable[[dict[str, float]], None]) -> None:
-        super().__init__()
-        self.do = do
-        self.updates = 0
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_start(self) -> None:
-        if self.updates:
-            self._report()
-        self.updates += 1
-
-    def _on_training_end(self) -> None:
-        self._report()
-
-    def _report(self) -> None:
-        values = self.model.logger.name_to_value
-        self.do({name: float(value) for name, value in values.items() if name.startswith("train/")})
 
 
 def ppo_arrays(model: PPO, env: VecNormalize) -> checkpoint.Arrays:

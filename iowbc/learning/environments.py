@@ -1,0 +1,32 @@
+"""What the learners ask of the environments."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Environments(Protocol):
+    """A stable-baselines3 vector environment that can be stopped and continued; `VectorEnv` of the task is one."""
+
+    num_envs: int
+    observation_space: Any
+    action_space: Any
+
+    def reset(self) -> NDArray[np.float32]:
+        """Observations, (num_envs, size), at the beginning of an episode everywhere."""
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Observations, rewards, dones and infos of a control step."""
+
+    def statistics(self) -> dict[str, float]:
+        """Figures since the last call."""
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything that the future depends on."""
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `state`."""

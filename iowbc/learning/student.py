@@ -1,0 +1,148 @@
+"""The student's training, one round of DAgger at a time: it drives, the teacher says what it would have done."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from iowbc.learning import checkpoint
+from iowbc.learning.acting import TeacherPolicy
+from iowbc.learning.distillation import Experience, gradient_step, mirror_half, spread
+from iowbc.learning.environments import Environments
+from iowbc.learning.history import History
+from iowbc.learning.networks import StudentNetwork, TeacherNetwork
+from iowbc.learning.ppo import Mirrors
+from iowbc.recipe.distillation import Distillation
+
+
+class StudentTraining:
+    """On-policy distillation. Between two rounds `arrays` holds all that the rest of it depends on."""
+
+    def __init__(
+        self,
+        settings: Distillation,
+        environments: Environments,
+        teacher: TeacherNetwork,
+        places: tuple[slice, slice],
+        mirrors: Mirrors | None,
+        seed: int,
+    ) -> None:
+        """`places`: of s_t and of s_priv in a row; `mirrors`: of s_t and the action, to learn from mirror images, too.
+
+        Observations are normalised as the teacher's are.
+        """
+        torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
+        self.settings, self.environments, self.mirrors = settings, environments, mirrors
+        self.teacher = TeacherPolicy(teacher)
+        self.seen, self.privileged = places
+        size, actions = self.seen.stop, environments.action_space.shape[0]
+        self.architecture: dict[str, Any] = {
+            "observation": size,
+            "history": settings.history,
+            "actions": actions,
+            "frame_features": settings.frame_features,
+            "latent": settings.latent,
+            "hidden": list(settings.hidden),
+            "activation": settings.activation,
+            "clip": teacher.normalizer.clip,
+        }
+        self.network = StudentNetwork(**self.architecture)
+        self.network.normalizer.mean.copy_(teacher.normalizer.mean[self.seen])
+        self.network.normalizer.std.copy_(teacher.normalizer.std[self.seen])
+        self.std = torch.clamp(teacher.log_std.exp(), min=settings.std_floor)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
+        self.random = np.random.default_rng(seed)
+        self.experience = Experience(settings.buffer, settings.environments, size, actions, settings.history)
+        self.history = History(settings.environments, settings.history, size)
+        self.starts = np.ones(settings.environments, np.bool_)
+        self.observation: NDArray[np.float32] | None = None
+        self.teacher_drives = spread(settings.environments)
+        self.rounds = 0
+
+    @property
+    def steps(self) -> int:
+        """Environment steps made so far."""
+        return self.rounds * self._steps_a_round
+
+    @property
+    def planned(self) -> int:
+        """Environment steps after which the training is done, in whole rounds."""
+        return self._planned_rounds * self._steps_a_round
+
+    @property
+    def _steps_a_round(self) -> int:
+        return self.settings.environments * self.settings.rollout
+
+    @property
+    def _planned_rounds(self) -> int:
+        return -(-self.settings.steps // self._steps_a_round)
+
+    def update(self) -> dict[str, float]:
+        """One round: a rollout and its gradient steps; returns the figures of both."""
+        settings, progress = self.settings, self.rounds / self._planned_rounds
+        share = max(0.0, 1.0 - progress / settings.teacher_share) if settings.teacher_share else 0.0
+        error, target_square = self._rollout(share)
+        for group in self.optimizer.param_groups:
+            group["lr"] = settings.learning_rate * (0.1 + 0.9 * 0.5 * (1 + np.cos(np.pi * progress)))
+        losses = [self._gradient_step() for _ in range(settings.gradient_steps)]
+        self.rounds += 1
+        return {
+            "kl": float(np.mean(losses)),
+            "action_rmse": float(np.sqrt(error)),
+            "action_agreement": float(1 - error / target_square),
+            "teacher_share": share,
+            **self.environments.statistics(),
+        }
+
+    def _rollout(self, teacher_share: float) -> tuple[np.floating[Any], np.floating[Any]]:
+        """Lets the student drive, the teacher in its share; mean squares of student's error and teacher's action."""
+        if self.observation is None:
+            self.observation = self.environments.reset()
+        errors, squares = [], []
+        for _ in range(self.settings.rollout):
+            frame = self.observation[:, self.seen]
+            target = self.teacher.act(frame, self.observation[:, self.privileged])
+            frames = self.history.push(frame, self.starts)
+            with torch.inference_mode():
+                action = self.network(torch.from_numpy(frames)).numpy()
+            self.experience.add(frame, target, self.starts)
+            errors.append(np.mean((action - target) ** 2))
+            squares.append(np.mean(target**2))
+            driven = np.where((self.teacher_drives < teacher_share)[:, None], target, action)
+            self.observation, _, self.starts, _ = self.environments.step(driven)
+        return np.mean(errors), np.mean(squares)
+
+    def _gradient_step(self) -> float:
+        histories, targets = self.experience.sample(self.settings.batch, self.random)
+        if self.mirrors is not None:
+            mirror_half(histories, targets, *self.mirrors, self.random)
+        return gradient_step(self.network, self.optimizer, histories, targets, self.std, self.settings.gradient_norm)
+
+    def arrays(self) -> checkpoint.Arrays:
+        """Everything that a resumed training needs, between two rounds."""
+        assert self.observation is not None
+        return {
+            **checkpoint.prefixed("student", checkpoint.module_arrays(self.network)),
+            **checkpoint.prefixed("optimizer", checkpoint.optimizer_arrays(self.optimizer)),
+            **checkpoint.prefixed("experience", self.experience.arrays()),
+            **checkpoint.prefixed("environment", self.environments.state()),
+            "history": self.history.frames,
+            "starts": self.starts,
+            "observation": self.observation,
+            "rounds": np.array([self.rounds]),
+            "random": np.frombuffer(json.dumps(self.random.bit_generator.state).encode(), np.uint8),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `arrays`, on a training made from the same recipe."""
+        checkpoint.restore_module(self.network, checkpoint.under("student", arrays))
+        checkpoint.restore_optimizer(self.optimizer, checkpoint.under("optimizer", arrays))
+        self.experience.restore(checkpoint.under("experience", arrays))
+        self.environments.restore(checkpoint.under("environment", arrays))
+        self.history.frames[:], self.starts[:] = arrays["history"], arrays["starts"]
+        self.observation = np.array(arrays["observation"])
+        self.rounds = int(arrays["rounds"][0])
+        self.random.bit_generator.state = json.loads(arrays["random"].tobytes())

@@ -1,0 +1,66 @@
+"""What the stages that train share: updates until the budget is spent, curves, checkpoints, stopping and going on."""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+from iowbc.errors import Interrupted
+from iowbc.pipeline.stage import Job
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from iowbc.learning.curves import Curves
+
+
+class Training(Protocol):
+    """A training that goes one update at a time."""
+
+    @property
+    def steps(self) -> int:
+        """Environment steps made so far."""
+
+    @property
+    def planned(self) -> int:
+        """Environment steps after which it is done."""
+
+    def update(self) -> dict[str, float]:
+        """One rollout and its gradient steps; returns their figures."""
+
+    def arrays(self) -> "dict[str, NDArray[Any]]":
+        """Everything that a resumed training needs."""
+
+    def restore(self, arrays: "Mapping[str, NDArray[Any]]") -> None:
+        """Inverse of `arrays`."""
+
+
+def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[Mapping[str, float]], str]) -> "Curves":
+    """Goes on from the job's checkpoint, if there is one, to the end of the training; returns its curves.
+
+    `checkpoint_every`: updates between two checkpoints; `note`: what to say beside the progress, from the figures of an
+    update. Raises Interrupted, with a checkpoint written, once the job is asked to stop.
+    """
+    from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
+    from iowbc.learning.curves import Curves
+
+    path = job.work / "checkpoint.safetensors"
+    found = load_checkpoint(path, job.key, job.report.say)
+    if found is not None:
+        training.restore(found)
+        job.report.say(f"resumed from its checkpoint at {training.steps:,} of {training.planned:,} steps")
+    curves = Curves(job.work / "curves.jsonl", training.steps)
+    updates = 0
+    while (before := training.steps) < training.planned:
+        began = time.monotonic()
+        values = training.update()
+        values["steps_per_second"] = (training.steps - before) / (time.monotonic() - began)
+        curves.append(training.steps, values)
+        job.report.metrics(values, training.steps)
+        job.report.progress(min(training.steps, training.planned), training.planned, note(values))
+        updates += 1
+        stop = job.interrupted()
+        if stop or updates % checkpoint_every == 0 or training.steps >= training.planned:
+            save_checkpoint(path, job.key, training.arrays())
+        if stop:
+            raise Interrupted(f"stopped at {training.steps:,} of {training.planned:,} steps, checkpoint written")
+    return curves

@@ -1,0 +1,55 @@
+"""The stages that train, whole: what they leave, and that stopping and going on changes nothing."""
+
+import json
+from pathlib import Path
+
+import pytest
+from safetensors.numpy import load_file
+from training_jobs import ENVIRONMENTS, job, rows, small_recipe, stopped_and_resumed
+
+from iowbc.learning.acting import load_policy
+from iowbc.stages import distill, teacher
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where a teacher and a student were trained without a break."""
+    place = tmp_path_factory.mktemp("trained")
+    teacher.STAGE.run(job(place / "teacher", small_recipe()))
+    distill.STAGE.run(job(place / "distill", small_recipe(), {"teacher": place / "teacher" / "out"}))
+    return place
+
+
+def test_a_teacher_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(trained: Path, tmp_path: Path) -> None:
+    resumed = stopped_and_resumed(teacher.STAGE, tmp_path, small_recipe())
+    assert resumed.report.lines == ["resumed from its checkpoint at 64 of 128 steps"]  # type: ignore[attr-defined]
+    for name in ("teacher.safetensors", "teacher.json"):
+        assert (tmp_path / "out" / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
+    assert rows(tmp_path / "work") == rows(trained / "teacher" / "work")
+
+
+def test_a_student_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(trained: Path, tmp_path: Path) -> None:
+    inputs = {"teacher": trained / "teacher" / "out"}
+    resumed = stopped_and_resumed(distill.STAGE, tmp_path, small_recipe(), inputs)
+    assert resumed.report.lines == ["resumed from its checkpoint at 32 of 64 steps"]  # type: ignore[attr-defined]
+    for name in ("student.safetensors", "student.json"):
+        assert (tmp_path / "out" / name).read_bytes() == (trained / "distill" / "out" / name).read_bytes(), name
+    assert rows(tmp_path / "work") == rows(trained / "distill" / "work")
+
+
+def test_both_stages_leave_a_policy_its_layout_and_its_curves(trained: Path) -> None:
+    for stage, network in (("teacher", "teacher"), ("distill", "student")):
+        out = trained / stage / "out"
+        load_policy(out)
+        assert load_file(out / f"{network}.safetensors")
+        about = json.loads((out / f"{network}.json").read_text())
+        assert about["layout"]
+        assert (out / "figures" / "learning_curves.png").is_file()
+        assert len((out / "tables" / "learning_curves.csv").read_text().splitlines()) == 3
+        assert (
+            json.loads((out / "summary.json").read_text())["metrics"]["step"]
+            == rows(trained / stage / "work")[-1]["step"]
+        )
+    curriculum = json.loads((trained / "teacher" / "out" / "teacher.json").read_text())["curriculum"]
+    assert sum(map(len, curriculum["levels"].values())) == ENVIRONMENTS
+    assert (trained / "teacher" / "out" / "teacher_sb3.zip").is_file()
