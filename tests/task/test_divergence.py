@@ -13,8 +13,8 @@ Make = Callable[..., VectorEnv]
 
 
 def plant_nan(env: VectorEnv, index: int) -> None:
-    world, place = env.batch.simulation._world_of(index)
-    world._qvel[place, 7] = np.nan
+    world, place = env.batch.simulation.world_of(index)
+    world.qvel[place, 7] = np.nan
 
 
 def test_a_nan_resets_that_environment_alone_and_is_counted(make: Make, tmp_path: Path) -> None:
