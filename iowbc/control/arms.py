@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from iowbc.control.chain import Chain, turn
 from iowbc.robot.description import Robot
+from iowbc.robot.mjcf import Body
 
 Array = NDArray[Any]
 
@@ -23,8 +24,17 @@ X, Y = 0, 1
 IDENTITY = np.eye(3)
 
 
+def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
+    """Bodies of both arms from the torso outward, and those from the base to the torso.
+
+    The torso is the body that moves: where its own is fixed to another, the frame is the other's.
+    """
+    torso = robot.tree.mover(robot.torso).name
+    return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
+
+
 class ArmKinematics:
-    """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left 7, right 7."""
+    """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left, then right."""
 
     def __init__(
         self,
@@ -36,7 +46,7 @@ class ArmKinematics:
     ) -> None:
         """`joint_speed`: bound on the references' speed [rad/s]; without it each joint's own limit."""
         names = [robot.joints[index] for index in robot.interaction]
-        chains = [robot.tree.chain(body, robot.torso) for body in robot.wrist_bodies]
+        chains, waist = arm_chains(robot)
         order = [names.index(body.hinge.name) for chain in chains for body in chain if body.hinge is not None]
         if order != list(range(len(names))):
             raise ValueError(f"{robot.folder}: the arm joints must be the left chain followed by the right one")
@@ -45,11 +55,11 @@ class ArmKinematics:
         own = robot.velocity_limit[robot.interaction]
         self.speed = own if joint_speed is None else np.minimum(own, joint_speed)
         self.damping, self.posture_gain = damping, posture_gain
-        self._chain, self._waist = Chain(chains), Chain([robot.tree.chain(robot.torso, robot.base)])
+        self._chain, self._waist = Chain(chains), Chain([waist])
         self._grip = robot.grip_offset.T[:, :, None]
 
     def forward(self, arm_position: Array) -> tuple[Array, Array]:
-        """Wrist positions (n, 2, 3) [m] in the torso frame and their Jacobian (n, 2, 3, 7), of arms (n, 14) [rad]."""
+        """Wrist positions (n, 2, 3) [m] in the torso frame, and their Jacobian (n, 2, 3, joints of an arm)."""
         count, joints = len(arm_position), self._chain.length
         vectors = np.empty((3, joints + 1, 2, count))
         vectors[:, joints] = self._grip
@@ -60,7 +70,7 @@ class ArmKinematics:
     def solve_step(self, arm_position: Array, target: Array, dt: float) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
-        `arm_position` (n, 14) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
+        `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
         next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to LONGEST;
         kept to the joint ranges and the joint speed.
         """
@@ -82,7 +92,7 @@ class ArmKinematics:
         return kept
 
     def solve(self, arm_position: Array, target: Array, *, steps: int = 60, dt: float = 0.1) -> Array:
-        """Repeats `solve_step`: postures (n, 14) whose wrists are at, or as near as they get to, `target` (n, 2, 3)."""
+        """Repeats `solve_step`: postures whose wrists are at, or as near as they get to, `target` (n, 2, 3)."""
         for _ in range(steps):
             arm_position = self.solve_step(arm_position, target, dt)
         return arm_position
@@ -100,7 +110,7 @@ class ArmKinematics:
     ) -> tuple[Array, Array]:
         """Rotation (n, 3, 3) and position (n, 3) [m] of the torso frame in the heading frame at the base.
 
-        `waist` (n, 3): yaw, roll, pitch positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
+        `waist` (n, waist joints): positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
         """
         vectors = np.zeros((3, 4, 1, len(waist)))
         for axis in range(3):

@@ -1,6 +1,20 @@
 """Chains of hinges, many rows at once: vectors fixed to the last body are carried inward, hinge by hinge, to the base.
 
-Rows are last in memory, so that NumPy's loops are long, and a turn about a coordinate axis mixes two components.
+Rows are last in memory, so that NumPy's loops are long, and a turn about a coordinate axis mixes two components. Ours,
+because pinocchio and MuJoCo take one posture at a time and are not on the robot's computer.
+
+An example: a forearm of 0.3 m that turns about y at the end of an upper arm of 0.2 m that turns about z. With both
+hinges at a quarter turn its end lies 0.3 m below the elbow, which lies 0.2 m to the left of the shoulder:
+
+    upper = Body("upper", None, position=(0, 0, 0), quaternion=(1, 0, 0, 0), hinge=Hinge(axis=(0, 0, 1), ...), ...)
+    lower = Body("lower", "upper", position=(0.2, 0, 0), quaternion=(1, 0, 0, 0), hinge=Hinge(axis=(0, 1, 0), ...), ...)
+    chain = Chain([[upper, lower]])                      # one chain
+    angle = np.full((2, 1, 1), np.pi / 2)                # hinges, chains, rows
+    vectors = np.zeros((3, 3, 1, 1))                     # xyz; two columns of the Jacobian and the point; chains; rows
+    vectors[:, 2, 0, 0] = (0.3, 0, 0)                    # the point in the forearm's frame
+    chain.carry(angle, vectors, columns=2)
+    vectors[:, 2, 0, 0]                                  # (0, 0.2, -0.3): the point in the base's frame
+    vectors[:, 0, 0, 0], vectors[:, 1, 0, 0]             # (-0.2, 0, 0), (0, -0.3, 0): its motion with each hinge
 """
 
 from collections.abc import Sequence
@@ -55,24 +69,25 @@ class Chain:
     """Equally long chains side by side, such as two arms."""
 
     def __init__(self, chains: Sequence[Sequence[Body]]) -> None:
-        """`chains`: their bodies from the base outward, each with a hinge."""
-        self.length = len(chains[0])
+        """`chains`: their bodies from the base outward. A body without a hinge is fixed to the one before it; the last
+        has one."""
+        links = [_links(chain) for chain in chains]
+        self.length = len(links[0])
         self._axis: list[int] = []
         self._sign = np.ones((self.length, len(chains), 1))
         self._offset = np.empty((self.length, 3, len(chains), 1))
         self._before: list[Array | None] = []
         self._after: list[Array | None] = []
         for j in range(self.length):
-            bodies = [chain[j] for chain in chains]
-            axes = np.stack([hinge_axis(body) for body in bodies])
-            fixed = np.stack([rotations.matrix(body.quaternion) for body in bodies])
+            axes = np.stack([link[j].axis for link in links])
+            fixed = np.stack([link[j].rotation for link in links])
             axis = int(np.argmax(np.abs(axes[0])))
             aside = np.stack([_turning_to(one, axis) for one in axes])
             if np.allclose(np.abs(axes), np.eye(3)[axis]):
                 self._sign[j, :, 0] = axes[:, axis]
                 aside[:] = np.eye(3)
             self._axis.append(axis)
-            self._offset[j, :, :, 0] = np.stack([body.position for body in bodies], axis=-1)
+            self._offset[j, :, :, 0] = np.stack([link[j].position for link in links], axis=-1)
             self._before.append(_unless_identity(np.swapaxes(aside, 1, 2)))
             self._after.append(_unless_identity(fixed @ aside))
         self._quarter = np.stack([-self._sign, self._sign], axis=1)
@@ -137,8 +152,24 @@ def _turning_to(direction: Array, axis: int) -> Array:
     return np.asarray(rotations.axis_matrix(between / sine, np.arctan2(sine, start @ direction)))
 
 
-def hinge_axis(body: Body) -> Array:
-    """Axis of a body's hinge, (3,). Raises ValueError where there is none."""
-    if body.hinge is None:
-        raise ValueError(f"body {body.name!r} lies on a joint chain but has no hinge")
-    return body.hinge.axis
+@dataclass(frozen=True)
+class _Link:
+    """A hinge and its place in the frame of the hinge before."""
+
+    axis: Array
+    position: Array
+    rotation: Array
+
+
+def _links(chain: Sequence[Body]) -> list[_Link]:
+    """The hinges of a chain. Raises ValueError where the last body has none."""
+    if chain and chain[-1].hinge is None:
+        raise ValueError(f"body {chain[-1].name!r} ends a joint chain but has no hinge; take the body it is fixed to")
+    links, position, rotation = [], np.zeros(3), np.eye(3)
+    for body in chain:
+        position = position + rotation @ body.position
+        rotation = rotation @ rotations.matrix(body.quaternion)
+        if body.hinge is not None:
+            links.append(_Link(body.hinge.axis, position, rotation))
+            position, rotation = np.zeros(3), np.eye(3)
+    return links

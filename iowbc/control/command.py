@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.recipe.task.commands import CommandRates
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import VECTOR_SIGN, MirrorMap
 
 Array = NDArray[np.floating[Any]]
 
@@ -23,6 +25,12 @@ YAW_RATE = 2
 HEIGHT = 3
 PITCH = 4
 OFFSET = slice(5, 11)
+
+
+def command_mirror(robot: Robot) -> MirrorMap:
+    """Mirror of the command, (11,): v_y, yaw rate and the y offsets change sign, the wrists change sides."""
+    permutation = np.array([0, 1, 2, 3, 4, 8, 9, 10, 5, 6, 7])
+    return MirrorMap(permutation, np.array([1.0, -1.0, -1.0, 1.0, 1.0, *VECTOR_SIGN, *VECTOR_SIGN]))
 
 
 def rate_limits(rates: CommandRates) -> Array:

@@ -1,21 +1,19 @@
 """The gait clock φ_t: when it runs, which foot should be on the ground, and the swing it adds to the reference."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import in_place
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
 
-SUPPORT_JOINTS = 15
-LEFT_LEG_PITCH = (0, 3, 4)
-"""Hip pitch, knee and ankle pitch among the support joints, left leg."""
-RIGHT_LEG_PITCH = (6, 9, 10)
-"""The same, right leg."""
+phase_mirror = in_place(-1.0, -1.0)
+"""Half a stride later: (sin, cos) of the phase change sign, and the zero of standing stays."""
 
 
 def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
@@ -61,22 +59,20 @@ def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
     return down
 
 
-def swing_prior(phase: Array, stepping: Mask, gait: GaitPrior) -> Array:
-    """What the gait prior adds to θ_S_ref, (n, 15) [rad]: amplitude · sin(π·progress); zero while the clock rests."""
-    if not gait.enabled:
-        return np.zeros((len(phase), SUPPORT_JOINTS))
-    bump = np.sin(np.pi * swing_progress(foot_phase(phase), gait.stance)) * stepping[:, None]
-    added: Array = bump @ _amplitudes(gait.hip_pitch, gait.knee, gait.ankle_pitch)
-    return added
-
-
-@cache
-def _amplitudes(hip_pitch: float, knee: float, ankle_pitch: float) -> Array:
-    """What the swing of each foot adds at most to each support joint, (2, 15) [rad]."""
-    amplitude = np.zeros((2, SUPPORT_JOINTS))
-    for foot, joints in enumerate((LEFT_LEG_PITCH, RIGHT_LEG_PITCH)):
-        amplitude[foot, joints] = hip_pitch, knee, ankle_pitch
+def swing_amplitude(robot: Robot, gait: GaitPrior) -> Array:
+    """What the swing of each foot adds at most to each support joint, (2, support joints) [rad]; zero when off."""
+    amplitude = np.zeros((2, len(robot.support)))
+    if gait.enabled:
+        for foot, joints in enumerate(robot.leg_pitch):
+            amplitude[foot, joints] = gait.hip_pitch, gait.knee, gait.ankle_pitch
     return amplitude
+
+
+def swing_prior(phase: Array, stepping: Mask, stance: float, amplitude: Array) -> Array:
+    """What the gait prior adds to θ_S_ref, (n, support joints) [rad]: amplitude · sin(π·progress); zero at rest."""
+    bump = np.sin(np.pi * swing_progress(foot_phase(phase), stance)) * stepping[:, None]
+    added: Array = bump @ amplitude
+    return added
 
 
 def phase_signal(phase: Array, stepping: Mask) -> Array:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.control.arms import arm_chains
 from iowbc.control.chain import Chain, Weights
 from iowbc.robot.description import GRAVITY, Robot
 
@@ -15,14 +16,13 @@ class ArmGravity:
     """Static torques of both arms, many robots at once. Holds constants only."""
 
     def __init__(self, robot: Robot) -> None:
-        chains = [robot.tree.chain(body, robot.torso) for body in robot.wrist_bodies]
-        self._arms, self._waist = Chain(chains), Chain([robot.tree.chain(robot.torso, robot.base)])
+        chains, waist = arm_chains(robot)
+        self._arms, self._waist = Chain(chains), Chain([waist])
         hinges = self._arms.length
         self._moment, self._mass = np.zeros((hinges, 3, 2, 1)), np.zeros((hinges, 2, 1))
         for side, chain in enumerate(chains):
-            for place, body in enumerate(chain):
-                last = place == hinges - 1
-                mass, moment = robot.tree.burden(body.name) if last else (body.mass, body.mass * body.centre)
+            for place, body in enumerate(body for body in chain if body.hinge is not None):
+                mass, moment = robot.tree.burden(body.name)
                 self._moment[place, :, side, 0] = moment
                 self._mass[: place + 1, side] += mass
         self._grip = robot.grip_offset.T[:, :, None]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.control import gait
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.recipe.task.joint_references import References
@@ -20,8 +21,6 @@ Array = NDArray[np.floating[Any]]
 SETTLING, REFINING = 0.3, 0.02
 """Time that an iteration of inverse kinematics stands for at the start [s]: the longer, the more it heeds the rest
 posture of the arms, and the less their targets."""
-WAIST = slice(12, 15)
-"""Waist yaw, roll and pitch among the support joints."""
 
 
 def both_wrists(left: tuple[float, float, float]) -> Array:
@@ -47,6 +46,8 @@ class ReferenceLayer:
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
+        self.waist, self._waist_pitch = robot.waist, robot.waist_pitch
+        self._stance, self._amplitude = references.gait.stance, gait.swing_amplitude(robot, references.gait)
 
     def clamp(self, command: Array) -> Array:
         """The command with height and torso pitch brought into the feasible map; (n, 11)."""
@@ -67,7 +68,8 @@ class ReferenceLayer:
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
         """References at the start of an episode, settled in the commanded posture.
 
-        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, 14), support (n, 15).
+        command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, arm joints),
+        support (n, support joints).
         """
         arms = np.tile(self.default_arms, (len(command), 1))
         target = self.wrist_target(self.support(arms, command), command, grasp)
@@ -84,16 +86,21 @@ class ReferenceLayer:
         return arms, self.support(arms, command)
 
     def support(self, arms: Array, command: Array) -> Array:
-        """θ_S_ref = φ_RG(θ_I_ref, σ_base), (n, 15) [rad], without the gait prior."""
+        """θ_S_ref = φ_RG(θ_I_ref, σ_base), (n, support joints) [rad], without the gait prior."""
         if self.network is None:
             return np.tile(self.default_support, (len(command), 1))
         base = np.zeros((len(command), len(self.network.inputs) - arms.shape[1]))
         base[:, :2] = command[:, HEIGHT : PITCH + 1]
         return self.network(arms, base)
 
+    def with_swing(self, support: Array, phase: Array, stepping: NDArray[np.bool_]) -> Array:
+        """θ_S_ref with what the gait prior adds to it, (n, support joints) [rad]."""
+        swung: Array = support + gait.swing_prior(phase, stepping, self._stance, self._amplitude)
+        return swung
+
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""
-        pitch: Array = command[:, PITCH] - support[:, WAIST.stop - 1]
+        pitch: Array = command[:, PITCH] - support[:, self._waist_pitch].sum(axis=1)
         return pitch
 
     def start_pitch(self, support: Array, command: Array) -> Array:
@@ -106,4 +113,4 @@ class ReferenceLayer:
         The torso stands where the references put it, not where it is measured: the arms do not answer to swaying.
         """
         wrists = grasp + command[:, OFFSET].reshape(-1, 2, 3)
-        return self.arms.into_torso(support[:, WAIST], self.pelvis_pitch(support, command), wrists)
+        return self.arms.into_torso(support[:, self.waist], self.pelvis_pitch(support, command), wrists)

@@ -37,11 +37,13 @@ class PortEntry(Section):
     meaning: str
 
 
-class Part(Section):
+class PartEntry(Section):
     """A part of the observation s_t, in order."""
 
     name: str
     size: int
+    unit: str
+    frame: str
 
 
 class Contract(Section):
@@ -89,7 +91,7 @@ class Contract(Section):
     """Bound of the action; already inside the graph."""
     history: int
     """Length K of the observation history."""
-    observation: tuple[Part, ...]
+    observation: tuple[PartEntry, ...]
     """Parts of s_t, in order; the graph builds it."""
     command: tuple[str, ...]
     """Entries of the command C, in order."""

@@ -17,6 +17,7 @@ from iowbc.control import gait
 from iowbc.control.command import COMMAND, approach, rate_limits
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import FEASIBLE, GENERATOR, GRAPH, ROBOT, Contract, read_contract
 from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
@@ -24,28 +25,6 @@ from iowbc.robot.description import Robot, load_robot
 
 Array = NDArray[np.floating[Any]]
 Generator = Callable[[Array, Array], Array]
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What the robots' sensors deliver, a row for each of n robots."""
-
-    projected_gravity: Array
-    """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
-    base_angular_velocity: Array
-    """Base frame, (n, 3) [rad/s]."""
-    joint_position: Array
-    """(n, 29) [rad]."""
-    joint_velocity: Array
-    """(n, 29) [rad/s]."""
-    object_position: Array | None = None
-    """Object from the base, base frame, (n, 3) [m]; needed where the policy observes the object, zero without one."""
-    object_quaternion: Array | None = None
-    """Object's orientation in the base frame, wxyz, (n, 4)."""
-    object_linear_velocity: Array | None = None
-    """Object's velocity relative to the base, base frame, (n, 3) [m/s]."""
-    object_angular_velocity: Array | None = None
-    """Object's angular velocity relative to the base, base frame, (n, 3) [rad/s]."""
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,10 @@
 """The exported controller as the driver of simulated episodes: it reads the simulated sensors, not the observation."""
 
-from dataclasses import fields
-
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.deploy.controller import Controller, Measured
+from iowbc.control.sensors import Measured
+from iowbc.deploy.controller import Controller
 from iowbc.task.vector.vector_env import VectorEnv
 
 
@@ -32,8 +31,7 @@ class ExportedPolicy:
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         del observation, privileged
         batch = self.environment.batch
-        sensors = batch.simulation.measured
-        measured = Measured(**{field.name: getattr(sensors, field.name) for field in fields(Measured)})
+        measured = Measured.of(batch.simulation.measured)
         targets = self.controller.step(measured, batch.command, limit_rates=False)
         expected = batch.targets(targets.action)
         self.largest_difference = max(self.largest_difference, float(np.abs(expected - targets.position).max()))

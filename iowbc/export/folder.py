@@ -54,7 +54,7 @@ def write_folder(
         action_scale=tuple(graph.scale.double().tolist()),
         action_bound=graph.bound,
         history=graph.history,
-        observation=tuple(contract.Part(name=name, size=size) for name, size in graph.layout.parts),
+        observation=tuple(contract.PartEntry.model_validate(part) for part in graph.layout.describe()),
         command=COMMAND,
         commands=recipe.task.commands,
         references=recipe.task.references,

@@ -4,15 +4,17 @@ It does in one graph what `iowbc.task` does in NumPy, from measured values to jo
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iowbc.control.command import HEIGHT, PITCH
-from iowbc.control.gait import LEFT_LEG_PITCH, RIGHT_LEG_PITCH
+from iowbc.control.command import COMMAND, HEIGHT, PITCH
+from iowbc.control.gait import swing_amplitude
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.observation import ObservationLayout
+from iowbc.control.observation import OBJECT, PROPRIOCEPTION, ObservationLayout, Sensed
+from iowbc.control.sensors import Measured, quantities
 from iowbc.learning.networks import ACTIVATIONS, StudentNetwork
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.description import Robot
@@ -71,14 +73,10 @@ class GaitModule(nn.Module):
 
     amplitude: Tensor
 
-    def __init__(self, gait: GaitPrior, support_joints: int) -> None:
+    def __init__(self, gait: GaitPrior, robot: Robot) -> None:
         super().__init__()
         self.stance = gait.stance
-        amplitude = np.zeros((2, support_joints))
-        if gait.enabled:
-            for foot, joints in enumerate((LEFT_LEG_PITCH, RIGHT_LEG_PITCH)):
-                amplitude[foot, list(joints)] = gait.hip_pitch, gait.knee, gait.ankle_pitch
-        self.register_buffer("amplitude", _tensor(amplitude))
+        self.register_buffer("amplitude", _tensor(swing_amplitude(robot, gait)))
 
     def forward(self, gait: Tensor) -> tuple[Tensor, Tensor]:
         """gait: φ in [0, 1), and 1 while the clock runs, (n, 2). Returns swing (n, 15) [rad] and signal (n, 2)."""
@@ -111,11 +109,12 @@ class ControllerGraph(nn.Module):
     ) -> None:
         super().__init__()
         self.layout, self.history, self.bound = layout, history, action_bound
-        self.observes_object = "object_position" in layout.names
+        self.observes_object = OBJECT[0].name in layout.names
+        self._measured = (*quantities(of_object=False), *(quantities(of_object=True) if self.observes_object else ()))
         self.robot = robot
         self.student = student
         self.reference = ReferenceModule(rg, robot.default_position[robot.support], len(robot.interaction))
-        self.gait = GaitModule(gait, len(robot.support))
+        self.gait = GaitModule(gait, robot)
         self.register_buffer("scale", _tensor(action_scale))
         order = np.argsort(np.concatenate([robot.support, robot.interaction]))
         self.register_buffer("joint_order", torch.from_numpy(order))
@@ -123,30 +122,22 @@ class ControllerGraph(nn.Module):
 
     def input_ports(self) -> tuple[Port, ...]:
         """Inputs, in order."""
-        joints, support, arms = len(self.robot.joints), len(self.robot.support), len(self.robot.interaction)
+        support, arms = len(self.robot.support), len(self.robot.interaction)
         return (
-            Port("command", (11,), "m/s, m/s, rad/s, m, rad, m x 6", "heading", "the skill-level command C, clamped"),
-            Port("projected_gravity", (3,), "1", "base", "direction of gravity; (0, 0, -1) when upright"),
-            Port("base_angular_velocity", (3,), "rad/s", "base", "gyroscope"),
-            Port("joint_position", (joints,), "rad", "joint", "all joints, in the order of `joints`"),
-            Port("joint_velocity", (joints,), "rad/s", "joint", "all joints, in the order of `joints`"),
+            Port("command", (len(COMMAND),), PROPRIOCEPTION[0].unit, "heading", "the skill-level command C, clamped"),
+            *self._measured_ports(False),
             Port("arm_reference", (arms,), "rad", "joint", "θ_I_ref from differential IK, interaction order"),
             Port("gait", (2,), "1, 1", "-", "gait phase in [0, 1), and 1 while the gait clock runs, else 0"),
             Port("last_action", (support,), "action", "joint", "`action` of the step before, 0 at the start"),
             Port("restart", (1,), "1", "-", "1 at the first step of an episode: the history is filled with it"),
             Port("history", (self.history, self.layout.size), "SI", "-", "`history_next` of the step before"),
-            *self.object_ports(),
+            *(self._measured_ports(True) if self.observes_object else ()),
         )
 
-    def object_ports(self) -> tuple[Port, ...]:
-        """The last inputs, where the policy observes the object."""
-        if not self.observes_object:
-            return ()
-        return (
-            Port("object_position", (3,), "m", "base", "object's origin from the base"),
-            Port("object_quaternion", (4,), "1", "base", "object's orientation, wxyz"),
-            Port("object_linear_velocity", (3,), "m/s", "base", "object's velocity relative to the base"),
-            Port("object_angular_velocity", (3,), "rad/s", "base", "object's angular velocity relative to the base"),
+    def _measured_ports(self, of_object: bool) -> tuple[Port, ...]:
+        return tuple(
+            Port(name, (len(what.kind(self.robot)),), what.unit, what.frame, what.meaning)
+            for name, what in quantities(of_object).items()
         )
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -159,48 +150,24 @@ class ControllerGraph(nn.Module):
             Port("history_next", (self.history, self.layout.size), "SI", "-", "the next step's `history`"),
         )
 
-    def forward(
-        self,
-        command: Tensor,
-        projected_gravity: Tensor,
-        base_angular_velocity: Tensor,
-        joint_position: Tensor,
-        joint_velocity: Tensor,
-        arm_reference: Tensor,
-        gait: Tensor,
-        last_action: Tensor,
-        restart: Tensor,
-        history: Tensor,
-        object_position: Tensor | None = None,
-        object_quaternion: Tensor | None = None,
-        object_linear_velocity: Tensor | None = None,
-        object_angular_velocity: Tensor | None = None,
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        swing, signal = self.gait(gait)
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Values of the output ports for those of the input ports, in their order."""
+        given = dict(zip((port.name for port in self.input_ports()), inputs, strict=True))
+        command, arm_reference, history = given["command"], given["arm_reference"], given["history"]
+        swing, signal = self.gait(given["gait"])
         support_reference = self.reference(arm_reference, command[:, HEIGHT : PITCH + 1]) + swing
-        joint_reference = torch.cat([support_reference, arm_reference], dim=1).index_select(1, self.joint_order)
-        parts = {
+        measured: dict[str, Any] = {name: given[name] for name in self._measured}
+        known: dict[str, Any] = {  # tensors in place of arrays: the observation's parts use operators alone
             "command": command,
-            "projected_gravity": projected_gravity,
-            "base_angular_velocity": base_angular_velocity,
-            "joint_position": joint_position - joint_reference,
-            "joint_velocity": joint_velocity,
+            "joint_reference": torch.cat([support_reference, arm_reference], dim=1).index_select(1, self.joint_order),
             "phase": signal,
-            "last_action": last_action,
+            "last_action": given["last_action"],
             "support_reference": support_reference,
         }
-        if object_quaternion is not None:
-            sign = 1.0 - 2.0 * (object_quaternion[:, :1] < 0.0).to(object_quaternion.dtype)
-            parts["object_orientation"] = object_quaternion[:, 1:] * sign
-        seen = {
-            "object_position": object_position,
-            "object_linear_velocity": object_linear_velocity,
-            "object_angular_velocity": object_angular_velocity,
-        }
-        parts |= {name: value for name, value in seen.items() if value is not None}
-        frame = torch.cat([parts[name] for name in self.layout.names], dim=1)[:, None]
+        sensed = Sensed(measured=Measured(**measured), **known)
+        frame = torch.cat([part.value(sensed) for part in self.layout.parts], dim=1)[:, None]
         shifted = torch.cat([history[:, 1:], frame], dim=1)
-        history_next = torch.where(restart[:, :, None] > 0.5, frame.expand(-1, self.history, -1), shifted)
+        history_next = torch.where(given["restart"][:, :, None] > 0.5, frame.expand(-1, self.history, -1), shifted)
         action = torch.clamp(self.student(history_next), -self.bound, self.bound)
         target = support_reference + self.scale * action
         return target, action, support_reference, history_next

@@ -30,7 +30,7 @@ def write_onnx(graph: ControllerGraph, path: Path, opset: int, about: Mapping[st
             output_names=[port.name for port in graph.output_ports()],
             opset_version=opset,
             dynamo=True,
-            dynamic_shapes=tuple({0: torch.export.Dim.DYNAMIC} for _ in ports),
+            dynamic_shapes=(tuple({0: torch.export.Dim.DYNAMIC} for _ in ports),),
             verbose=False,
         )
     assert program is not None

@@ -1,6 +1,6 @@
 """What the rest of the package knows of a robot: its joints, branches, gains, limits and named frames."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from iowbc.robot.mjcf import Tree, read_tree
+from iowbc.robot.mjcf import Hinge, Tree, read_tree
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
@@ -34,6 +34,12 @@ class Robot:
     """Support branch S: indices of its joints, in the order of the policy's action."""
     interaction: Indices
     """Interaction branch I: indices of the arm joints."""
+    waist: Indices
+    """Places of the joints from base to torso, in that order, among the support joints."""
+    waist_pitch: Indices
+    """Those of them that turn about y."""
+    leg_pitch: Indices
+    """Places of hip pitch, knee and ankle pitch among the support joints, left and right leg, shape (2, 3)."""
     kp: Array
     """Position gains [N·m/rad]."""
     kd: Array
@@ -54,9 +60,9 @@ class Robot:
     wrists: tuple[str, str]
     """Sites that the wrist commands move (left, right): the grip points."""
     wrist_bodies: tuple[str, str]
-    """Bodies that carry those sites."""
+    """Bodies that carry those sites: the last that move on a joint."""
     grip_offset: Array
-    """Position of the wrist sites in their bodies' frames, shape (2, 3) [m]."""
+    """Position of the wrist sites in those bodies' frames, shape (2, 3) [m]."""
     soles: tuple[str, str]
     """Sites at the centre of each sole, on the sole plane."""
     sole_bodies: tuple[str, str]
@@ -121,10 +127,8 @@ def load_robot(folder: Path) -> Robot:
     if None in scales:
         raise ValueError(f"{source}: joints: support joint {joints[support[scales.index(None)]]} has no `scale`")
     wrists, soles = _pair(entries, "wrists", source), _pair(entries, "soles", source)
-    wrist_bodies, sole_bodies = (
-        [tree.body_of_site(site) for site in wrists],
-        [tree.body_of_site(site) for site in soles],
-    )
+    grips, sole_bodies = [tree.carrier(site) for site in wrists], [tree.body_of_site(site) for site in soles]
+    waist = tree.hinges_between(entries["torso"], entries["base"])
     posture = dict(zip(joints, default.tolist(), strict=True))
     return Robot(
         folder=folder,
@@ -134,6 +138,11 @@ def load_robot(folder: Path) -> Robot:
         joints=joints,
         support=support,
         interaction=np.array([index for index in range(len(joints)) if index not in set(support.tolist())]),
+        waist=_places(waist, support, joints, source),
+        waist_pitch=_places([hinge for hinge in waist if _is_pitch(hinge)], support, joints, source),
+        leg_pitch=np.stack(
+            [_leg_pitch(tree, body.name, entries["base"], support, joints, source) for body in sole_bodies]
+        ),
         kp=np.array([float(row["kp"]) for row in rows]),
         kd=np.array([float(row["kd"]) for row in rows]),
         effort=np.array([hinge.effort for hinge in hinges]),
@@ -144,8 +153,8 @@ def load_robot(folder: Path) -> Robot:
         default_position=default,
         action_scale=np.array(scales, dtype=np.float64),
         wrists=wrists,
-        wrist_bodies=(wrist_bodies[0].name, wrist_bodies[1].name),
-        grip_offset=np.stack([body.sites[site] for body, site in zip(wrist_bodies, wrists, strict=True)]),
+        wrist_bodies=(grips[0][0].name, grips[1][0].name),
+        grip_offset=np.stack([position for _, position in grips]),
         soles=soles,
         sole_bodies=(sole_bodies[0].name, sole_bodies[1].name),
         sole_polygon=np.stack(
@@ -186,6 +195,31 @@ def _support(names: list[str], joints: tuple[str, ...], source: Path) -> Indices
     if unknown or len(set(names)) != len(names):
         raise ValueError(f"{source}: support: unknown or repeated joints {unknown}; the MJCF has {', '.join(joints)}")
     return np.array([joints.index(name) for name in names])
+
+
+def _is_pitch(hinge: Hinge) -> bool:
+    """Whether a hinge turns about the y axis of its body."""
+    return bool(np.argmax(np.abs(hinge.axis)) == 1)
+
+
+def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...], source: Path) -> Indices:
+    """Places of hinges among the support joints."""
+    names = [joints[index] for index in support]
+    missing = [hinge.name for hinge in hinges if hinge.name not in names]
+    if missing:
+        raise ValueError(f"{source}: support: joints of legs and waist belong to it, missing {', '.join(missing)}")
+    return np.array([names.index(hinge.name) for hinge in hinges], dtype=np.int64)
+
+
+def _leg_pitch(tree: Tree, sole: str, base: str, support: Indices, joints: tuple[str, ...], source: Path) -> Indices:
+    """Places of a leg's joints about y among the support joints: hip, knee, ankle."""
+    found = [hinge for hinge in tree.hinges_between(sole, base) if _is_pitch(hinge)]
+    if len(found) != 3:
+        raise ValueError(
+            f"{source}: soles: the leg of {sole} has the joints {', '.join(hinge.name for hinge in found) or 'none'} "
+            "about y; a hip, a knee and an ankle are needed"
+        )
+    return _places(found, support, joints, source)
 
 
 def _pair(entries: Mapping[str, Any], key: str, source: Path) -> tuple[str, str]:

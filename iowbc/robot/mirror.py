@@ -1,5 +1,6 @@
 """Left-right mirror maps: reflection across the sagittal plane (y to -y) of joints and vectors."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,40 @@ class MirrorMap:
         """The mirror image of values, shape (..., size)."""
         mirrored: Array = self.sign * values[..., self.permutation]
         return mirrored
+
+    def __len__(self) -> int:
+        return len(self.permutation)
+
+    def as_float32(self) -> "MirrorMap":
+        """The same map for arrays of float32, which it then leaves so."""
+        return MirrorMap(self.permutation, self.sign.astype(np.float32))
+
+
+Kind = Callable[[Robot], MirrorMap]
+"""What an array is when seen in a mirror, whatever the robot."""
+
+
+def in_place(*sign: float) -> Kind:
+    """Entries that stay where they are and change sign or not."""
+    return lambda robot: MirrorMap(np.arange(len(sign)), np.array(sign))
+
+
+scalar = in_place(1.0)
+polar_vector = in_place(*VECTOR_SIGN)
+axial_vector = in_place(*AXIAL_SIGN)
+rotation = in_place(*QUATERNION_SIGN)
+
+
+def polar_vector_each_side(robot: Robot) -> MirrorMap:
+    """Two polar vectors, left and right, which change places, (6,)."""
+    return MirrorMap(np.array([3, 4, 5, 0, 1, 2]), np.tile(VECTOR_SIGN, 2))
+
+
+def side_by_side(maps: Sequence[MirrorMap]) -> MirrorMap:
+    """Mirror of rows that consist of parts."""
+    starts = np.cumsum([0, *map(len, maps)])
+    places = [start + one.permutation for start, one in zip(starts, maps, strict=False)]
+    return MirrorMap(np.concatenate(places), np.concatenate([one.sign for one in maps]))
 
 
 def joint_mirror(robot: Robot) -> MirrorMap:

@@ -95,17 +95,28 @@ class Tree:
             name = self.bodies[name].parent
         return tuple(reversed(found))
 
-    def burden(self, name: str) -> tuple[float, Array]:
-        """Mass [kg] of a body with all that is fixed to it, and their first moment of mass, (3,) [kg·m], in its frame.
+    def hinges_between(self, end: str, start: str) -> tuple[Hinge, ...]:
+        """Hinges from below body `start` down to body `end`."""
+        return tuple(body.hinge for body in self.chain(end, start) if body.hinge is not None)
 
-        Raises ValueError where something that hangs on it moves on a hinge of its own.
-        """
+    def mover(self, name: str) -> Body:
+        """The nearest body, from one inward, that moves on a hinge, or the root: what the body is fixed to."""
+        body = self.bodies[name]
+        while body.hinge is None and body.parent is not None:
+            body = self.bodies[body.parent]
+        return body
+
+    def carrier(self, site: str) -> tuple[Body, Array]:
+        """The body that moves a site, and the site's place in that body's frame, (3,) [m]."""
+        mover = self.mover(self.body_of_site(site).name)
+        return mover, self.forward({}, mover.name, site)[0]
+
+    def burden(self, name: str) -> tuple[float, Array]:
+        """Mass [kg] of a body with all that is fixed to it, and their first moment in its frame, (3,) [kg·m]."""
         body = self.bodies[name]
         mass, moment = body.mass, body.mass * body.centre
         for child in self.bodies.values():
-            if child.parent == name:
-                if child.hinge is not None:
-                    raise ValueError(f"{child.hinge.name} moves a part of {name!r}: no fixed burden")
+            if child.parent == name and child.hinge is None:
                 more, further = self.burden(child.name)
                 mass += more
                 moment = moment + more * child.position + rotations.matrix(child.quaternion) @ further

@@ -12,10 +12,10 @@ def run(job: Job) -> None:
     """Distil the teacher; leave the student's network, normalisation and curves."""
     import torch
 
+    from iowbc.control.action import action_mirror
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import StudentTraining
     from iowbc.robot.description import load_robot
-    from iowbc.task.mirror import action_mirror, observation_mirror
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
@@ -33,7 +33,7 @@ def run(job: Job) -> None:
         environments.set_curriculum(about["curriculum"])
         layout, mirrors = environments.layout, None
         if recipe.teacher.symmetry == "augment":
-            mirrors = observation_mirror(robot, layout.state), action_mirror(robot)
+            mirrors = layout.state.mirror, action_mirror(robot)
         places = layout.observation, layout.privileged
         training = StudentTraining(settings, environments, teacher, places, mirrors, recipe.seed)
         curves = train(job, training, settings.checkpoint_every, lambda values: f"KL {values['kl']:.3f}")

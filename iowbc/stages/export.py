@@ -12,6 +12,7 @@ def run(job: Job) -> None:
     import numpy as np
     import torch
 
+    from iowbc.control.action import action_scale
     from iowbc.control.generator import ReferenceNetwork
     from iowbc.control.observation import observation_layout
     from iowbc.deploy import contract
@@ -38,12 +39,10 @@ def run(job: Job) -> None:
         student,
         ReferenceNetwork.load(rg) if rg is not None and task.references.use_rg else None,
         robot,
-        observation_layout(task.observation.observe_object),
+        observation_layout(robot, task.observation.observe_object),
         task.references.gait,
         history=int(about["architecture"]["history"]),
-        action_scale=robot.action_scale
-        if task.action.scale is None
-        else np.full(len(robot.support), task.action.scale),
+        action_scale=action_scale(robot, task.action),
         action_bound=task.action.bound,
     )
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}

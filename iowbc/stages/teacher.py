@@ -18,10 +18,10 @@ PANELS = (
 
 def run(job: Job) -> None:
     """Train the teacher; leave its network, normalisation, curves, and an SB3 zip for users' own code."""
+    from iowbc.control.action import action_mirror
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.robot.description import load_robot
-    from iowbc.task.mirror import action_mirror, observation_mirror
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings, robot = job.recipe, job.recipe.teacher, load_robot(job.robot)
@@ -37,7 +37,7 @@ def run(job: Job) -> None:
     try:
         mirrors = None
         if settings.symmetry == "augment":
-            mirrors = observation_mirror(robot, environments.layout), action_mirror(robot)
+            mirrors = environments.layout.mirror, action_mirror(robot)
         training = TeacherTraining(settings, environments, mirrors, recipe.seed)
         curves = train(
             job, training, settings.checkpoint_every, lambda values: f"{values['episode_seconds']:.1f} s an episode"

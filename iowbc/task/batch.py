@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from iowbc import counter_random as random
 from iowbc.arrays import Keys, as_slice
 from iowbc.control import gait
+from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, PITCH, VELOCITY, YAW_RATE
-from iowbc.control.observation import FullLayout, Sensed, observation_layout, observe, privileged_layout
+from iowbc.control.observation import Sensed
 from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.control.sensors import Measured
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
@@ -20,9 +22,10 @@ from iowbc.task.commands.commander import Commander
 from iowbc.task.curriculum import Difficulty, difficulty, initial_level, next_level
 from iowbc.task.endings import dropped, fallen
 from iowbc.task.episodes import Episode
+from iowbc.task.layout import full_layout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion, low_pass, motion
-from iowbc.task.privileged import privileged
+from iowbc.task.privileged import Truth
 from iowbc.task.record.recorder import Ending, count_endings, count_step, write_signals
 from iowbc.task.rewards.total import RewardFunction, Scored, Step
 from iowbc.task.vector.shared import Buffers
@@ -33,11 +36,6 @@ Mask = NDArray[np.bool_]
 
 EVERY = slice(None)
 """All environments."""
-
-
-def full_layout(recipe: Recipe) -> FullLayout:
-    """Layout of the rows that the environments of a recipe deliver."""
-    return FullLayout(observation_layout(recipe.task.observation.observe_object), privileged_layout())
 
 
 class Batch:
@@ -62,7 +60,8 @@ class Batch:
         simulations are kept for replay.
         """
         task = recipe.task
-        self.recipe, self.robot, self.buffers, self.layout = recipe, load_robot(robot), buffers, full_layout(recipe)
+        self.recipe, self.robot, self.buffers = recipe, load_robot(robot), buffers
+        self.layout = full_layout(recipe, self.robot)
         self.n = n = len(environments)
         self.period = 1.0 / task.control_frequency
         self.references = ReferenceLayer(self.robot, task.references, rg)
@@ -91,7 +90,7 @@ class Batch:
         self._trials, self._divergences = episodes, divergences
         self._reward = RewardFunction(task.reward, self._support, self.period)
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
-        self._scale = self.robot.action_scale if task.action.scale is None else task.action.scale
+        self._scale = action_scale(self.robot, task.action)
         self._height_rate, self._velocity = np.zeros(n), np.zeros((n, 3))
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self._scales = {name: np.ones(n) for name in ("load_scale", "impulse_scale", "push_scale")}
@@ -196,7 +195,7 @@ class Batch:
         memory.phase[:], memory.stepping[:] = phase, stepping
         arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self._grasp, self.period)
         memory.arms[:], memory.posture[:] = arms, posture
-        np.add(posture, gait.swing_prior(phase, stepping, settings), out=memory.support)
+        memory.support[:] = self.references.with_swing(posture, phase, stepping)
 
     def _finish(self, moved: Motion, scored: Scored, ending: Ending) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""
@@ -286,28 +285,20 @@ class Batch:
 
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
         """Writes the rows of s_t and s_priv of some environments."""
-        memory, measured, layout = self.memory, self.simulation.measured, self.layout
+        memory, layout = self.memory, self.layout
         self._joint_reference[:, self._support] = memory.support
         self._joint_reference[:, self._arms] = memory.arms
         sensed = Sensed(
+            measured=Measured.of(self.simulation.measured),
             command=memory.command,
-            projected_gravity=measured.projected_gravity,
-            base_angular_velocity=measured.base_angular_velocity,
-            joint_position=measured.joint_position,
-            joint_velocity=measured.joint_velocity,
             joint_reference=self._joint_reference,
             phase=gait.phase_signal(memory.phase, memory.stepping),
             last_action=memory.action,
             support_reference=memory.support,
-            object_position=measured.object_position,
-            object_quaternion=measured.object_quaternion,
-            object_linear_velocity=measured.object_linear_velocity,
-            object_angular_velocity=measured.object_angular_velocity,
         )
-        extra = privileged(moved, self.simulation.drawn)
         rows = np.empty((len(moved.heading[which]), layout.size), np.float32)
-        observe(layout.state, sensed if which is EVERY else sensed.rows(which), rows[:, layout.observation])
-        layout.extra.gather({name: values[which] for name, values in extra.items()}, rows[:, layout.privileged])
+        layout.state.gather(sensed, rows[:, layout.observation], which)
+        layout.extra.gather(Truth(moved, self.simulation.drawn), rows[:, layout.privileged], which)
         self.buffers["observation"][which] = rows
 
     def _keep_divergences(self) -> None:

@@ -1,30 +1,61 @@
-"""What the teacher alone sees (paper III-C: s_priv): the truth about load, contact and forces."""
+"""What the teacher alone sees (paper III-C: s_priv): one list of the truth about load, contact and forces.
 
-from collections.abc import Mapping
+To add a part, write a function that computes it from `Truth` and a line of the list.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.control.layout import Layout, Part
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import axial_vector, polar_vector, polar_vector_each_side, scalar
 from iowbc.task.motion import Motion
 
 Array = NDArray[np.floating[Any]]
 
-DRAWN = (
-    *("object_mass", "object_com_offset", "inertia_scale", "ground_friction", "object_ground_friction"),
-    *("surface_friction", "partner_share", "action_latency"),
+
+@dataclass(frozen=True)
+class Truth:
+    """What the simulation knows of n environments; what parts of s_priv are computed from."""
+
+    motion: Motion
+    drawn: Mapping[str, Array]
+    """Drawn quantities by name, (n,) or (n, k)."""
+
+
+def _drawn(name: str) -> Callable[[Truth], Array]:
+    return lambda truth: truth.drawn[name]
+
+
+def _moving(name: str) -> Callable[[Truth], Array]:
+    return lambda truth: getattr(truth.motion, name)
+
+
+PRIVILEGED: tuple[Part[Truth], ...] = (
+    Part("object_mass", scalar, "kg", "-", _drawn("object_mass")),
+    Part("object_com_offset", polar_vector, "m", "object", _drawn("object_com_offset")),
+    Part("inertia_scale", scalar, "1", "-", _drawn("inertia_scale")),
+    Part("ground_friction", scalar, "1", "-", _drawn("ground_friction")),
+    Part("object_ground_friction", scalar, "1", "-", _drawn("object_ground_friction")),
+    Part("surface_friction", scalar, "1", "-", _drawn("surface_friction")),
+    Part("base_linear_velocity", polar_vector, "m/s", "heading", _moving("base_velocity")),
+    Part("system_velocity", polar_vector, "m/s", "heading", _moving("system_velocity")),
+    Part("pelvis_height", scalar, "m", "-", _moving("pelvis_height")),
+    Part("foot_force", polar_vector_each_side, "N", "heading", _moving("foot_force")),
+    Part("external_force", polar_vector, "N", "heading", _moving("external_force")),
+    Part("external_torque", axial_vector, "N·m", "heading", _moving("external_torque")),
+    Part("partner_share", scalar, "1", "-", _drawn("partner_share")),
+    Part("action_latency", scalar, "control periods", "-", _drawn("action_latency")),
 )
-"""Drawn quantities that are privileged observations under their own names."""
+"""Parts of s_priv, in order."""
+
+PrivilegedLayout = Layout[Truth]
 
 
-def privileged(moved: Motion, drawn: Mapping[str, Array]) -> dict[str, Array]:
-    """The parts of s_priv by name, each (n, k): vectors in the heading frame, SI units."""
-    values = {name: drawn[name].reshape(len(moved.heading), -1) for name in DRAWN}
-    return values | {
-        "base_linear_velocity": moved.base_velocity,
-        "system_velocity": moved.system_velocity,
-        "pelvis_height": moved.pelvis_height[:, None],
-        "foot_force": moved.foot_force.reshape(-1, 6),
-        "external_force": moved.external_force,
-        "external_torque": moved.external_torque,
-    }
+def privileged_layout(robot: Robot) -> PrivilegedLayout:
+    """Layout of s_priv."""
+    return Layout(PRIVILEGED, robot)

@@ -76,8 +76,31 @@ def test_a_turn_is_a_rotation_about_its_axis(axis: int) -> None:
     assert vectors == pytest.approx(expected)
 
 
-def test_a_body_without_a_hinge_does_not_belong_on_a_chain() -> None:
+def test_a_body_without_a_hinge_is_fixed_to_the_one_before() -> None:
+    chain = [body([0, 0, 1]), body([1, 0, 0]), body([0, 1, 0])]
+    chain[1].hinge = None
+    angle, point = RANDOM.normal(size=(2, 1, 1)), RANDOM.normal(size=3)
+    carried = point.reshape(3, 1, 1, 1).copy()
+    Chain([chain]).carry(angle, carried)
+    chain[1].hinge = SimpleNamespace(axis=np.array([1, 0, 0]))
+    rotation, position, _, _ = by_matrices(chain, [angle[0, 0, 0], 0.0, angle[1, 0, 0]])
+    assert carried.ravel() == pytest.approx(position + rotation @ point)
+
+
+def test_a_chain_ends_at_a_hinge() -> None:
     stiff = body([1, 0, 0])
     stiff.hinge = None
-    with pytest.raises(ValueError, match="'link' lies on a joint chain but has no hinge"):
+    with pytest.raises(ValueError, match="'link' ends a joint chain but has no hinge"):
         Chain([[stiff]])
+
+
+def test_the_example_of_the_docstring() -> None:
+    upper, lower = body([0, 0, 1]), body([0, 1, 0])
+    upper.quaternion = lower.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+    upper.position, lower.position = np.zeros(3), np.array([0.2, 0.0, 0.0])
+    vectors = np.zeros((3, 3, 1, 1))
+    vectors[:, 2, 0, 0] = (0.3, 0.0, 0.0)
+    Chain([[upper, lower]]).carry(np.full((2, 1, 1), np.pi / 2), vectors, columns=2)
+    assert vectors[:, 2, 0, 0] == pytest.approx([0.0, 0.2, -0.3])
+    assert vectors[:, 0, 0, 0] == pytest.approx([-0.2, 0.0, 0.0])
+    assert vectors[:, 1, 0, 0] == pytest.approx([0.0, -0.3, 0.0])

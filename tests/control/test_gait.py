@@ -1,10 +1,13 @@
 """The gait clock and the swing it adds."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from iowbc.control import gait
 from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.robot.description import Robot
 
 PRIOR = GaitPrior(frequency=1.0, stance=0.6)
 DT = 0.02
@@ -47,10 +50,14 @@ def test_the_feet_swing_in_turn_and_both_stand_in_between() -> None:
     assert gait.expected_stance(gait.foot_phase(phases), np.zeros(200, bool), 0.6).all()
 
 
-def test_the_prior_bends_the_swinging_leg_alone_and_most_at_mid_swing() -> None:
+def swing(robot: Robot, phase: Any, stepping: Any, prior: GaitPrior) -> Any:
+    return gait.swing_prior(phase, stepping, prior.stance, gait.swing_amplitude(robot, prior))
+
+
+def test_the_prior_bends_the_swinging_leg_alone_and_most_at_mid_swing(robot: Robot) -> None:
     middle = 0.6 + 0.4 / 2
-    added = gait.swing_prior(np.array([middle, middle - 0.5]), np.array([True, True]), PRIOR)
-    left, right = list(gait.LEFT_LEG_PITCH), list(gait.RIGHT_LEG_PITCH)
+    added = swing(robot, np.array([middle, middle - 0.5]), np.array([True, True]), PRIOR)
+    left, right = robot.leg_pitch
     bend = [PRIOR.hip_pitch, PRIOR.knee, PRIOR.ankle_pitch]
     assert added[0, left] == pytest.approx(bend)
     assert added[1, right] == pytest.approx(bend)
@@ -58,11 +65,11 @@ def test_the_prior_bends_the_swinging_leg_alone_and_most_at_mid_swing() -> None:
     assert not np.delete(added[1], right).any()
 
 
-def test_the_prior_is_nothing_at_rest_and_when_switched_off() -> None:
+def test_the_prior_is_nothing_at_rest_and_when_switched_off(robot: Robot) -> None:
     phase = np.array([0.8])
-    assert not gait.swing_prior(phase, np.array([False]), PRIOR).any()
+    assert not swing(robot, phase, np.array([False]), PRIOR).any()
     off = PRIOR.model_copy(update={"enabled": False})
-    assert not gait.swing_prior(phase, np.array([True]), off).any()
+    assert not swing(robot, phase, np.array([True]), off).any()
 
 
 def test_the_phase_signal_is_on_the_circle_or_zero_at_rest() -> None:

@@ -54,7 +54,7 @@ def rg(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def untrained(recipe: Recipe, robot: Robot, rg: Path | None, observe_object: bool = True) -> ControllerGraph:
     """The graph of an untrained student."""
     torch.manual_seed(0)
-    layout = observation_layout(observe_object)
+    layout = observation_layout(robot, observe_object)
     student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16], "elu", 10.0)
     return ControllerGraph(
         student,

@@ -2,23 +2,30 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 import pytest
 import torch
 
-from iowbc.control.gait import phase_signal, swing_prior
+from iowbc.control import observation
+from iowbc.control.gait import phase_signal, swing_amplitude, swing_prior
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.observation import Sensed, observe
+from iowbc.control.layout import Part
+from iowbc.control.observation import Sensed
+from iowbc.control.sensors import Measured, quantities
 from iowbc.deploy.contract import GRAPH
 from iowbc.deploy.controller import open_session
+from iowbc.export.folder import write_folder
 from iowbc.export.golden import Values, largest_difference, read_golden, run_session, stacked, write_golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
+from iowbc.robot.mirror import scalar
 
 TOLERANCE = 1e-5
 
@@ -40,33 +47,19 @@ def expected_frame(graph: ControllerGraph, rg: Path | None, robot: Robot, inputs
     support = np.tile(robot.default_position[robot.support], (rows, 1))
     if rg is not None:
         support = ReferenceNetwork.load(rg)(inputs["arm_reference"].astype(float), inputs["command"][:, 3:5])
-    support = support + swing_prior(phase, stepping, GaitPrior())
+    support = support + swing_prior(phase, stepping, GaitPrior().stance, swing_amplitude(robot, GaitPrior()))
     reference = np.empty((rows, 29))
     reference[:, robot.support], reference[:, robot.interaction] = support, inputs["arm_reference"]
-    seen = {
-        name: inputs.get(name, np.tile([1.0, 0.0, 0.0, 0.0][:size], (rows, 1)))
-        for name, size in (
-            ("object_position", 3),
-            ("object_quaternion", 4),
-            ("object_linear_velocity", 3),
-            ("object_angular_velocity", 3),
-        )
-    }
-    return observe(
-        graph.layout,
-        Sensed(
-            command=inputs["command"],
-            projected_gravity=inputs["projected_gravity"],
-            base_angular_velocity=inputs["base_angular_velocity"],
-            joint_position=inputs["joint_position"],
-            joint_velocity=inputs["joint_velocity"],
-            joint_reference=reference,
-            phase=phase_signal(phase, stepping),
-            last_action=inputs["last_action"],
-            support_reference=support,
-            **seen,
-        ),
+    seen = (*quantities(of_object=False), *(quantities(of_object=True) if graph.observes_object else ()))
+    sensed = Sensed(
+        measured=Measured(**{name: inputs[name] for name in seen}),
+        command=inputs["command"],
+        joint_reference=reference,
+        phase=phase_signal(phase, stepping),
+        last_action=inputs["last_action"],
+        support_reference=support,
     )
+    return graph.layout.gather(sensed, np.empty((rows, graph.layout.size), np.float32))
 
 
 @pytest.mark.parametrize("observe_object", [True, False])
@@ -150,3 +143,25 @@ def test_opsets_differ_in_form_only(graph: ControllerGraph, tmp_path: Path) -> N
     write_onnx(graph, tmp_path / "graph.onnx", 20, {})
     outputs = run_session(open_session(tmp_path / "graph.onnx"), inputs)
     assert max(largest_difference(run_torch(graph, inputs), outputs).values()) < TOLERANCE
+
+
+def knees(sensed: Sensed) -> Any:
+    return sensed.measured.joint_position[:, 3:4] * sensed.measured.joint_position[:, 9:10]
+
+
+def test_a_part_that_is_added_to_the_list_is_in_graph_file_and_contract(
+    make_graph: Callable[[Path | None, bool], ControllerGraph],
+    recipe: Recipe,
+    robot: Robot,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    added = Part("knees", scalar, "rad²", "joint", knees)
+    monkeypatch.setattr(observation, "PROPRIOCEPTION", (*observation.PROPRIOCEPTION, added))
+    graph = make_graph(None, False)
+    contract = write_folder(tmp_path, graph, recipe, None, {})
+    assert [part.name for part in contract.observation][-1] == "knees"
+    inputs = random_inputs(graph, 3)
+    found = run_session(open_session(tmp_path / GRAPH), inputs)["history_next"]
+    assert found[:, -1] == pytest.approx(expected_frame(graph, None, robot, inputs), abs=TOLERANCE)
+    assert found[:, -1, -1] == pytest.approx(inputs["joint_position"][:, 3] * inputs["joint_position"][:, 9])

@@ -22,9 +22,9 @@ from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import robot_folder
+from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import evaluate
-from iowbc.task.batch import full_layout
+from iowbc.task.layout import full_layout
 
 QUESTION = {
     "name": "test",
@@ -69,7 +69,7 @@ def student(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("student")
     torch.manual_seed(0)
     architecture = {
-        "observation": full_layout(recipe).state.size,
+        "observation": full_layout(recipe, load_robot(robot_folder("g1"))).state.size,
         "history": 25,
         "actions": 15,
         "frame_features": 4,
@@ -229,7 +229,13 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
     }
     recipe = Recipe.model_validate(question)
     assert evaluate.STAGE.reads(recipe) == ("rg-fit", "teacher")
-    architecture = {"inputs": full_layout(recipe).size, "actions": 15, "hidden": [8], "activation": "elu", "clip": 10.0}
+    architecture = {
+        "inputs": full_layout(recipe, load_robot(robot_folder("g1"))).size,
+        "actions": 15,
+        "hidden": [8],
+        "activation": "elu",
+        "clip": 10.0,
+    }
     save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
     finished = job(recipe, tmp_path, tmp_path / "job")
     evaluate.run(finished)
@@ -237,7 +243,13 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
 
 
 def test_a_teacher_is_not_taken_for_the_student(recipe: Recipe, tmp_path: Path) -> None:
-    architecture = {"inputs": full_layout(recipe).size, "actions": 15, "hidden": [8], "activation": "elu", "clip": 10.0}
+    architecture = {
+        "inputs": full_layout(recipe, load_robot(robot_folder("g1"))).size,
+        "actions": 15,
+        "hidden": [8],
+        "activation": "elu",
+        "clip": 10.0,
+    }
     save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
     with pytest.raises(StageFailed, match=r"add `distill` .* or evaluate the teacher"):
         evaluate.run(job(recipe, tmp_path, tmp_path / "job"))

@@ -1,7 +1,6 @@
 """Left and right: the mirror maps against the physics."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -9,11 +8,12 @@ import numpy as np
 import pytest
 from task_worlds import QUIET, actions
 
+from iowbc.control.action import action_mirror
+from iowbc.control.command import command_mirror
 from iowbc.robot.description import Robot
 from iowbc.sim import world
 from iowbc.task.commands.script import CommandScript, CommandSegment
 from iowbc.task.episodes import Episode
-from iowbc.task.mirror import action_mirror, command_mirror, observation_mirror
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
@@ -27,7 +27,7 @@ STEPS = 35
 
 def scripts(scene: str, robot: Robot) -> tuple[Episode, Episode]:
     """An episode with commands, and the one with the mirrored commands."""
-    mirror = command_mirror()
+    mirror = command_mirror(robot)
     both = []
     for turn in (lambda c: c, lambda c: mirror(np.array(c))):
         segments = tuple(CommandSegment(0.4, tuple(turn(command)), 0.2) for command in COMMANDS)
@@ -66,7 +66,7 @@ def test_mirroring_twice_changes_nothing(make: Make, robot: Robot, observe_objec
     env = make(changes={"task.observation.observe_object": observe_object})
     rows = env.reset()
     for layout, values in ((env.layout, rows), (env.layout.state, rows[:, env.layout.observation])):
-        mirror = observation_mirror(robot, layout)
+        mirror = layout.mirror
         assert np.array_equal(mirror(mirror(values)), values)
         assert not np.array_equal(mirror(values), values)
         assert mirror(values).dtype == np.float32
@@ -87,7 +87,7 @@ def test_the_mirrored_course_is_the_course_of_the_mirrored_start(
 
     monkeypatch.setattr(world, "compile_scene", even)
     env = make(num_envs=2, changes=QUIET, episodes=scripts(scene, robot))
-    rows, mirror, mirror_action = env.reset(), observation_mirror(robot, env.layout), action_mirror(robot)
+    rows, mirror, mirror_action = env.reset(), env.layout.mirror, action_mirror(robot)
     env.batch.memory.phase[1] = 0.5
     rewards: list[Any] = []
     for step in range(STEPS):
@@ -99,10 +99,3 @@ def test_the_mirrored_course_is_the_course_of_the_mirrored_start(
     assert env.signals["phase"][0, 0] != 0.0, "the gait clock should run"
     ours, mirrored = np.array(rewards).T
     assert mirrored == pytest.approx(ours, abs=1e-4)
-
-
-def test_every_part_of_the_observation_has_a_mirror(robot: Robot, folder: Path) -> None:
-    from iowbc.task.mirror import _part_mirror
-
-    with pytest.raises(ValueError, match="no mirror is known for the observation's part 'tail' of size 3"):
-        _part_mirror(robot, "tail", 3)

@@ -11,7 +11,7 @@ from task_worlds import QUIET, rollout, same
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.references import WAIST, ReferenceLayer, both_wrists
+from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
@@ -56,7 +56,7 @@ def command(**parts: Any) -> Any:
 
 def wrists(layer: ReferenceLayer, arms: Any, support: Any, asked: Any) -> Any:
     """Wrist positions in the heading frame that the references stand for, (2, 3)."""
-    rotation, position = layer.arms.torso_in_heading(support[:, WAIST], layer.pelvis_pitch(support, asked))
+    rotation, position = layer.arms.torso_in_heading(support[:, layer.waist], layer.pelvis_pitch(support, asked))
     return (layer.arms.forward(arms)[0] @ np.swapaxes(rotation, 1, 2) + position[:, None])[0]
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
-from iowbc.task.batch import Batch, full_layout
+from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
+from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import buffer_fields
 from iowbc.task.scenes import scene_of
 from iowbc.task.vector.shared import Buffers, Fields
@@ -49,7 +50,8 @@ class Setup:
 
     def buffer_fields(self) -> Fields:
         """What passes between the environments and the learner."""
-        return buffer_fields(full_layout(self.recipe).size, len(load_robot(self.robot).support))
+        robot = load_robot(self.robot)
+        return buffer_fields(full_layout(self.recipe, robot).size, len(robot.support))
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""

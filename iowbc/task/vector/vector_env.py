@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.batch import Batch, full_layout
+from iowbc.robot.description import load_robot
+from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
+from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import REASONS, SIGNALS
 from iowbc.task.record.statistics import Statistics
 from iowbc.task.vector.setup import Setup
@@ -52,7 +54,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """
         trials = None if episodes is None else tuple(episodes)
         self.setup = Setup(recipe, robot, rg, num_envs, seed, trials, divergences)
-        self.layout = full_layout(recipe)
+        self.layout = full_layout(recipe, load_robot(robot))
         self._scenes = self.setup.scenes
         self._crew: Crew = Workers(self.setup, workers, patience) if workers else Alone(self.setup)
         self._buffers = self._crew.buffers

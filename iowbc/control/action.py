@@ -1,0 +1,22 @@
+"""The residual action a of the support branch."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.recipe.task.action import Action
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import MirrorMap, support_mirror
+
+Array = NDArray[np.floating[Any]]
+
+
+def action_scale(robot: Robot, action: Action) -> Array:
+    """Radians of joint target that a unit of each action adds, (support joints,): the recipe's, or the robot's own."""
+    return robot.action_scale if action.scale is None else np.full(len(robot.support), action.scale)
+
+
+def action_mirror(robot: Robot) -> MirrorMap:
+    """Mirror of the action, (support joints,), float32 as the networks are."""
+    return support_mirror(robot).as_float32()

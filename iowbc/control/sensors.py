@@ -1,0 +1,67 @@
+"""What a robot's sensors deliver: the measured inputs of the observation, with their size, unit, frame and mirror."""
+
+from dataclasses import MISSING, dataclass, fields
+from functools import cache
+from typing import Annotated, Any, Self, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, rotation
+
+Array = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What an array of the control loop means; a row a robot."""
+
+    kind: Kind
+    """Its mirror map, whose length is its size."""
+    unit: str
+    frame: str
+    """Frame in which the values are given; "joint" for joint coordinates, "-" where there is none."""
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the robots' sensors deliver, a row for each of n robots."""
+
+    projected_gravity: Annotated[
+        Array, Quantity(polar_vector, "1", "base", "direction of gravity; (0, 0, -1) when upright")
+    ]
+    """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
+    base_angular_velocity: Annotated[Array, Quantity(axial_vector, "rad/s", "base", "gyroscope")]
+    """Base frame, (n, 3) [rad/s]."""
+    joint_position: Annotated[Array, Quantity(joint_mirror, "rad", "joint", "all joints, in the order of `joints`")]
+    """(n, joints) [rad]."""
+    joint_velocity: Annotated[Array, Quantity(joint_mirror, "rad/s", "joint", "all joints, in the order of `joints`")]
+    """(n, joints) [rad/s]."""
+    object_position: Annotated[Array | None, Quantity(polar_vector, "m", "base", "object's origin from the base")] = (
+        None
+    )
+    """Object from the base, base frame, (n, 3) [m]; needed where the policy observes the object, zero without one."""
+    object_quaternion: Annotated[Array | None, Quantity(rotation, "1", "base", "object's orientation, wxyz")] = None
+    """Object's orientation in the base frame, wxyz, (n, 4)."""
+    object_linear_velocity: Annotated[
+        Array | None, Quantity(polar_vector, "m/s", "base", "object's velocity relative to the base")
+    ] = None
+    """Object's velocity relative to the base, base frame, (n, 3) [m/s]."""
+    object_angular_velocity: Annotated[
+        Array | None, Quantity(axial_vector, "rad/s", "base", "object's angular velocity relative to the base")
+    ] = None
+    """Object's angular velocity relative to the base, base frame, (n, 3) [rad/s]."""
+
+    @classmethod
+    def of(cls, source: object) -> Self:
+        """The same arrays, taken from the attributes of something that has them all."""
+        return cls(**{field.name: getattr(source, field.name) for field in fields(cls)})
+
+
+@cache
+def quantities(of_object: bool) -> dict[str, Quantity]:
+    """The measured quantities by name: those of the robot, or those of the object."""
+    hints = get_type_hints(Measured, include_extras=True)
+    chosen = [field.name for field in fields(Measured) if (field.default is not MISSING) == of_object]
+    return {name: hints[name].__metadata__[0] for name in chosen}

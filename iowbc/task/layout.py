@@ -1,0 +1,55 @@
+"""The rows that the environments deliver: s_t, then s_priv."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from iowbc.control.observation import ObservationLayout, observation_layout
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import MirrorMap, side_by_side
+from iowbc.task.privileged import PrivilegedLayout, privileged_layout
+
+
+@dataclass(frozen=True)
+class FullLayout:
+    """Where s_t, s_priv and their parts lie in a row."""
+
+    state: ObservationLayout
+    extra: PrivilegedLayout
+
+    @cached_property
+    def observation(self) -> slice:
+        """Place of s_t."""
+        return slice(0, self.state.size)
+
+    @cached_property
+    def privileged(self) -> slice:
+        """Place of s_priv."""
+        return slice(self.state.size, self.size)
+
+    @cached_property
+    def size(self) -> int:
+        """Length of the row."""
+        return self.state.size + self.extra.size
+
+    @cached_property
+    def mirror(self) -> MirrorMap:
+        """Mirror of a row, (size,), float32."""
+        return side_by_side((self.state.mirror, self.extra.mirror))
+
+    def describe(self) -> dict[str, list[dict[str, Any]]]:
+        """Both parts, for JSON."""
+        return {"observation": self.state.describe(), "privileged": self.extra.describe()}
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Place of each part; a part of s_priv goes by `privileged/<name>`."""
+        shift = self.state.size
+        privileged = {f"privileged/{k}": slice(s.start + shift, s.stop + shift) for k, s in self.extra.slices.items()}
+        return self.state.slices | privileged
+
+
+def full_layout(recipe: Recipe, robot: Robot) -> FullLayout:
+    """Layout of the rows that the environments of a recipe deliver."""
+    return FullLayout(observation_layout(robot, recipe.task.observation.observe_object), privileged_layout(robot))
