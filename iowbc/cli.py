@@ -11,9 +11,9 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from iowbc.commands.request import Request
     from iowbc.pipeline.store.runs import Runs
     from iowbc.pipeline.store.store import Store
-    from iowbc.recipe.recipe import Recipe
 
 app = typer.Typer(
     help="Train, test and export a whole-body controller of a humanoid robot that carries and pushes heavy objects.",
@@ -66,7 +66,15 @@ def run(
     runs: RunsFolder = None,
 ) -> None:
     """Run a recipe: make every stage that is not cached, and resume what was interrupted."""
-    _run_or_plan(recipe, overrides, until, force, workers, on_code_change, runs, only_plan=dry_run)
+    from iowbc.commands.plan import plan as print_plan
+    from iowbc.commands.run import run as run_recipe
+    from iowbc.stages.registry import STAGES
+
+    request = _request(recipe, overrides, until, force, workers, on_code_change, runs)
+    if dry_run:
+        print_plan(request, STAGES, _console())
+    else:
+        raise typer.Exit(run_recipe(request, STAGES, _console()))
 
 
 @app.command()
@@ -79,10 +87,13 @@ def plan(
     runs: RunsFolder = None,
 ) -> None:
     """Say for each stage whether it is cached or would run, why, and how long it takes."""
-    _run_or_plan(recipe, overrides, until, force, None, on_code_change, runs, only_plan=True)
+    from iowbc.commands.plan import plan as print_plan
+    from iowbc.stages.registry import STAGES
+
+    print_plan(_request(recipe, overrides, until, force, None, on_code_change, runs), STAGES, _console())
 
 
-def _run_or_plan(
+def _request(
     recipe: Path,
     overrides: list[str] | None,
     until: str | None,
@@ -90,22 +101,18 @@ def _run_or_plan(
     workers: int | None,
     on_code_change: Literal["report", "rerun"],
     runs: Path | None,
-    only_plan: bool,
-) -> None:
-    from iowbc.commands import run as session
+) -> "Request":
+    from iowbc.commands.request import Request
     from iowbc.pipeline.planner import Options
-    from iowbc.stages import registry
 
     options = Options(until, frozenset(force or ()), on_code_change, workers)
-    request = session.Request(recipe, tuple(overrides or ()), _runs(runs), options)
-    act = session.plan if only_plan else session.run
-    raise typer.Exit(act(request, registry.STAGES, _console()))
+    return Request(recipe, tuple(overrides or ()), _runs(runs), options)
 
 
 @app.command()
 def status(runs: RunsFolder = None) -> None:
     """Show what runs, what was left unfinished, and what each recipe has."""
-    from iowbc.commands.listing import print_status
+    from iowbc.commands.status import print_status
 
     print_status(_store(runs), _console())
 
@@ -116,17 +123,15 @@ def list_(
     runs: RunsFolder = None,
 ) -> None:
     """List the stored artifacts."""
-    from iowbc.commands.listing import list_artifacts
+    from iowbc.commands.ls import list_artifacts
 
-    if stage is not None:
-        _check_stage(stage)
     list_artifacts(_store(runs), _console(), stage)
 
 
 @app.command()
 def show(what: Named, runs: RunsFolder = None) -> None:
     """Show an artifact in detail, or the stages and metrics of a recipe."""
-    from iowbc.commands.listing import show as print_artifact
+    from iowbc.commands.show import show as print_artifact
 
     print_artifact(_store(runs), _console(), what)
 
@@ -186,7 +191,6 @@ def play(
     runs: RunsFolder = None,
 ) -> None:
     """Watch a trained policy in the viewer, or make a film of it."""
-    _check_scene(scene)
     from iowbc.commands.play import play_word
 
     raise typer.Exit(
@@ -215,52 +219,17 @@ def bench_simulation(
     runs: RunsFolder = None,
 ) -> None:
     """Measure how fast the vector environment steps, against a bare loop of MuJoCo; the figures go to MLflow."""
-    given = _given(recipe)
-    _check_scene(scene)
-    from iowbc.benchmarks import simulation
-    from iowbc.pipeline.tracking.tracker import record_figures
-    from iowbc.pipeline.writability import require_writable_runs
+    from iowbc.commands.bench import simulation
 
-    require_writable_runs(_runs(runs))
-    figures = simulation.main(
-        given, scene=scene, environments=environments, workers=tuple(workers or ()), others=others
-    )
-    record_figures(_runs(runs), "bench-sim", figures)
+    simulation(_runs(runs), recipe, scene=scene, environments=environments, workers=workers or (), others=others)
 
 
 @bench.command("rg")
 def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: RunsFolder = None) -> None:
     """Measure how fast the reference generator's samples are labelled, by each method; the figures go to MLflow."""
-    given = _given(recipe)
-    from iowbc.benchmarks import reference
-    from iowbc.pipeline.tracking.tracker import record_figures
-    from iowbc.pipeline.writability import require_writable_runs
+    from iowbc.commands.bench import reference
 
-    require_writable_runs(_runs(runs))
-    record_figures(_runs(runs), "bench-rg", reference.main(given, workers=tuple(workers or ())))
-
-
-def _given(recipe: Path | None) -> "Recipe | None":
-    from iowbc.recipe.reading.loading import load_recipe
-
-    return load_recipe(recipe).recipe if recipe is not None else None
-
-
-def _check_stage(name: str) -> None:
-    from iowbc.errors import UsageError, nearest
-    from iowbc.recipe.recipe import PIPELINE
-
-    if name not in PIPELINE:
-        raise UsageError(f"{name}: no such stage; valid: {', '.join(PIPELINE)}{nearest(name, PIPELINE)}")
-
-
-def _check_scene(name: str) -> None:
-    from iowbc.errors import UsageError, nearest
-    from iowbc.recipe.task.task import SceneShares
-
-    known = list(SceneShares.model_fields)
-    if name not in known:
-        raise UsageError(f"--scene {name}: no such scene; valid: {', '.join(known)}{nearest(name, known)}")
+    reference(_runs(runs), recipe, workers=workers or ())
 
 
 @app.command()
@@ -276,15 +245,9 @@ def ui(
 @app.command()
 def schema(output: Annotated[Path | None, typer.Option(help="File to write to, instead of printing.")] = None) -> None:
     """Write the JSON Schema of recipes, for editors."""
-    import json
+    from iowbc.commands.schema import write_schema
 
-    from iowbc.commands.schema import recipe_schema
-
-    text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
-    if output is None:
-        typer.echo(text, nl=False)
-    else:
-        output.write_text(text, encoding="utf-8")
+    write_schema(output)
 
 
 @app.command()
@@ -325,13 +288,9 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         app(arguments, prog_name="iowbc")
     except Exception as error:
-        from iowbc.errors import UsageError
+        from iowbc.errors import IowbcError
 
-        if not isinstance(error, UsageError):
+        if not isinstance(error, IowbcError):
             raise
         print(error, file=sys.stderr)
-        sys.exit(2)
-
-
-if __name__ == "__main__":
-    main()
+        sys.exit(error.exit_code)

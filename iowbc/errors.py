@@ -1,16 +1,16 @@
 """Every error that iowbc raises on purpose. Each text says what is wrong, where, and what to do next.
 
-IowbcError
-├── UsageError          what was asked for cannot be done (exit 2)
+IowbcError              a command that raises one prints its text and ends with 1
+├── UsageError          what was asked for cannot be done (2)
 │   └── RecipeError     a recipe or an override is wrong; holds every problem found
-├── StageFailed         a stage's result misses a gate or could not be made (exit 1)
-├── PipelineFailed      a run ended at a failed stage (exit 1)
-├── Interrupted         asked to stop; what was done is kept (exit 130)
+├── StageFailed         a stage's result misses a gate or could not be made
+├── PipelineFailed      a run ended at a failed stage
+├── Interrupted         asked to stop; what was done is kept (130)
 ├── Damaged             a file or an artifact is not what was written
-├── ContractBroken      an exported folder is incomplete, damaged, or of another format
+├── ContractBroken      an exported folder is incomplete, damaged, or of another format (2)
 ├── WorkerFailed        a worker process died, hung, or raised
-├── NoRenderer          nothing can be drawn on this machine
-├── NoDisplay           the viewer needs a display and there is none
+├── NoRenderer          nothing can be drawn on this machine (2)
+├── NoDisplay           the viewer needs a display and there is none (2)
 └── Rejected            a sample of the reference generator has no label
 """
 
@@ -35,9 +35,14 @@ class Problem:
 class IowbcError(Exception):
     """Base of all errors that are raised on purpose."""
 
+    exit_code = 1
+    """With which a command ends that raised it."""
+
 
 class UsageError(IowbcError):
     """What was asked for cannot be done; the text says why, what is valid, and what to do."""
+
+    exit_code = 2
 
 
 class RecipeError(UsageError):
@@ -59,6 +64,8 @@ class PipelineFailed(IowbcError):
 class Interrupted(IowbcError):
     """Somebody asked to stop; the text says what is kept."""
 
+    exit_code = 130
+
 
 class Damaged(IowbcError):
     """A file or an artifact is not what was written. The text says how."""
@@ -66,6 +73,8 @@ class Damaged(IowbcError):
 
 class ContractBroken(IowbcError):
     """An exported folder is incomplete, damaged, or of another format. The text says what to do."""
+
+    exit_code = 2
 
 
 class WorkerFailed(IowbcError):
@@ -75,13 +84,24 @@ class WorkerFailed(IowbcError):
 class NoRenderer(IowbcError):
     """Nothing can be drawn on this machine. The text says what to install."""
 
+    exit_code = 2
+
 
 class NoDisplay(IowbcError):
     """The viewer needs a display and there is none. The text says what to do instead."""
 
+    exit_code = 2
+
 
 class Rejected(IowbcError):
     """A sample has no label; the text is the reason, one of a few words so that they can be counted."""
+
+
+def require_known(name: str, what: str, known: Iterable[str]) -> None:
+    """Raises `UsageError` with the known names where `name` is not one of them; `what` is a noun: `scene`, `stage`."""
+    valid = list(known)
+    if name not in valid:
+        raise UsageError(f"{name}: no such {what}; valid: {', '.join(valid)}{nearest(name, valid)}")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -7,9 +7,10 @@ import yaml
 from rich.console import Console
 
 from iowbc.commands.named import named
-from iowbc.errors import Damaged, UsageError
+from iowbc.errors import Damaged, Interrupted, UsageError, require_known
 from iowbc.pipeline.store.last_used import remaking
 from iowbc.pipeline.store.store import RECIPE, Artifact, Store
+from iowbc.recipe.simulation.holding import SCENES
 
 if TYPE_CHECKING:
     from iowbc.evaluation.viewer import Source
@@ -24,6 +25,7 @@ def play_word(
     store: Store, console: Console, word: str, stage: str | None, *, video: Path | None, **settings: Any
 ) -> int:
     """Play what a word names; `settings` are those of `iowbc.evaluation.viewer.play`. Returns the exit code."""
+    require_known(settings["scene"], "scene", SCENES)
     artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
     generator = None
     if artifact is not None:
@@ -31,7 +33,6 @@ def play_word(
         for read in filter(None, (artifact, generator)):
             _check_whole(store, read)
 
-    from iowbc.errors import ContractBroken, Interrupted, NoDisplay, NoRenderer
     from iowbc.evaluation.viewer import exported_source, play
 
     try:
@@ -40,8 +41,6 @@ def play_word(
         else:
             source = _source(artifact, generator)
         result = play(source, video=video, **settings)
-    except (NoDisplay, NoRenderer, ContractBroken) as error:
-        raise UsageError(str(error)) from error
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return 0

@@ -40,6 +40,13 @@ def shown_files(artifact: Artifact) -> Iterator[str]:
         yield shown_path(artifact.folder / EXPORTED)
 
 
+def metrics_text(artifact: Artifact, limit: int | None = None) -> str:
+    """The metrics of an artifact in one line, or the first few."""
+    items = list(artifact.metrics.items())
+    text = ", ".join(f"{name} {value:.4g}" for name, value in items[:limit])
+    return text + (", ..." if limit is not None and len(items) > limit else "")
+
+
 def shown_path(path: Path) -> str:
     """A path as short as it can be said from here."""
     relative = os.path.relpath(path)

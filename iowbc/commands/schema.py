@@ -1,8 +1,20 @@
-"""The JSON Schema of a recipe, for editors."""
+"""`iowbc schema`: the JSON Schema of a recipe, for editors."""
 
+import json
+import sys
+from pathlib import Path
 from typing import Any
 
 from iowbc.recipe.recipe import Recipe
+
+
+def write_schema(output: Path | None) -> None:
+    """Write the schema to a file, or print it."""
+    text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        output.write_text(text, encoding="utf-8")
 
 
 def recipe_schema() -> dict[str, Any]:

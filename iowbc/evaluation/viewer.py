@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
-from iowbc.errors import ContractBroken, Interrupted, NoDisplay, UsageError
+from iowbc.errors import ContractBroken, Interrupted, NoDisplay, UsageError, require_known
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.film import EpisodeFilm
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, trials_at
@@ -76,8 +76,7 @@ def play(
     Interrupted when interrupted or when the viewer was closed.
     """
     recipe = source.recipe
-    if scene not in SCENES:
-        raise UsageError(f"no scene {scene!r}; valid: {', '.join(SCENES)}")
+    require_known(scene, "scene", SCENES)
     mass = 0.0 if scene == FREE else mass
     if video is not None and video.suffix != ".mp4":
         raise UsageError(f"{video}: a film is an mp4 file; give a name that ends in .mp4")

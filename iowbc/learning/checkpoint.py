@@ -14,20 +14,20 @@ from safetensors.numpy import save_file
 from torch import nn
 
 from iowbc.errors import Damaged
+from iowbc.files import replacing, synchronise
 
 Arrays = dict[str, NDArray[Any]]
 
 
 def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Replace the checkpoint at `path` and keep the one before beside it; a crash at any moment leaves one of them."""
-    fresh = path.with_suffix(".fresh")
     contiguous = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
-    save_file(contiguous, fresh, metadata={"key": key, "crc32": _checksum(contiguous)})
-    with fresh.open("rb") as file:
-        os.fsync(file.fileno())
-    if path.is_file():
-        os.replace(path, previous_checkpoint(path))
-    os.replace(fresh, path)
+    metadata = {"key": key, "crc32": _checksum(contiguous)}
+    with replacing(path) as fresh:
+        save_file(contiguous, fresh, metadata=metadata)
+        synchronise(fresh)
+        if path.is_file():
+            os.replace(path, previous_checkpoint(path))
 
 
 def previous_checkpoint(path: Path) -> Path:

@@ -66,12 +66,13 @@ class Curves:
             axes.grid(alpha=0.3)
         figure.savefig(path, dpi=110)
 
-    def write_artifact(self, out: Path, title: str, panels: Sequence[str], terms: Sequence[str] = ()) -> None:
-        """Table, figure (of `panels`, then `terms`) and, of the last row, the summary of a training stage."""
+    def write_artifact(
+        self, out: Path, title: str, panels: Sequence[str], terms: Sequence[str] = ()
+    ) -> dict[str, float]:
+        """Table and figure (of `panels`, then `terms`); returns, of the last row, the metrics of a training stage."""
         (out / "tables").mkdir()
         (out / "figures").mkdir()
         self.write_csv(out / "tables" / "learning_curves.csv")
         self.write_figure(out / "figures" / "learning_curves.png", title, [*panels, *terms])
         last = self.rows[-1]
-        metrics = {name: last[name] for name in ("step", *panels, "steps_per_second") if name in last}
-        (out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
+        return {name: last[name] for name in ("step", *panels, "steps_per_second") if name in last}

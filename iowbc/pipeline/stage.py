@@ -1,11 +1,15 @@
 """What a stage declares and what it receives."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from iowbc.recipe.recipe import Recipe
+
+SUMMARY = "summary.json"
+"""File of an artifact with its metrics."""
 
 
 class Report(Protocol):
@@ -41,6 +45,11 @@ class Job:
     report: Report
     interrupted: Callable[[], bool]
     """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
+
+    def summarize(self, metrics: Mapping[str, float], **details: Any) -> None:
+        """Leave `summary.json`: the figures that tell how it went, shown wherever the artifact is, and details."""
+        text = json.dumps({"metrics": dict(metrics), **details}, indent=1) + "\n"
+        (self.out / SUMMARY).write_text(text, encoding="utf-8")
 
 
 @dataclass(frozen=True)

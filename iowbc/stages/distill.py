@@ -41,7 +41,7 @@ def run(job: Job) -> None:
         environments.close()
 
     save_network(training.network, training.architecture, job.out, "student", {"layout": layout.describe()})
-    curves.write_artifact(job.out, f"{recipe.name}: student", PANELS)
+    job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 
 
 STAGE = Stage(

@@ -1,6 +1,5 @@
 """Stage `eval`: mass sweeps and heavy cases with the trained policy, their tables, figures and films."""
 
-import json
 from typing import TYPE_CHECKING
 
 from iowbc.errors import Interrupted, StageFailed
@@ -60,7 +59,7 @@ def run(job: Job) -> None:
         raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
     metrics = headline(summary)
     job.report.metrics(metrics, 0)
-    (job.out / "summary.json").write_text(json.dumps({"metrics": metrics}, indent=1) + "\n")
+    job.summarize(metrics)
     for suite, rows in summary.groupby("suite", sort=False):
         counts = ", ".join(f"{row['mass']:g} kg {row['survived']}/{row['trials']}" for _, row in rows.iterrows())
         job.report.say(f"{suite}: survived {counts}")

@@ -1,7 +1,5 @@
 """Stage `export`: one ONNX graph with everything baked in, its contract and golden vectors, checked and tried out."""
 
-import json
-
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
@@ -70,8 +68,7 @@ def run(job: Job) -> None:
         "acceptance_survived": float(survived),
     }
     job.report.metrics(metrics, 0)
-    summary = {"metrics": metrics, "parity_by_output": differences, "seconds": [trial.seconds for trial in played]}
-    (job.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+    job.summarize(metrics, parity_by_output=differences, seconds=[trial.seconds for trial in played])
     job.report.say(
         f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(policy.inputs)} steps; "
         f"an inference takes {metrics['inference_ms']:.3f} ms"

@@ -1,6 +1,5 @@
 """Stage rg-dataset: labels arm postures and base commands with support postures, and checks them in two ways."""
 
-import json
 import time
 
 from iowbc.errors import Interrupted, StageFailed
@@ -85,12 +84,7 @@ def run(job: Job) -> None:
     dataset.save(job.out / "dataset.npz")
     region.map.save(job.out / "feasible.npz")
     rejected = reasons(result)
-    summary = {
-        "metrics": metrics,
-        "rejected": rejected,
-        "worst_crosscheck": [] if check is None else check.worst,
-    }
-    (job.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    job.summarize(metrics, rejected=rejected, worst_crosscheck=[] if check is None else check.worst)
     job.report.metrics(metrics, 0)
     job.report.say(f"{len(dataset)} of {plan.count} samples have a label; labelling took {seconds:.0f} s here")
     figures = job.out / "figures"

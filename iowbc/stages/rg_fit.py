@@ -1,8 +1,5 @@
 """Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples."""
 
-import json
-from typing import Any
-
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Stage
 
@@ -10,7 +7,7 @@ WORST_SHOWN = 5
 
 
 def run(job: Job) -> None:
-    """Leaves `rg.safetensors`, `rg.json`, `feasible.npz`, `report.json` and figures."""
+    """Leaves `rg.safetensors`, `rg.json`, `feasible.npz`, `summary.json` and figures."""
     import numpy as np
 
     from iowbc.control.feasible_map import FeasibleMap
@@ -72,15 +69,8 @@ def run(job: Job) -> None:
     errors = prepared.kinematics.errors([prepared.samples[i] for i in held], predicted.astype(np.float64))
     jumps = measure_jumps(network, rg, feasible, dataset.arm[held], job.recipe.seed)
     verdict = judge_fit(rg.fit.gates, dataset, held, predicted, errors, jumps)
-    report: dict[str, Any] = {
-        "metrics": verdict.metrics,
-        "gates": verdict.gates,
-        "worst": verdict.worst,
-        "samples": {"training": len(prepared.train.inputs), "held_out": len(held), "best_epoch": fitted.epochs},
-    }
-    text = json.dumps(report, indent=2) + "\n"
-    (job.out / "report.json").write_text(text, encoding="utf-8")
-    (job.out / "summary.json").write_text(text, encoding="utf-8")
+    samples = {"training": len(prepared.train.inputs), "held_out": len(held), "best_epoch": fitted.epochs}
+    job.summarize(verdict.metrics, gates=verdict.gates, worst=verdict.worst, samples=samples)
     job.report.metrics(verdict.metrics, fitted.epochs)
     figures = job.out / "figures"
     figures.mkdir(exist_ok=True)

@@ -52,7 +52,7 @@ def run(job: Job) -> None:
     if (job.work / "divergences").is_dir():
         (job.work / "divergences").rename(job.out / "divergences")
     terms = sorted({name for row in curves.rows for name in row if name.startswith("reward/")})
-    curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
+    job.summarize(curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms))
 
 
 STAGE = Stage(

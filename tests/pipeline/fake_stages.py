@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 
 from iowbc.errors import Interrupted, StageFailed
+from iowbc.files import write_whole
 from iowbc.pipeline import stage as contract
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.pipeline.store.runs import write_atomically
 from iowbc.pipeline.tracking import tracker as tracking
 from iowbc.recipe.recipe import Recipe
 
@@ -31,7 +31,7 @@ def counting(name: str) -> Callable[[Job], None]:
         while done < steps:
             time.sleep(behaviour.get("pause", 0.0))
             done += 1
-            write_atomically(checkpoint, json.dumps(done))
+            write_whole(checkpoint, json.dumps(done))
             job.report.metrics({"count": float(done), "half": done / 2}, done)
             job.report.progress(done, steps, f"at {done}")
             if job.interrupted():
@@ -45,7 +45,7 @@ def counting(name: str) -> Callable[[Job], None]:
         (job.out / "tables" / "counts.md").write_text(f"| {name} |\n|---|\n| {done} |\n")
         (job.out / "figures" / "curve.png").write_bytes(b"not really a picture")
         (job.out / "result.json").write_text(json.dumps({"seed": job.recipe.seed, "started_at": started_at}))
-        (job.out / "summary.json").write_text(json.dumps({"metrics": {"count": float(done)}}))
+        job.summarize({"count": float(done)})
 
     return run
 

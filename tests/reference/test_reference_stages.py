@@ -146,7 +146,7 @@ def test_optimal_control_alone_labels_a_dataset(tmp_path: Path) -> None:
 def test_the_fit_leaves_a_network_its_map_and_a_report(fit_job: Job, dataset_job: Job) -> None:
     for name in ("rg.safetensors", "rg.json", "figures/errors.png", "figures/joints.png", "figures/learning.png"):
         assert (fit_job.out / name).stat().st_size > 0, name
-    report = json.loads((fit_job.out / "report.json").read_text())
+    report = json.loads((fit_job.out / "summary.json").read_text())
     assert set(report["gates"]) == set(type(fit_job.recipe.rg.fit.gates).model_fields)
     assert all(gate["passed"] for gate in report["gates"].values())
 
@@ -185,7 +185,7 @@ def test_the_quickstarts_map_leaves_ordinary_commands_alone(tmp_path: Path, robo
 def test_the_fit_is_the_same_on_every_run(fit_job: Job, dataset_job: Job, tmp_path: Path) -> None:
     job = make_job(tmp_path, small_recipe(), inputs={"rg-dataset": dataset_job.out}, workers=2)
     rg_fit.run(job)
-    for name in ("rg.safetensors", "rg.json", "report.json"):
+    for name in ("rg.safetensors", "rg.json", "summary.json"):
         assert (job.out / name).read_bytes() == (fit_job.out / name).read_bytes(), name
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import Trial, heavier_mass, heavy_trials, sweep_trials
 from iowbc.evaluation.trials.rollout import Acting, Played, play_episodes
+from iowbc.files import replacing
 from iowbc.recipe.evaluation import Success
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.episodes import Episode
@@ -91,9 +92,8 @@ class Protocol:
             )
             rows = [trial_row(self.recipe, t, p) for t, p in zip(trials, played, strict=True)]
             table = pd.DataFrame(rows).assign(batch_size=size, batch_row=places)
-            unfinished = path.with_suffix(".part")
-            table.to_parquet(unfinished, index=False)
-            unfinished.rename(path)
+            with replacing(path) as fresh:
+                table.to_parquet(fresh, index=False)
         self.done += len(trials)
         self.progress(self.done, self.total, name)
         return pd.read_parquet(path)

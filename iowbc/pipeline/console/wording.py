@@ -1,5 +1,6 @@
 """Spans of time, sizes and lists of reasons in words for people."""
 
+import time
 from collections.abc import Sequence
 
 KEY_LENGTH = 12
@@ -22,6 +23,11 @@ def duration(seconds: float | None) -> str:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def ago(moment: float) -> str:
+    """How long ago a moment [s since 1970] was; empty for 0."""
+    return f"{duration(max(0.0, time.time() - moment))} ago" if moment else ""
 
 
 def size(count: float) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.errors import UsageError
-from iowbc.pipeline.store.runs import Runs, read_json, write_atomically
+from iowbc.files import write_whole
+from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.pipeline.store.store import RECIPE, Artifact
 from iowbc.recipe.reading.loading import LoadedRecipe
 
@@ -20,7 +21,7 @@ def remember(runs: Runs, loaded: LoadedRecipe, stage: str, key: str) -> None:
     record["overrides"] = list(loaded.overrides)
     record["recipe"] = loaded.recipe.model_dump(mode="json")
     record.setdefault("stages", {})[stage] = {"key": key, "time": time.time()}
-    write_atomically(path, json.dumps(record, indent=1))
+    write_whole(path, json.dumps(record, indent=1))
 
 
 def recall(runs: Runs, recipe: str) -> dict[str, Any]:

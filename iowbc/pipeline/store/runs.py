@@ -1,13 +1,9 @@
 """Where everything that runs leave behind is kept."""
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-RUNS_VARIABLE = "IOWBC_RUNS"
-"""Environment variable that names another folder than `./runs`."""
 
 
 @dataclass(frozen=True)
@@ -55,19 +51,6 @@ class Runs:
     def tracked_files(self) -> Path:
         """Files of MLflow's runs, where it uses the embedded database."""
         return self.root / "mlartifacts"
-
-
-def default_runs() -> Runs:
-    """`./runs`, or the folder that the environment names."""
-    return Runs(Path(os.environ.get(RUNS_VARIABLE) or "runs"))
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Replace a file so that a reader, or a crash, meets the old text or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
 
 
 def read_json(path: Path) -> Any:

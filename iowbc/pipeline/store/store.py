@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from iowbc.errors import Damaged
+from iowbc.files import synchronise, write_whole
+from iowbc.pipeline.stage import SUMMARY
 from iowbc.pipeline.store.digests import content_digest, file_digest
-from iowbc.pipeline.store.runs import Runs, read_json, write_atomically
+from iowbc.pipeline.store.runs import Runs, read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,8 +80,8 @@ class Artifact:
 
     @property
     def metrics(self) -> dict[str, float]:
-        """The metrics of the stage's `summary.json`."""
-        summary = read_json(self.folder / "summary.json")
+        """The metrics that the stage left in its summary."""
+        summary = read_json(self.folder / SUMMARY)
         metrics = summary.get("metrics") if isinstance(summary, dict) else None
         if not isinstance(metrics, dict):
             return {}
@@ -154,12 +156,12 @@ class Store:
         }
         digest = content_digest({name: record.sha256 for name, record in files.items()})
         manifest = Manifest(**details, digest=digest, files=files, made=time.time())
-        write_atomically(out / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
-        write_atomically(out / RECIPE, recipe)
+        write_whole(out / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
+        write_whole(out / RECIPE, recipe)
         for name in (*files, INGREDIENTS, RECIPE):
-            _synchronise(out / name)
-        write_atomically(out / MANIFEST, manifest.model_dump_json(indent=1))
-        _synchronise(out / MANIFEST)
+            synchronise(out / name)
+        write_whole(out / MANIFEST, manifest.model_dump_json(indent=1))
+        synchronise(out / MANIFEST)
 
     def publish(self, out: Path, stage: str, key: str) -> Artifact:
         """Rename sealed output into the store; an artifact that stands there already goes with the work folder."""
@@ -170,7 +172,7 @@ class Store:
             shutil.rmtree(replaced, ignore_errors=True)
             os.rename(folder, replaced)
         os.rename(out, folder)
-        _synchronise(folder.parent)
+        synchronise(folder.parent)
         artifact = self.find(stage, key)
         assert artifact is not None
         return artifact
@@ -194,11 +196,3 @@ def _read(folder: Path, stage: str, key: str) -> Artifact:
     if (manifest.stage, manifest.key) != (stage, key):
         raise Damaged(f"{MANIFEST} belongs to {manifest.stage} {manifest.key}")
     return Artifact(folder, manifest)
-
-
-def _synchronise(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -7,8 +7,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from iowbc.files import write_whole
 from iowbc.pipeline.machine import host
-from iowbc.pipeline.store.runs import Runs, read_json, write_atomically
+from iowbc.pipeline.store.runs import Runs, read_json
 
 PROGRESS = "progress.json"
 WRITE_INTERVAL = 1.0
@@ -82,7 +83,7 @@ class Workspace:
         """Record the progress on disk."""
         self._written = time.monotonic()
         self._state.update(seconds=self.seconds, updated=time.time())
-        write_atomically(self.root / PROGRESS, json.dumps(self._state))
+        write_whole(self.root / PROGRESS, json.dumps(self._state))
 
     def remove(self) -> None:
         """Remove scratch, checkpoints and leftovers."""

@@ -14,7 +14,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from iowbc.pipeline.store.runs import read_json, write_atomically
+from iowbc.files import write_whole
+from iowbc.pipeline.store.runs import read_json
 
 
 def now() -> int:
@@ -140,7 +141,7 @@ def sent(path: Path) -> tuple[int, dict[str, str]]:
 
 def mark_sent(path: Path, offset: int, ids: Mapping[str, str]) -> None:
     """Record that MLflow has a journal up to an offset."""
-    write_atomically(sent_path(path), json.dumps({"offset": offset, "ids": dict(ids)}))
+    write_whole(sent_path(path), json.dumps({"offset": offset, "ids": dict(ids)}))
 
 
 def unsent(path: Path) -> bool:

@@ -1,6 +1,6 @@
 """The Markov decision process."""
 
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
@@ -12,8 +12,6 @@ from iowbc.recipe.task.joint_references import References
 from iowbc.recipe.task.observation import Observation
 from iowbc.recipe.task.reward import Reward
 from iowbc.recipe.task.termination import Termination
-
-SceneName = Literal["free", "lift", "tyre", "push"]
 
 
 class SceneShares(Section):

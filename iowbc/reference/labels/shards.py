@@ -1,6 +1,5 @@
 """The results of labelling in pieces on disk, so that an interrupted stage goes on where it stopped."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+
+from iowbc.files import replacing
 
 Array = NDArray[Any]
 
@@ -29,8 +30,7 @@ class Shard:
 
 def write_shard(path: Path, key: str, shard: Shard) -> None:
     """Writes a shard and renames it into place."""
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    with temporary.open("wb") as file:
+    with replacing(path) as fresh, fresh.open("wb") as file:
         np.savez(
             file,
             allow_pickle=False,
@@ -40,9 +40,6 @@ def write_shard(path: Path, key: str, shard: Shard) -> None:
             reasons=np.array(shard.reasons, dtype=np.str_),
             **{f"label_{name}": values for name, values in shard.labels.items()},
         )
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
 
 
 def read_shard(path: Path, key: str, indices: Sequence[int]) -> Shard | None:

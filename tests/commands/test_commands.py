@@ -27,7 +27,7 @@ def processor_seconds(act: Callable[[], object]) -> float:
 
 
 def iowbc(*arguments: str) -> None:
-    subprocess.run([sys.executable, "-m", "iowbc.cli", *arguments], capture_output=True, check=False)
+    subprocess.run([sys.executable, "-m", "iowbc", *arguments], capture_output=True, check=False)
 
 
 def test_help_answers_at_once() -> None:

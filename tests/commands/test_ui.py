@@ -24,7 +24,7 @@ def test_a_taken_port_is_refused_with_a_free_one(tmp_path: Path) -> None:
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = int(other.getsockname()[1])
-        words = [sys.executable, "-m", "iowbc.cli", "ui", "--port", str(port), "--runs", str(tmp_path / "runs")]
+        words = [sys.executable, "-m", "iowbc", "ui", "--port", str(port), "--runs", str(tmp_path / "runs")]
         done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert done.stderr.startswith(f"port {port} is taken; try --port ")
@@ -34,7 +34,7 @@ def test_a_taken_port_is_refused_with_a_free_one(tmp_path: Path) -> None:
 def test_the_interface_answers_and_ends(tmp_path: Path) -> None:
     port = free_port()
     address = f"http://127.0.0.1:{port}"
-    words = [sys.executable, "-m", "iowbc.cli", "ui", "--port", str(port), "--runs", str(tmp_path / "runs")]
+    words = [sys.executable, "-m", "iowbc", "ui", "--port", str(port), "--runs", str(tmp_path / "runs")]
     with (tmp_path / "log.txt").open("w") as log, subprocess.Popen(words, stdout=log, stderr=log) as server:
         limit = time.monotonic() + 90.0
         while True:

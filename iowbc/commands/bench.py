@@ -1,0 +1,38 @@
+"""`iowbc bench`: the speed of this machine; the figures go to MLflow."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from iowbc.errors import require_known
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.tracker import record_figures
+from iowbc.pipeline.writability import require_writable_runs
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.task.task import SceneShares
+
+
+def simulation(
+    runs: Runs, file: Path | None, *, scene: str, environments: int, workers: Sequence[int], others: bool
+) -> None:
+    """Measure the vector environment, of the default recipe or of one in a file. Raises `UsageError`."""
+    require_known(scene, "scene", SceneShares.model_fields)
+    recipe = _recipe(file)
+    require_writable_runs(runs)
+    from iowbc.benchmarks import simulation
+
+    figures = simulation.main(recipe, scene=scene, environments=environments, workers=tuple(workers), others=others)
+    record_figures(runs, "bench-sim", figures)
+
+
+def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
+    """Measure the labelling of samples, of the default recipe or of one in a file. Raises `UsageError`."""
+    recipe = _recipe(file)
+    require_writable_runs(runs)
+    from iowbc.benchmarks import reference
+
+    record_figures(runs, "bench-rg", reference.main(recipe, workers=tuple(workers)))
+
+
+def _recipe(file: Path | None) -> Recipe | None:
+    return load_recipe(file).recipe if file is not None else None

@@ -1,0 +1,39 @@
+"""`iowbc ls`: the stored artifacts."""
+
+from rich.console import Console
+from rich.text import Text
+
+from iowbc.commands.named import known_recipes, last_used
+from iowbc.commands.results import metrics_text
+from iowbc.commands.tables import plain_table
+from iowbc.errors import require_known
+from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
+from iowbc.pipeline.store.store import Store
+from iowbc.recipe.recipe import PIPELINE
+
+
+def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
+    """A row for each artifact, oldest first. Raises `UsageError` for an unknown stage."""
+    if stage is not None:
+        require_known(stage, "stage", PIPELINE)
+    users: dict[str, list[str]] = {}
+    for recipe in known_recipes(store):
+        for artifact in last_used(store, recipe).values():
+            users.setdefault(artifact.manifest.key, []).append(recipe)
+    table = plain_table("stage", "key", "used by", "made", "took", "size", "metrics")
+    artifacts = store.artifacts(stage)
+    for artifact in artifacts:
+        manifest = artifact.manifest
+        table.add_row(
+            manifest.stage,
+            manifest.key[:KEY_LENGTH],
+            ", ".join(users.get(manifest.key, ["-"])),
+            ago(manifest.made),
+            duration(manifest.seconds),
+            size(artifact.size),
+            Text(metrics_text(artifact, 3)),
+        )
+    if artifacts:
+        console.print(table)
+    else:
+        console.print(f"nothing is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it", highlight=False)

@@ -1,0 +1,48 @@
+"""`iowbc plan`: what would run, why, and how long that takes."""
+
+from collections.abc import Mapping
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.commands.request import Request, prepared
+from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
+from iowbc.pipeline.planner import Step
+from iowbc.pipeline.stage import Stage
+
+REASONS_SHOWN = 8
+"""Reasons of a stage that are printed; the rest is counted."""
+
+
+def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> None:
+    """Print what would run, and why."""
+    planner, _ = prepared(request, registry)
+    steps = planner.plan()
+    table = Table(box=None, padding=(0, 1))
+    for name in ("stage", "plan", "why", "takes about"):
+        table.add_column(name, no_wrap=name != "why")
+    for step in steps:
+        table.add_row(*_row(step))
+    console.print(table)
+    missing = [step for step in steps if not step.cached]
+    count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
+    known = [step.expected for step in missing if step.expected is not None]
+    if not missing:
+        console.print("all stages are cached", highlight=False)
+    elif not known:
+        console.print(f"{count}; how long that takes is not known", highlight=False)
+    else:
+        rest = len(missing) - len(known)
+        parts = [f"about {duration(sum(known))}"]
+        parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
+        console.print(f"{count}: {', and '.join(parts)}", highlight=False)
+
+
+def _row(step: Step) -> tuple[str | Text, ...]:
+    """Stage, what is planned for it, why, and the time that it takes."""
+    if step.cached:
+        why = "\n".join(step.notes) or (step.key or "")[:KEY_LENGTH]
+        return step.stage.name, Text("cached", style="cyan"), Text(why), ""
+    why = "\n".join((short(step.reasons, REASONS_SHOWN), *step.notes))
+    return step.stage.name, Text("run", style="bold yellow"), Text(why), duration(step.expected)

@@ -1,0 +1,55 @@
+"""What `iowbc run` and `iowbc plan` were asked for, checked before anything heavy is imported."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from iowbc.commands.robot_check import check_against_robot
+from iowbc.errors import Problem, RecipeError
+from iowbc.pipeline.planner import Options, Planner
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.loading import load_recipe
+
+
+@dataclass(frozen=True)
+class Request:
+    """What `iowbc run` was asked for."""
+
+    file: Path
+    overrides: Sequence[str]
+    runs: Runs
+    options: Options
+
+    def command(self, forced: Sequence[str]) -> str:
+        """The command that goes on with this run; `forced` stages are still to be made anew."""
+        words = ["iowbc", "run", str(self.file)]
+        for override in self.overrides:
+            words += ["--set", override]
+        if self.options.until:
+            words += ["--until", self.options.until]
+        for stage in sorted(forced):
+            words += ["--force", stage]
+        if self.options.workers:
+            words += ["--workers", str(self.options.workers)]
+        if self.options.on_code_change != "report":
+            words += ["--on-code-change", self.options.on_code_change]
+        if self.runs.root != Path("runs"):
+            words += ["--runs", str(self.runs.root)]
+        return shlex.join(words)
+
+
+def prepared(request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
+    """The planner of a request and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
+    loaded = load_recipe(request.file, request.overrides)
+
+    from iowbc.robot.description import robot_folder
+
+    try:
+        robot = robot_folder(loaded.recipe.robot)
+    except FileNotFoundError as error:
+        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
+    check_against_robot(loaded, robot)
+    return Planner(loaded, registry, Store(request.runs), robot, request.options), robot

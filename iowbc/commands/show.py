@@ -1,0 +1,69 @@
+"""`iowbc show`: one artifact in detail, or the stages and metrics of a recipe."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.commands.named import named
+from iowbc.commands.results import metrics_text, shown_files, shown_path
+from iowbc.commands.tables import plain_table
+from iowbc.errors import shown
+from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
+from iowbc.pipeline.nested import flattened
+from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.recipe.recipe import Recipe
+
+
+def show(store: Store, console: Console, word: str) -> None:
+    """All of one artifact, or the stages and metrics of a recipe."""
+    found = named(store, word)
+    if found.recipe is not None:
+        table = plain_table("stage", "key", "made", "took", "metrics")
+        for stage, artifact in found.artifacts.items():
+            manifest = artifact.manifest
+            row = (stage, manifest.key[:KEY_LENGTH], ago(manifest.made), duration(manifest.seconds))
+            table.add_row(*row, Text(metrics_text(artifact)))
+        console.print(table)
+        return
+    (artifact,) = found.artifacts.values()
+    _show_artifact(artifact, console)
+
+
+def _show_artifact(artifact: Artifact, console: Console) -> None:
+    manifest, ingredients = artifact.manifest, artifact.ingredients
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    rows = {
+        "stage": f"{manifest.stage}, version {manifest.version}",
+        "key": manifest.key,
+        "folder": shown_path(artifact.folder),
+        "made": f"{ago(manifest.made)} by recipe {manifest.recipe} on {manifest.host}",
+        "took": f"{duration(manifest.seconds)} in {manifest.attempts} attempt(s) with {manifest.workers} worker(s)",
+        "reads": "\n".join(f"{name} (content {digest[:KEY_LENGTH]})" for name, digest in _inputs(ingredients).items()),
+        "metrics": "\n".join(f"{name} {value:.6g}" for name, value in artifact.metrics.items()),
+        "files": "\n".join(f"{name} ({size(record.size)})" for name, record in manifest.files.items()),
+        "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
+        "recipe": "\n".join(_unusual(ingredients.get("recipe", {}))),
+        "to look at": "\n".join(shown_files(artifact)),
+    }
+    for name, text in rows.items():
+        if text:
+            grid.add_row(Text(name, style="bold"), Text(text))
+    console.print(grid, soft_wrap=True)
+
+
+def _unusual(slices: Mapping[str, Any]) -> list[str]:
+    """The values of a stage's part of the recipe that are not the defaults."""
+    usual = flattened(Recipe(name="default").model_dump(mode="json"))
+    own = flattened(slices)
+    found = [f"{path}: {shown(value)}" for path, value in own.items() if path not in usual or usual[path] != value]
+    return [*found, "all else is default"]
+
+
+def _inputs(ingredients: dict[str, object]) -> dict[str, str]:
+    inputs = ingredients.get("inputs")
+    return {str(name): str(digest) for name, digest in inputs.items()} if isinstance(inputs, dict) else {}
