@@ -62,7 +62,7 @@ def _report(runs: Sequence[Named], output: Path) -> None:
         if any(counts[label] > 1 for label in own):
             labels[run.word] = own[0]
             trials[index] = table.assign(variant=run.word)
-    rates = {run.artifacts["eval"].ingredients["recipe"]["eval"]["success"]["capacity_rate"] for run in runs}
+    rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:
         raise UsageError(
             f"the recipes count a mass as carried at different rates (eval.success.capacity_rate): {rates}"

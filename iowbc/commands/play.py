@@ -3,13 +3,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
 from rich.console import Console
 
 from iowbc.commands.named import named
 from iowbc.errors import Damaged, Interrupted, UsageError, require_known
 from iowbc.pipeline.store.last_used import remaking
-from iowbc.pipeline.store.store import RECIPE, Artifact, Store
+from iowbc.pipeline.store.store import Artifact, Store
 from iowbc.recipe.simulation.holding import SCENES
 
 if TYPE_CHECKING:
@@ -92,6 +91,6 @@ def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
 
-    recipe = Recipe.model_validate(yaml.safe_load((artifact.folder / RECIPE).read_text(encoding="utf-8")))
+    recipe = Recipe.model_validate(artifact.recipe)
     folder = robot_folder(recipe.robot)
     return Source(recipe, folder, generator.folder if generator is not None else None, artifact.folder)

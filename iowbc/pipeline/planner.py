@@ -5,14 +5,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import iowbc
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.store.digests import code_digests, data_digest, folder_digest
+from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, folder_digest
 from iowbc.pipeline.store.store import Artifact, Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.recipe.section import deciding
 
 OnCodeChange = Literal["report", "rerun"]
 
@@ -62,7 +62,7 @@ class Planner:
         self.store = store
         self.options = options
         self.robot_digest = folder_digest(robot)
-        self.resolved = loaded.recipe.model_dump(mode="json")
+        self.deciding = deciding(loaded.recipe)
         self.stages = self._selected(registry)
 
     def _selected(self, registry: Mapping[str, Stage]) -> list[Stage]:
@@ -107,7 +107,7 @@ class Planner:
         ingredients = {
             "stage": stage.name,
             "version": stage.version,
-            "recipe": {path: slice_value(self.resolved, path, stage) for path in stage.slice},
+            "recipe": {path: slice_value(self.deciding, path, stage) for path in stage.slice},
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
@@ -140,9 +140,17 @@ class Planner:
             if changed:
                 text = f"code changed since it was made: {', '.join(changed)}"
                 (found if self.options.on_code_change == "rerun" else notes).append(text)
+            notes.extend(self._looks(stage, artifact))
         if found:
             notes.extend(self._checkpoint(stage, key))
         return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code)
+
+    def _looks(self, stage: Stage, artifact: Artifact) -> Iterator[str]:
+        """Cosmetic values of a stage that an artifact was made with otherwise: it is used, and looks as it did."""
+        for path, old, new in differences(artifact.recipe, self.loaded.recipe.model_dump(mode="json")):
+            of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
+            if of_stage and MISSING not in (old, new) and stage.name not in self.options.force:
+                yield f"{path} is {_shown(old)} in it; `--force {stage.name}` makes it with {_shown(new)}"
 
     def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
         """What an earlier attempt has left."""
@@ -202,20 +210,20 @@ def stage_code(stage: Stage) -> dict[str, str]:
     """Digests of a stage's own module and of the parts of the package that it declares."""
     module = stage.run.__module__.removeprefix("iowbc.")
     own = {module} if module != stage.run.__module__ else set()
-    return code_digests(Path(iowbc.__file__).parent, own | set(stage.packages))
+    return code_digests(PACKAGE, own | set(stage.packages))
 
 
 def _shown(value: Any) -> str:
     return "(absent)" if value is MISSING else shown(value)
 
 
-def slice_value(resolved: Mapping[str, Any], path: str, stage: Stage) -> Any:
-    """The part of a recipe at a dotted path."""
+def slice_value(values: Mapping[str, Any], path: str, stage: Stage) -> Any:
+    """The part at a dotted path of what decides a recipe's results."""
     if path.split(".")[0] in ("execution", "stages"):
         raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
-    value: Any = resolved
+    value: Any = values
     for part in path.split("."):
         if not isinstance(value, Mapping) or part not in value:
-            raise ValueError(f"stage {stage.name}: its slice names '{path}', which no recipe has")
+            raise ValueError(f"stage {stage.name}: its slice names '{path}', which decides nothing in a recipe")
         value = value[part]
     return value

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, PositiveInt, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import COSMETIC, Section
 
 
 class Distillation(Section):
@@ -40,7 +40,7 @@ class Distillation(Section):
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
     std_floor: float = Field(default=0.1, gt=0)
     """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales the error."""
-    checkpoint_every: int = Field(default=50, ge=1)
+    checkpoint_every: int = Field(default=50, ge=1, json_schema_extra=COSMETIC)
     """Rounds between two checkpoints."""
 
     @model_validator(mode="after")

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import COSMETIC, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 
 REACHABLE_HEIGHT = (0.3, 1.0)
@@ -116,7 +116,7 @@ class Success(Section):
 
     slip_fails: bool = False
     """Also count a trial as failed in which a hand ever lost the object, even though the other kept it."""
-    capacity_rate: float = Field(default=0.8, gt=0, le=1)
+    capacity_rate: float = Field(default=0.8, gt=0, le=1, json_schema_extra=COSMETIC)
     """Success rate that a mass, and every lighter one, must reach to count as carried (load capacity)."""
 
 
@@ -154,7 +154,7 @@ class Evaluation(Section):
 
     policy: Literal["student", "teacher"] = "student"
     """Which network acts: the deployable student, or the teacher with its privileged observation."""
-    label: str = Field(default="IO-WBC", min_length=1)
+    label: str = Field(default="IO-WBC", min_length=1, json_schema_extra=COSMETIC)
     """Name of the variant in tables and figures; the paper's are IO-WBC, WBC, w/o RG, w/o Distill."""
     trials: int = Field(default=5, ge=1)
     """Trials per mass; trial k of every mass and variant has the same seed."""
@@ -172,7 +172,7 @@ class Evaluation(Section):
     """Keep the impulses on the object and the pushes on the base during trials."""
     success: Success = Success()
     """When a trial counts as survived."""
-    video: Video = Video()
+    video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
     """Short films of trials."""
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation import Segment
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import COSMETIC, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 
 
@@ -46,7 +46,7 @@ class Export(Section):
     action [rad]; both round differently, by some 1e-6."""
     golden_steps: int = Field(default=100, ge=1)
     """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
-    timing_steps: int = Field(default=500, ge=1)
+    timing_steps: int = Field(default=500, ge=1, json_schema_extra=COSMETIC)
     """Inferences timed for the report."""
     acceptance: Acceptance | None = Acceptance()
     """The trial that accepts the exported controller; empty leaves it out."""

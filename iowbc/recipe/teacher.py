@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import COSMETIC, Section
 
 
 class Teacher(Section):
@@ -52,7 +52,7 @@ class Teacher(Section):
     """`augment` also learns from the left-right mirror image of every sample."""
     normalization_clip: float = Field(default=10.0, gt=0)
     """Normalised observations are clipped to this many standard deviations."""
-    checkpoint_every: int = Field(default=20, ge=1)
+    checkpoint_every: int = Field(default=20, ge=1, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
     @model_validator(mode="after")

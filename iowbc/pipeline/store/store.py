@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from iowbc.errors import Damaged
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 MANIFEST = "manifest.json"
 INGREDIENTS = "key.json"
 RECIPE = "recipe.yaml"
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 RECORDS = (MANIFEST, INGREDIENTS, RECIPE)
 """What the runner adds to a stage's own files."""
 
@@ -72,6 +74,15 @@ class Artifact:
     def ingredients(self) -> dict[str, Any]:
         """What its key was computed from."""
         return read_json(self.folder / INGREDIENTS) or {}
+
+    @property
+    def recipe(self) -> dict[str, Any]:
+        """The resolved recipe that it was made with; empty where that is not readable."""
+        try:
+            found = yaml.load((self.folder / RECIPE).read_bytes(), Loader=_LOADER)
+        except (OSError, yaml.YAMLError):
+            return {}
+        return found if isinstance(found, dict) else {}
 
     @property
     def size(self) -> int:

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import COSMETIC, Section
 from iowbc.recipe.simulation.partner import Partner
 from iowbc.recipe.simulation.randomization import Impulses, Pushes, Randomization
 from iowbc.recipe.simulation.scene import Scenes
@@ -35,7 +35,7 @@ class Physics(Section):
     """Vertical force above which a foot counts as being on the ground [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
     """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
-    divergences_kept: int = Field(default=8, ge=0)
+    divergences_kept: int = Field(default=8, ge=0, json_schema_extra=COSMETIC)
     """How many diverged simulations are kept for replay."""
 
 
