@@ -26,7 +26,7 @@ MAY_IMPORT = {
     "deploy": SHARED,
     "pipeline": {"recipe", "errors", "files", "processes"},
     "sim": SHARED,
-    "reference": SHARED,
+    "reference": WORLD,
     "learning": SHARED,
     "task": WORLD,
     "evaluation": WORLD | {"task", "reference", "learning", "deploy"},

@@ -69,6 +69,15 @@ def test_how_a_machine_runs_a_recipe_is_in_no_key(workplace: Workplace) -> None:
     assert all(step.cached for step in steps.values())
 
 
+def test_what_only_changes_how_it_looks_is_in_no_key_and_is_told(workplace: Workplace) -> None:
+    workplace.run()
+    step = workplace.plan("eval.video.count=7")["eval"]
+    assert step.cached
+    assert step.notes == ("eval.video.count is 2 in it; `--force eval` makes it with 7",)
+    workplace.run("eval.video.count=7", force=frozenset({"eval"}))
+    assert workplace.plan("eval.video.count=7")["eval"].notes == ()
+
+
 def test_going_back_to_an_earlier_recipe_finds_its_artifacts(workplace: Workplace) -> None:
     workplace.run()
     workplace.run("seed=4")
@@ -221,14 +230,15 @@ def test_a_duration_is_told_for_people(seconds: float | None, text: str) -> None
 def test_the_stages_of_the_package_are_light_and_whole() -> None:
     """Their slices name real parts of a recipe, their code exists, and their order is the pipeline's."""
     from iowbc.recipe.recipe import PIPELINE, Recipe
+    from iowbc.recipe.section import deciding
     from iowbc.stages.registry import STAGES
 
     assert tuple(STAGES) == PIPELINE
-    resolved = Recipe(name="any").model_dump(mode="json")
+    values = deciding(Recipe(name="any"))
     for stage in STAGES.values():
         assert planning.stage_code(stage)
         for path in stage.slice:
-            assert planning.slice_value(resolved, path, stage) is not None or "." in path
+            assert planning.slice_value(values, path, stage) is not None or "." in path
         for read in stage.reads(Recipe(name="any")):
             assert PIPELINE.index(read) < PIPELINE.index(stage.name)
     assert tuple(fake_stages.STAGES) == PIPELINE

@@ -1,0 +1,133 @@
+"""Every value of a recipe that decides a stage's result is in its key, and no other."""
+
+from collections.abc import Iterator
+from typing import Any, Literal, get_args, get_origin
+
+import pytest
+
+from iowbc.pipeline.planner import slice_value
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.digests import data_digest
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.section import Section, deciding
+from iowbc.stages.registry import STAGES
+
+SIMULATING = {"teacher", "distill", "eval", "export"}
+ALL = {"rg-dataset", "rg-fit", *SIMULATING}
+MOVED = {
+    "name": {"export"},
+    "seed": {"rg-dataset", "rg-fit", "teacher", "distill", "export"},
+    "rg.method": {"rg-dataset"},
+    "rg.height": ALL,
+    "rg.sampling": {"rg-dataset", "rg-fit"},
+    "rg.problem": {"rg-dataset", "rg-fit"},
+    "rg.ocp": {"rg-dataset"},
+    "rg.gates": {"rg-dataset"},
+    "rg.crosscheck": {"rg-dataset"},
+    "rg.feasible": {"rg-dataset", "rg-fit"},
+    "rg.fit": {"rg-fit"},
+    "simulation": SIMULATING,
+    "task": SIMULATING,
+    "teacher": {"teacher"},
+    "teacher.symmetry": {"teacher", "distill"},
+    "teacher.normalization_clip": {"teacher", "distill"},
+    "distill": {"distill"},
+    "eval": {"eval"},
+    "export": {"export"},
+}
+"""Stages whose own values change with a part of the recipe; the longest name that fits counts."""
+COSMETIC = {
+    "description",
+    "stages",
+    "robot",
+    "execution",
+    "simulation.physics.divergences_kept",
+    "teacher.checkpoint_every",
+    "distill.checkpoint_every",
+    "eval.label",
+    "eval.success.capacity_rate",
+    "eval.video",
+    "export.timing_steps",
+}
+"""Parts that move no key: they say how it is shown or carried out. (The robot's files count, not their folder.)"""
+
+
+def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Paths of a recipe's values; a list of sections counts by the section, any other as one value."""
+    if isinstance(value, Section):
+        for name in type(value).model_fields:
+            yield from leaves(getattr(value, name), (*path, name))
+    elif isinstance(value, tuple) and any(isinstance(item, Section) for item in value):
+        for index, item in enumerate(value):
+            yield from leaves(item, (*path, str(index)))
+    else:
+        yield path
+
+
+def other(section: Section, name: str) -> Any:
+    """Another value of the same kind for a field."""
+    value, annotation = getattr(section, name), type(section).model_fields[name].annotation
+    choices = get_args(annotation) if get_origin(annotation) is Literal else ()
+    if choices:
+        return next(choice for choice in choices if choice != value)
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, (int, float)):
+        return value + 1
+    if isinstance(value, str):
+        return f"{value}x"
+    if isinstance(value, tuple):
+        return (*value, *value) or (1,)
+    if isinstance(value, dict):
+        return {**value, "other": 1.0}
+    return 1.0
+
+
+def changed(value: Any, path: tuple[str, ...]) -> Any:
+    """A recipe, or a part of it, with another value at a path."""
+    name, rest = path[0], path[1:]
+    if isinstance(value, tuple):
+        return tuple(changed(item, rest) if index == int(name) else item for index, item in enumerate(value))
+    below = changed(getattr(value, name), rest) if rest else other(value, name)
+    return value.model_copy(update={name: below})
+
+
+def digest(recipe: Recipe, stage: Stage) -> str:
+    values = deciding(recipe)
+    return data_digest([slice_value(values, part, stage) for part in stage.slice])
+
+
+def expected(path: str) -> set[str]:
+    def fits(part: str) -> bool:
+        return path == part or path.startswith(f"{part}.")
+
+    if any(fits(part) for part in COSMETIC):
+        return set()
+    return MOVED[max((part for part in MOVED if fits(part)), key=len)]
+
+
+@pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
+def test_each_value_moves_the_keys_of_the_stages_that_it_decides_and_of_no_other() -> None:
+    usual = Recipe(name="usual")
+    before = {name: digest(usual, stage) for name, stage in STAGES.items()}
+    wrong = {}
+    paths = list(leaves(usual))
+    for path in paths:
+        after = changed(usual, path)
+        moved = {name for name, stage in STAGES.items() if digest(after, stage) != before[name]}
+        if moved != expected(".".join(path)):
+            wrong[".".join(path)] = moved
+    assert wrong == {}
+    assert len(paths) > 250
+
+
+def variant(stages: list[str], use_rg: bool) -> Recipe:
+    return Recipe.model_validate({"name": "x", "stages": stages, "task": {"references": {"use_rg": use_rg}}})
+
+
+@pytest.mark.parametrize("name", sorted(SIMULATING))
+def test_a_variant_without_the_generators_posture_still_heeds_its_feasible_map(name: str) -> None:
+    whole, stage = list(STAGES), STAGES[name]
+    assert "rg-fit" in stage.reads(variant(whole, use_rg=False))
+    assert "rg-fit" not in stage.reads(variant(whole[2:], use_rg=False))
+    assert "rg-fit" in stage.reads(variant(whole[2:], use_rg=True))
