@@ -192,21 +192,12 @@ def play(
 ) -> None:
     """Watch a trained policy in the viewer, or make a film of it."""
     from iowbc.commands.play import play_word
+    from iowbc.evaluation.play_request import PlayRequest
 
-    raise typer.Exit(
-        play_word(
-            _store(runs),
-            _console(),
-            what,
-            stage,
-            video=video,
-            scene=scene,
-            mass=mass,
-            partner_share=partner_share,
-            seed=seed,
-            disturbances=disturbances,
-        )
+    request = PlayRequest(
+        scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
     )
+    raise typer.Exit(play_word(_store(runs), _console(), what, stage, request))
 
 
 @bench.command("sim")

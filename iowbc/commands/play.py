@@ -1,18 +1,18 @@
 """What `iowbc play` plays: a recipe's policy, one artifact, or an exported folder."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from iowbc.commands.named import named
-from iowbc.errors import Damaged, Interrupted, UsageError, require_known
+from iowbc.errors import Damaged, Interrupted, UsageError
+from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.store.last_used import remaking
 from iowbc.pipeline.store.store import Artifact, Store
-from iowbc.recipe.simulation.holding import SCENES
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.viewer import Source
+    from iowbc.evaluation.play import Source
 
 POLICIES = ("export", "distill", "teacher")
 """Stages that leave a policy, the one to prefer first."""
@@ -20,11 +20,8 @@ CONTRACT = "contract.json"
 """Every exported folder has one."""
 
 
-def play_word(
-    store: Store, console: Console, word: str, stage: str | None, *, video: Path | None, **settings: Any
-) -> int:
-    """Play what a word names; `settings` are those of `iowbc.evaluation.viewer.play`. Returns the exit code."""
-    require_known(settings["scene"], "scene", SCENES)
+def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
+    """Play an episode of what a word names. Returns the exit code."""
     artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
     generator = None
     if artifact is not None:
@@ -32,19 +29,19 @@ def play_word(
         for read in filter(None, (artifact, generator)):
             _check_whole(store, read)
 
-    from iowbc.evaluation.viewer import exported_source, play
+    from iowbc.evaluation.play import exported_source, play
 
     try:
         if artifact is None or artifact.manifest.stage == "export":
             source = exported_source(artifact.folder if artifact is not None else Path(word))
         else:
             source = _source(artifact, generator)
-        result = play(source, video=video, **settings)
+        shown = play(source, request)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return 0
-    made = f"; {video} has {result['frames']} pictures" if video else ""
-    text = f"{result['end']} after {result['seconds']:.1f} of {result['duration']:.1f} s{made}"
+    made = f"; {request.video} has {shown.frames} pictures" if request.video else ""
+    text = f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}"
     console.print(text, markup=False, highlight=False, soft_wrap=True)
     return 0
 
@@ -87,7 +84,7 @@ def _generator(store: Store, artifact: Artifact) -> Artifact | None:
 
 def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
-    from iowbc.evaluation.viewer import Source
+    from iowbc.evaluation.play import Source
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
 

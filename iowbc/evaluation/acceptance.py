@@ -5,8 +5,9 @@ from pathlib import Path
 
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
+from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, command_script, trials_at
-from iowbc.evaluation.trials.rollout import Played, play_in
+from iowbc.evaluation.trials.rollout import play_in
 from iowbc.recipe.evaluation import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
@@ -28,7 +29,7 @@ def acceptance_trials(recipe: Recipe) -> list[Trial]:
 
 def try_out(
     recipe: Recipe, robot: Path, rg: Path | None, exported: Path, interrupted: Callable[[], bool]
-) -> tuple[ExportedPolicy, list[Played]]:
+) -> tuple[ExportedPolicy, list[Outcome]]:
     """Let the controller in the folder `exported` play the trials. Raises Interrupted when interrupted.
 
     Returns the driver, which holds the golden vectors and the difference of targets, and how the trials went.
@@ -38,7 +39,7 @@ def try_out(
     environment = VectorEnv(recipe, robot, rg=rg, num_envs=len(episodes), workers=0, seed=0, episodes=tuple(episodes))
     try:
         policy = ExportedPolicy(controller, environment, golden_steps=recipe.export.golden_steps)
-        played = play_in(environment, recipe, policy, interrupted)
+        outcomes = play_in(environment, recipe, policy, interrupted)
     finally:
         environment.close()
-    return policy, played
+    return policy, outcomes

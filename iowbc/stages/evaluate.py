@@ -21,10 +21,9 @@ def run(job: Job) -> None:
     import torch
 
     from iowbc.errors import NoRenderer
-    from iowbc.evaluation.film import filmed
+    from iowbc.evaluation.films import film_trial, filmed
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
-    from iowbc.evaluation.viewer import film_row
     from iowbc.learning.acting import TeacherPolicy, load_policy
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
@@ -52,7 +51,7 @@ def run(job: Job) -> None:
         (job.out / "videos").mkdir()
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
-            film_row(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
+            film_trial(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
     except Interrupted as stopped:

@@ -11,7 +11,9 @@ import pytest
 from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
 from iowbc.deploy.controller import open_session
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
-from iowbc.evaluation.viewer import exported_source, play, require_display
+from iowbc.evaluation.play import exported_source, play
+from iowbc.evaluation.play_request import PlayRequest
+from iowbc.evaluation.viewer import require_display
 from iowbc.export import golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.storage import save_network
@@ -146,16 +148,16 @@ def test_an_interruption_ends_the_stage(robot: Robot, rg: Path, student: Path, t
 
 def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
     film = tmp_path / "out.mp4"
-    result = play(
-        exported_source(done.out),
+    request = PlayRequest(
         mass=2.0,
-        sequence=[Segment(duration=0.3, ramp=0.0)],
+        sequence=(Segment(duration=0.3, ramp=0.0),),
         video=film,
         video_settings=Video(width=96, height=64, fps=10),
     )
-    assert result["end"] in ("finished", "fell", "dropped")
-    assert result["duration"] == pytest.approx(0.3)
-    assert 1 <= result["frames"] <= 4
+    shown = play(exported_source(done.out), request)
+    assert shown.outcome.ending in ("finished", "fell", "dropped")
+    assert shown.duration == pytest.approx(0.3)
+    assert 1 <= shown.frames <= 4
     assert film.stat().st_size > 500
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
 
@@ -169,16 +171,16 @@ def test_a_damaged_recipe_of_an_export_is_named(done: Job, tmp_path: Path) -> No
             exported_source(folder)
 
 
-def test_what_cannot_be_played_is_refused_with_what_can(done: Job, tmp_path: Path) -> None:
+def test_what_cannot_be_played_is_refused_with_what_can(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="valid: free, lift"):
-        play(exported_source(done.out), scene="sofa", video=tmp_path / "out.mp4")
+        PlayRequest(scene="sofa", video=tmp_path / "out.mp4")
     with pytest.raises(UsageError, match="mp4"):
-        play(exported_source(done.out), video=tmp_path / "out.gif")
+        PlayRequest(video=tmp_path / "out.gif")
 
 
 def test_an_interrupted_film_leaves_no_file(done: Job, tmp_path: Path) -> None:
     with pytest.raises(Interrupted):
-        play(exported_source(done.out), video=tmp_path / "out.mp4", interrupted=lambda: True)
+        play(exported_source(done.out), PlayRequest(video=tmp_path / "out.mp4"), interrupted=lambda: True)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -189,4 +191,4 @@ def test_without_a_display_the_viewer_says_what_to_do(done: Job, monkeypatch: py
     with pytest.raises(NoDisplay, match="--video"):
         require_display()
     with pytest.raises(NoDisplay):
-        play(exported_source(done.out))
+        play(exported_source(done.out), PlayRequest())

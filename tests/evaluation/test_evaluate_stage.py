@@ -13,10 +13,12 @@ import torch
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.evaluation.report.aggregate import COSTS
+from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.metrics import ERRORS
 from iowbc.evaluation.trials.plan import sweep_trials
-from iowbc.evaluation.trials.protocol import Protocol, in_batch, replayed
+from iowbc.evaluation.trials.protocol import Protocol
 from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network

@@ -112,11 +112,19 @@ def test_heavy_cases_show_rate_interval_and_the_papers_rate() -> None:
 def test_latex_groups_rows_and_escapes() -> None:
     trials = pd.concat([trials_of(name, "lifting", {0.0: 5, 4.0: 5}) for name in VARIANTS])
     text = latex(sweep_table(aggregate(trials), "lifting"))
-    assert text.count(r"\multirow{4}{*}") == 2
-    assert text.count(r"\midrule") == 2
+    assert text.count(r"\multirow[c]{4}{*}") == 2
+    assert text.count(r"\cline{1-11}") == 2
     assert "±" not in text
     assert "95 \\% interval" in text
+    assert "$E_{\\alpha}$ & $E_{h}$" in text
     assert text.count("{") == text.count("}")
+
+
+def test_latex_of_a_table_without_groups_has_one_line_a_variant() -> None:
+    text = latex(capacity_table(aggregate(trials_of("w/o Distill.", "lifting", {4.0: 5})), 0.8))
+    assert "80 \\% success" in text
+    assert "w/o Distill. & 4 kg \\\\" in text
+    assert "multirow" not in text
 
 
 @pytest.mark.parametrize("variants", [("IO-WBC",), VARIANTS])

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.trials.metrics import trial_metrics
-from iowbc.evaluation.trials.protocol import ending, survived
 from iowbc.evaluation.trials.rollout import RECORDED, VECTORS, play_in
+from iowbc.evaluation.trials.table import survived
 from iowbc.recipe.evaluation import Success
 from iowbc.recipe.recipe import Recipe
 
@@ -76,7 +76,7 @@ def test_each_episode_is_recorded_once_up_to_its_first_end() -> None:
 def test_endings_are_told_apart() -> None:
     ways = ["fallen", "dropped", "time_limit", "diverged"]
     trials = played([2, 2, 2, 2], ways)
-    assert [ending(trial) for trial in trials] == ["fell", "dropped", "finished", "diverged"]
+    assert [trial.ending for trial in trials] == ["fell", "dropped", "finished", "diverged"]
     assert [survived(Success(), trial) for trial in trials] == [False, False, True, False]
 
 

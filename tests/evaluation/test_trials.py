@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from iowbc.evaluation.film import filmed
+from iowbc.evaluation.films import filmed
 from iowbc.evaluation.trials.plan import command_script, heavier_mass, heavy_trials, sweep_trials
 from iowbc.recipe.evaluation import Beyond, Evaluation, HeavyCase, Segment, Sweep
 from iowbc.recipe.task.commands import Commands

@@ -41,9 +41,8 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
     }
     for name in ERRORS:
         values = survivors[name].to_numpy(np.float64)
-        half = mean_half_width(values)
         row[name] = float(values.mean()) if len(values) else np.nan
-        row[f"{name}_half"] = np.nan if half is None else half
+        row[f"{name}_half"] = mean_half_width(values)
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
     for name in COSTS:
         row[name] = float(survivors[name].mean()) if len(survivors) else np.nan

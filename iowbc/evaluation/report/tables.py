@@ -17,6 +17,7 @@ LATEX_HEADS = {"E_alpha": r"$E_{\alpha}$", "E_h": "$E_{h}$", "E_v": "$E_{v}$", "
 FAILS = "Fails"
 ABSENT = "–"
 TYRE_MASS = 18.0
+LATEX_SIGNS = str.maketrans({"±": r"$\pm$", "–": "--"})
 NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -126,25 +127,27 @@ def markdown(table: Table) -> str:
 
 def latex(table: Table) -> str:
     """A booktabs table with the paper's row groups; needs the packages booktabs and multirow."""
-    lines = [
-        r"\begin{table}[h]",
-        r"\centering",
-        rf"\caption{{{_escape(table.caption)}}}",
-        rf"\label{{tab:{table.name}}}",
-        rf"\begin{{tabular}}{{ll{'c' * (len(table.head) - 2)}}}",
-        r"\toprule",
-        " & ".join(_escape(head) for head in table.latex_head) + r" \\",
-        r"\midrule",
-    ]
-    previous = None
-    for index, row in enumerate(table.rows):
-        span = sum(1 for other in table.rows if other[0] == row[0])
-        first = rf"\multirow{{{span}}}{{*}}{{{_escape(row[0])}}}" if span > 1 else _escape(row[0])
-        if row[0] != previous and index and span > 1:
-            lines.append(r"\midrule")
-        lines.append(" & ".join([first if row[0] != previous else "", *map(_escape, row[1:])]) + r" \\")
-        previous = row[0]
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", r"\end{table}"]) + "\n"
+    grouped = table.head[1] == "Algorithm"
+    frame = pd.DataFrame(table.rows, columns=list(table.latex_head))
+    if grouped:
+        style = frame.set_index(list(table.latex_head[:2])).style.format_index(escape="latex")
+    else:
+        style = frame.style.hide(axis="index")
+    text = (
+        style.format(escape="latex")
+        .format_index(escape="latex-math", axis="columns")
+        .to_latex(
+            caption=table.caption.replace("%", r"\%"),
+            label=f"tab:{table.name}",
+            position="h",
+            position_float="centering",
+            hrules=True,
+            clines="skip-last;data" if grouped else None,
+            multirow_align="c",
+            column_format="ll" + "c" * (len(table.head) - 2),
+        )
+    )
+    return str(text).translate(LATEX_SIGNS)
 
 
 def write_table(table: Table, folder: Path) -> None:
@@ -162,9 +165,3 @@ def _with_half(value: float, half: float) -> str:
 
 def _pipe(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cells) + " |"
-
-
-def _escape(text: str) -> str:
-    for plain, tex in (("%", r"\%"), ("&", r"\&"), ("#", r"\#"), ("±", r"$\pm$"), ("–", "--"), ("_", r"\_")):
-        text = text.replace(plain, tex) if "$" not in text or plain != "_" else text
-    return text

@@ -1,22 +1,18 @@
 """The whole evaluation: every sweep and heavy case, one row a trial, resumable batch by batch."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.evaluation.trials.batch_policy import PolicyInBatch
 from iowbc.evaluation.trials.plan import Trial, heavier_mass, heavy_trials, sweep_trials
-from iowbc.evaluation.trials.rollout import Acting, Played, play_episodes
+from iowbc.evaluation.trials.rollout import Acting, play_episodes
+from iowbc.evaluation.trials.table import trial_row
 from iowbc.files import replacing
-from iowbc.recipe.evaluation import Success
 from iowbc.recipe.recipe import Recipe
-from iowbc.task.episodes import Episode
 
 
 class Protocol:
@@ -80,97 +76,23 @@ class Protocol:
                 reached = self.done + len(trials) * min(seconds / longest, 1.0)
                 self.progress(reached, self.total, f"{name}, {seconds:.0f} s")
 
-            played = play_episodes(
+            outcomes = play_episodes(
                 self.recipe,
                 self.robot,
                 self.rg,
                 [trial.episode for trial in trials],
-                Placed(self.policy, size, places),
+                PolicyInBatch(self.policy, size, places),
                 workers=self.workers,
                 interrupted=self.interrupted,
                 progress=progress,
             )
-            rows = [trial_row(self.recipe, t, p) for t, p in zip(trials, played, strict=True)]
+            rows = [trial_row(self.recipe, trial, outcome) for trial, outcome in zip(trials, outcomes, strict=True)]
             table = pd.DataFrame(rows).assign(batch_size=size, batch_row=places)
             with replacing(path) as fresh:
                 table.to_parquet(fresh, index=False)
         self.done += len(trials)
         self.progress(self.done, self.total, name)
         return pd.read_parquet(path)
-
-
-def trial_row(recipe: Recipe, trial: Trial, played: Played) -> dict[str, Any]:
-    """One row of the long table: what was tried, how it ended, the metrics, everything drawn, and how to replay it."""
-    gait_steps = round(recipe.task.control_frequency / recipe.task.references.gait.frequency)
-    return {
-        "variant": recipe.eval.label,
-        "policy": recipe.eval.policy,
-        "suite": trial.suite,
-        "case": trial.case,
-        "scene": trial.episode.scene,
-        "mass": trial.mass,
-        "trial": trial.number,
-        "seed": trial.episode.seed,
-        "duration": trial.episode.duration,
-        "survived": survived(recipe.eval.success, played),
-        "end": ending(played),
-        "seconds": played.seconds,
-        **trial_metrics(played.trace, gait_steps),
-        **{f"drawn_{name}": _plain(values) for name, values in played.drawn.items()},
-        "episode": json.dumps(trial.episode.as_json()),
-    }
-
-
-def survived(success: Success, played: Played) -> bool:
-    """Whether a trial counts as survived; by recipe only where no hand ever let go."""
-    slipped = success.slip_fails and bool(np.any(played.trace.slipped > 0))
-    return played.survived and not slipped
-
-
-def ending(played: Played) -> str:
-    """How a trial ended; "diverged" where the simulation broke off without a fall or a drop."""
-    if played.fallen:
-        return "fell"
-    if played.dropped:
-        return "dropped"
-    return "finished" if played.finished else "diverged"
-
-
-def replayed(row: "pd.Series[Any]") -> Episode:
-    """The episode of a row of the long table, to be played again."""
-    return Episode.from_json(json.loads(row["episode"]))
-
-
-class Placed:
-    """A policy for some environments that computes in the shape of a larger batch, with them at given places.
-
-    Matrix products round differently for other shapes; with this, a trial is the same bit for bit whichever trials of
-    its sweep it is played with.
-    """
-
-    def __init__(self, policy: Acting, size: int, places: NDArray[np.int64]) -> None:
-        """`places` (n,): the environments' rows in the batch of `size`."""
-        self.policy, self.size, self.places = policy, size, places
-
-    def reset(self, which: NDArray[np.bool_]) -> None:
-        self.policy.reset(self._spread(which))
-
-    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        return self.policy.act(self._spread(observation), self._spread(privileged))[self.places]
-
-    def _spread(self, rows: NDArray[Any]) -> NDArray[Any]:
-        batch = np.zeros((self.size, *rows.shape[1:]), rows.dtype)
-        batch[self.places] = rows
-        return batch
-
-
-def in_batch(policy: Acting, row: "pd.Series[Any]") -> Placed:
-    """The policy as it acted in the trial of a row of the long table, for that trial alone."""
-    return Placed(policy, int(row["batch_size"]), np.array([int(row["batch_row"])]))
-
-
-def _plain(values: np.ndarray[Any, np.dtype[np.float64]]) -> float | list[float]:
-    return float(values[0]) if len(values) == 1 else [float(value) for value in values]
 
 
 def _any_survivor(table: pd.DataFrame, mass: float) -> bool:

@@ -1,7 +1,7 @@
 """Plays episodes with a policy, each once, and records the signals of every step."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Protocol
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.trials.metrics import Trace
+from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.episodes import Episode
 from iowbc.task.vector.vector_env import VectorEnv
@@ -34,26 +35,6 @@ class Acting(Protocol):
         """Residual action (n, 15) from s_t (n, S) and s_priv (n, P)."""
 
 
-@dataclass(frozen=True)
-class Played:
-    """How one episode went."""
-
-    trace: Trace
-    seconds: float
-    """Time until it ended [s]."""
-    fallen: bool
-    dropped: bool
-    finished: bool
-    """Whether it reached its time limit."""
-    drawn: Mapping[str, Array]
-    """Everything that was drawn for it, by name, each of shape (k,)."""
-
-    @property
-    def survived(self) -> bool:
-        """No fall, nothing dropped, for the whole episode."""
-        return self.finished and not (self.fallen or self.dropped)
-
-
 def play_episodes(
     recipe: Recipe,
     robot: Path,
@@ -64,7 +45,7 @@ def play_episodes(
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
-) -> list[Played]:
+) -> list[Outcome]:
     """Play each episode to its end and return how they went, in their order; independent of `workers`.
 
     progress: told the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
@@ -85,7 +66,7 @@ def play_in(
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
     look: Callable[[float], None] = lambda seconds: None,
-) -> list[Played]:
+) -> list[Outcome]:
     """Play the episodes of an environment that was made for them; see `play_episodes`.
 
     look: called with the time [s] after the reset and after each step, while the first episode lasts.
@@ -121,7 +102,7 @@ def play_in(
             policy.reset(done)
     recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
     return [
-        Played(
+        Outcome(
             trace=_trace(recorded, index, int(length[index]), dt),
             seconds=float(length[index] * dt),
             fallen=bool(endings["fallen"][index]),

@@ -1,0 +1,145 @@
+"""Films of episodes: writes an mp4 file frame by frame, with lines of text in a corner, and plays trials again."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import imageio.v2
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from iowbc.evaluation.trials.batch_policy import in_batch
+from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.table import replayed
+from iowbc.recipe.evaluation import Video
+from iowbc.recipe.recipe import Recipe
+from iowbc.sim.rendering.renderer import SceneRenderer
+from iowbc.task.vector.vector_env import VectorEnv
+
+Frame = NDArray[np.uint8]
+
+QUALITY = 7
+"""Of imageio-ffmpeg, 0 to 10; 20 s of 640 x 480 take about 2 MB."""
+LINES_PER_FRAME = 26
+"""Height of the text: this many lines would fill the frame."""
+NOT_WORD = str.maketrans({" ": "_", "/": "_"})
+
+
+def with_text(frame: Frame, lines: Sequence[str]) -> Frame:
+    """The frame (H, W, 3) with lines of text at the upper left, white on a darkened strip."""
+    image = Image.fromarray(frame)
+    size = max(10, frame.shape[0] // LINES_PER_FRAME)
+    font = ImageFont.load_default(size)
+    draw = ImageDraw.Draw(image, "RGBA")
+    width = max(draw.textlength(line, font=font) for line in lines)
+    draw.rectangle((0, 0, width + size, (len(lines) + 0.5) * size * 1.15), fill=(0, 0, 0, 130))
+    for row, line in enumerate(lines):
+        draw.text((size / 2, size * (0.2 + 1.15 * row)), line, font=font, fill="white")
+    return np.asarray(image)
+
+
+class Film:
+    """An mp4 file that is written frame by frame; it appears under its name when the block ends without an error."""
+
+    def __init__(self, path: Path, fps: int) -> None:
+        self.path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._unfinished = path.with_suffix(".part.mp4")
+        self._writer = imageio.v2.get_writer(
+            self._unfinished, format="FFMPEG", fps=fps, codec="libx264", quality=QUALITY, pixelformat="yuv420p"
+        )
+
+    def add(self, frame: Frame) -> None:
+        """Append a frame (H, W, 3)."""
+        self._writer.append_data(frame)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.close()
+        if kind is None:
+            self._unfinished.replace(self.path)
+        else:
+            self._unfinished.unlink(missing_ok=True)
+
+
+def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
+    """The trials to film, with names: the first trial of up to `count` masses, spread over those with an object.
+
+    Without any object, over what there is. A single film is of the middle mass.
+    """
+    first = trials[trials["trial"] == 0]
+    first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
+    ends = (0, len(first) - 1) if count > 1 else ((len(first) - 1) // 2,) * 2
+    places = np.linspace(*ends, min(count, len(first))).round().astype(int)
+    rows = [first.iloc[place] for place in dict.fromkeys(places.tolist())]
+    return [(f"{row['case']}_{row['mass']:g}kg".translate(NOT_WORD), row) for row in rows]
+
+
+def command_line(signals: dict[str, Any], seconds: float) -> str:
+    """Time and command of the first environment, in words."""
+    forward, left, turn = signals["commanded_velocity"][0]
+    height, pitch = float(signals["height_command"][0, 0]), float(signals["torso_pitch_command"][0, 0])
+    walk = f"v {forward:+.2f} {left:+.2f} m/s, turn {turn:+.2f} rad/s"
+    return f"{seconds:4.1f} s   {walk}   H {height:.2f} m, pitch {pitch:+.2f} rad"
+
+
+class EpisodeFilm:
+    """A film of the first environment of an in-process vector environment; give `look` to `play_in`."""
+
+    def __init__(self, environment: VectorEnv, path: Path, video: Video, title: Sequence[str]) -> None:
+        """`title`: lines of text in every frame, above the line with time and command."""
+        self.environment, self.video, self.title = environment, video, list(title)
+        self._film = Film(path, video.fps)
+        self._renderer: SceneRenderer | None = None
+        self.frames = 0
+
+    def look(self, seconds: float) -> None:
+        """Draw a frame if one is due at this time [s]."""
+        if seconds > self.video.duration or seconds * self.video.fps < self.frames - 1e-6:
+            return
+        simulation = self.environment.batch.simulation
+        if self._renderer is None:
+            self._renderer = SceneRenderer(simulation, 0, width=self.video.width, height=self.video.height)
+        frame = self._renderer.frame()
+        if self.video.traces:
+            frame = with_text(frame, [*self.title, command_line(self.environment.signals, seconds)])
+        self._film.add(frame)
+        self.frames += 1
+
+    def __enter__(self) -> Self:
+        self._film.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+        self._film.__exit__(kind, error, trace)
+
+
+def film_trial(
+    recipe: Recipe,
+    robot: Path,
+    rg: Path | None,
+    policy: Acting,
+    row: "pd.Series[Any]",
+    path: Path,
+    interrupted: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """Play the trial in a row of `trials.parquet` again and film it. Raises Interrupted when interrupted."""
+    environment = VectorEnv(recipe, robot, rg=rg, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
+    title = [f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"]
+    try:
+        with EpisodeFilm(environment, path, recipe.eval.video, title) as film:
+            return play_in(environment, recipe, in_batch(policy, row), interrupted, look=film.look)[0]
+    finally:
+        environment.close()

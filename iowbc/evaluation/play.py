@@ -1,0 +1,102 @@
+"""Plays one episode for the eye: in MuJoCo's viewer where there is a display, or into a film."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from iowbc.deploy import contract
+from iowbc.deploy.controller import Controller
+from iowbc.errors import ContractBroken
+from iowbc.evaluation.exported import ExportedPolicy
+from iowbc.evaluation.films import EpisodeFilm
+from iowbc.evaluation.play_request import PlayRequest
+from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, trials_at
+from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.viewer import play_in_viewer, require_display
+from iowbc.learning.acting import load_policy
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.episodes import Episode
+from iowbc.task.vector.vector_env import VectorEnv
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is played: a policy, and the world that its recipe describes."""
+
+    recipe: Recipe
+    robot: Path
+    """The robot's folder."""
+    rg: Path | None
+    """Artifact of `rg-fit`, or the generator in an exported folder; None without a reference generator."""
+    policy: Path
+    """Artifact of `teacher` or `distill`, or an exported folder."""
+
+    def environment(self, episode: Episode) -> VectorEnv:
+        """One environment, in this process, that plays an episode."""
+        return VectorEnv(self.recipe, self.robot, rg=self.rg, num_envs=1, workers=0, seed=0, episodes=(episode,))
+
+
+def exported_source(folder: Path) -> Source:
+    """The source in an exported folder, which holds all it needs. Raises ContractBroken."""
+    contract.read_contract(folder)
+    path = folder / contract.RECIPE
+    try:
+        recipe = Recipe.model_validate_json(path.read_bytes())
+    except (FileNotFoundError, ValidationError) as error:
+        raise ContractBroken(f"{path}: missing or not a recipe of this version: {error}; export again") from error
+    generator = folder / contract.GENERATOR
+    return Source(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None, folder)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What was shown, and how it ended."""
+
+    outcome: Outcome
+    duration: float
+    """Time that the episode was to last [s]."""
+    frames: int
+    """Pictures of the film; 0 in the viewer."""
+
+
+def play(source: Source, request: PlayRequest, interrupted: Callable[[], bool] = lambda: False) -> Shown:
+    """Play one episode; in the viewer, or with `request.video` into that mp4 file (no display needed).
+
+    Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
+    """
+    recipe, episode = source.recipe, requested_episode(source.recipe, request)
+    if request.video is None:
+        require_display()
+    environment = source.environment(episode)
+    try:
+        policy = open_policy(source.policy, environment)
+        if request.video is None:
+            return Shown(play_in_viewer(environment, recipe, policy, interrupted), episode.duration, 0)
+        settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
+        title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
+        with EpisodeFilm(environment, request.video, settings, title) as film:
+            outcome = play_in(environment, recipe, policy, interrupted, look=film.look)[0]
+        return Shown(outcome, episode.duration, film.frames)
+    finally:
+        environment.close()
+
+
+def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
+    """The episode that a request describes."""
+    script = command_script(request.sequence or recipe.eval.sequence, recipe.task.commands)
+    fixed = {} if request.disturbances else dict(UNDISTURBED)
+    if request.partner_share is not None:
+        fixed["partner_share"] = request.partner_share
+    return trials_at("play", request.scene, request.object_mass, script, count=1, seed=request.seed, fixed=fixed)[
+        0
+    ].episode
+
+
+def open_policy(folder: Path, environment: VectorEnv) -> Acting:
+    """The policy in a folder: an exported controller where there is a contract, else a trained network."""
+    if (folder / contract.CONTRACT).is_file():
+        return ExportedPolicy(Controller.load(folder, robots=environment.num_envs), environment)
+    return load_policy(folder)
