@@ -19,7 +19,7 @@ ARMS_COLLIDE = "arms collide"
 
 
 @dataclass(frozen=True)
-class Region:
+class LabelledRegion:
     """The map of what has labels, and what it was made from, on the grid (pitches, heights)."""
 
     map: FeasibleMap
@@ -38,7 +38,7 @@ class GentleRegion:
     """Largest move of a joint for one step, not passed by the recipe's share of the arms [rad]."""
 
 
-def measure_region(plan: SamplePlan, dataset: Dataset) -> Region:
+def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegion:
     """The map of commands that have labels. Raises ValueError when it is empty."""
     recipe = plan.recipe.feasible
     on_grid = dataset.index >= plan.drawn
@@ -51,7 +51,9 @@ def measure_region(plan: SamplePlan, dataset: Dataset) -> Region:
     enough = tried >= recipe.enough
     share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
     feasible = held & (~enough | (share >= recipe.kept_share))
-    return Region(build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), held, share)
+    return LabelledRegion(
+        build_map(plan.pitches, plan.heights, feasible, recipe.bound_slope, plan.nominal), held, share
+    )
 
 
 def measure_gentle_region(

@@ -2,73 +2,70 @@
 
 import time
 
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import Job, Stage
 
+LABELLED = "labelled.npz"
+"""The map of commands that have labels; `feasible.npz` of rg-fit is the part of it where the network moves gently."""
 CHUNK = {"static": 256, "ocp": 8}
 """Samples in a shard: one to three seconds of work, which is what an interruption or a crash costs."""
 
 
 def run(job: Job) -> None:
-    """Leaves `dataset.npz`, `feasible.npz`, `summary.json` and figures."""
+    """Leaves `dataset.npz`, `labelled.npz`, `summary.json` and figures."""
     from iowbc.errors import NoRenderer
-    from iowbc.reference.labels.crosscheck import compare, pick
+    from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods, mirror_error
     from iowbc.reference.labels.dataset import assemble, reasons
     from iowbc.reference.labels.labelling import LabelTask
-    from iowbc.reference.labels.mirror_check import mirror_error
-    from iowbc.reference.labels.plan import SamplePlan, check_ranges
+    from iowbc.reference.labels.plan import SamplePlan
     from iowbc.reference.labels.pool import label_all
     from iowbc.reference.pictures.figures import dataset_figures
     from iowbc.reference.pictures.postures import draw_strip
-    from iowbc.reference.region import measure_region
+    from iowbc.reference.ranges import wrong_ranges
+    from iowbc.reference.region import measure_labelled_region
     from iowbc.robot.description import load_robot
 
     recipe, seed = job.recipe.rg, job.recipe.seed
     robot = load_robot(job.robot)
-    try:
-        check_ranges(robot, recipe)
-    except ValueError as error:
-        raise StageFailed(str(error)) from error
+    if wrong := [f"{path}: {text}" for path, text in wrong_ranges(robot, recipe)]:
+        raise StageFailed("; ".join(wrong))
     plan = SamplePlan(robot, recipe, seed)
     began = time.monotonic()
 
     def progress(done: int, total: int) -> None:
         job.report.progress(done, total, f"{recipe.method} labels")
 
+    result = label_all(
+        LabelTask(job.robot, recipe, seed, recipe.method),
+        range(plan.count),
+        folder=job.work / "shards",
+        key=job.key,
+        chunk_size=CHUNK[recipe.method],
+        workers=job.workers,
+        interrupted=job.interrupted,
+        progress=progress,
+    )
+    seconds = time.monotonic() - began
     try:
-        result = label_all(
-            LabelTask(job.robot, recipe, seed, recipe.method),
-            range(plan.count),
-            folder=job.work / "shards",
+        dataset = assemble(plan, result)
+        region = measure_labelled_region(plan, dataset)
+    except ValueError as error:
+        raise StageFailed(str(error)) from error
+    chosen = chosen_for_crosscheck(dataset, plan, recipe) if recipe.method == "static" else []
+    check = None
+    if chosen:
+        job.report.say(f"checks {len(chosen)} labels against the optimal control problem")
+        again = label_all(
+            LabelTask(job.robot, recipe, seed, "ocp"),
+            chosen,
+            folder=job.work / "crosscheck",
             key=job.key,
-            chunk_size=CHUNK[recipe.method],
+            chunk_size=CHUNK["ocp"],
             workers=job.workers,
             interrupted=job.interrupted,
-            progress=progress,
+            progress=lambda done, total: job.report.progress(done, total, "optimal control"),
         )
-        seconds = time.monotonic() - began
-        try:
-            dataset = assemble(plan, result)
-            region = measure_region(plan, dataset)
-        except ValueError as error:
-            raise StageFailed(str(error)) from error
-        chosen = pick(dataset, plan, recipe) if recipe.method == "static" else []
-        check = None
-        if chosen:
-            job.report.say(f"checks {len(chosen)} labels against the optimal control problem")
-            again = label_all(
-                LabelTask(job.robot, recipe, seed, "ocp"),
-                chosen,
-                folder=job.work / "crosscheck",
-                key=job.key,
-                chunk_size=CHUNK["ocp"],
-                workers=job.workers,
-                interrupted=job.interrupted,
-                progress=lambda done, total: job.report.progress(done, total, "optimal control"),
-            )
-            check = compare(dataset, again)
-    except Interrupted as stop:
-        raise Interrupted("finished shards are kept") from stop
+        check = compare_methods(dataset, again)
 
     metrics = {
         "samples": float(plan.count),
@@ -82,7 +79,7 @@ def run(job: Job) -> None:
     if check is not None:
         metrics |= check.metrics
     dataset.save(job.out / "dataset.npz")
-    region.map.save(job.out / "feasible.npz")
+    region.map.save(job.out / LABELLED)
     rejected = reasons(result)
     job.summarize(metrics, rejected=rejected, worst_crosscheck=[] if check is None else check.worst)
     job.report.metrics(metrics, 0)
@@ -110,7 +107,7 @@ def _percentile(values: object, percent: float) -> float:
 
 STAGE = Stage(
     name="rg-dataset",
-    version=2,
+    version=3,
     slice=(
         "seed",
         "rg.method",

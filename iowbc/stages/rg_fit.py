@@ -1,7 +1,8 @@
 """Stage rg-fit: fits the reference generator to the labels and judges it on held-out samples."""
 
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import Job, Stage
+from iowbc.stages.rg_dataset import LABELLED
 
 WORST_SHOWN = 5
 
@@ -26,20 +27,15 @@ def run(job: Job) -> None:
     rg, source = job.recipe.rg, job.inputs["rg-dataset"]
     robot = load_robot(job.robot)
     dataset = Dataset.load(source / "dataset.npz")
-    held_map = FeasibleMap.load(source / "feasible.npz")
+    labelled = FeasibleMap.load(source / LABELLED)
     prepared = prepare(dataset, robot, rg, job.recipe.seed, job.interrupted)
-    if prepared is None:
-        raise Interrupted
     job.report.say(f"{len(prepared.train.inputs)} training samples, {len(prepared.held_out)} held out")
 
     def epoch_done(epoch: int, training: float, validation: float) -> None:
         job.report.metrics({"loss": training, "validation_loss": validation}, epoch)
         job.report.progress(epoch, rg.fit.epochs, f"validation loss {validation:.2e}")
 
-    try:
-        fitted = fit(prepared.train, prepared.validation, rg.fit, job.recipe.seed, epoch_done, job.interrupted)
-    except Interrupted as stop:
-        raise Interrupted from stop
+    fitted = fit(prepared.train, prepared.validation, rg.fit, job.recipe.seed, epoch_done, job.interrupted)
     support = robot.support
     network = ReferenceNetwork(
         inputs=input_names(robot, rg),
@@ -57,7 +53,7 @@ def run(job: Job) -> None:
     plan = SamplePlan(robot, rg, job.recipe.seed)
     learnt = prepared.training[dataset.index[prepared.training] < plan.drawn]
     try:
-        region = measure_gentle_region(plan, held_map, network, dataset.arm[learnt], dataset.payload[learnt])
+        region = measure_gentle_region(plan, labelled, network, dataset.arm[learnt], dataset.payload[learnt])
     except ValueError as error:
         raise StageFailed(f"{error}; or raise rg.feasible.jump") from error
     feasible = region.map
@@ -75,7 +71,7 @@ def run(job: Job) -> None:
     figures = job.out / "figures"
     figures.mkdir(exist_ok=True)
     error_figures(figures, dataset.support[held], predicted, errors, jumps, rg.fit.gates, network.outputs)
-    gentle_figure(figures, plan, region, held_map)
+    gentle_figure(figures, plan, region, labelled)
     learning_figure(figures, fitted.training_loss, fitted.validation_loss)
     if verdict.failures:
         raise StageFailed(
@@ -88,7 +84,7 @@ def run(job: Job) -> None:
 
 STAGE = Stage(
     name="rg-fit",
-    version=2,
+    version=3,
     slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem", "rg.feasible"),
     reads=lambda recipe: ("rg-dataset",),
     run=run,

@@ -27,10 +27,13 @@ def test_arm_joints_within_their_limits_pass(tmp_path: Path) -> None:
     [
         (ELBOW.format(name="left_elbw_joint", low=0.0), r"mine.yaml:4:\d+: .* is no joint of g1.*'left_elbow_joint'\?"),
         (ELBOW.format(name="left_knee_joint", low=0.0), r"mine.yaml:4:\d+: .* is no arm joint of g1; valid: left_"),
-        (ELBOW.format(name="left_elbow_joint", low=-9.0), r"mine.yaml:4:\d+: .* = -9 to 1: the joint's limits are"),
+        (
+            ELBOW.format(name="left_elbow_joint", low=-9.0),
+            r"mine.yaml:4:\d+: .* -9 to 1: the joint's limits are",
+        ),
         (
             "rg: {sampling: {height: {low: 50, high: 80}}}\n",
-            r"mine.yaml:1:\d+: key 'rg.sampling.height' = 50 to 80: .* m",
+            r"mine.yaml:1:\d+: key 'rg.sampling.height': 50 to 80: .* m",
         ),
     ],
 )

@@ -5,19 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference_jobs import make_job, small_recipe
+from reference_doubles import make_job, small_recipe
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.support_model import SupportModel
-from iowbc.robot.description import Robot, load_robot, robot_folder
-
-
-@pytest.fixture(scope="session")
-def robot() -> Robot:
-    return load_robot(robot_folder("g1"))
+from iowbc.robot.description import Robot
 
 
 @pytest.fixture(scope="session")

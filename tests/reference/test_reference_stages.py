@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference_jobs import make_job, small_recipe
+from reference_doubles import make_job, small_recipe
 
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
@@ -24,14 +24,14 @@ from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 from iowbc.stages import rg_dataset, rg_fit
 
-DATA = ("dataset.npz", "feasible.npz", "summary.json")
+DATA = ("dataset.npz", "labelled.npz", "summary.json")
 
 KILLED = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 if __name__ == "__main__":
-    from reference_jobs import make_job, small_recipe
+    from reference_doubles import make_job, small_recipe
     from iowbc.stages import rg_dataset
     rg_dataset.run(make_job(Path({folder!r}), small_recipe(), workers=1))
 """
@@ -42,7 +42,7 @@ def summary(job: Job) -> Any:
 
 
 def test_the_dataset_stage_leaves_data_and_figures(dataset_job: Job) -> None:
-    for name in (*DATA, "figures/feasible_map.png", "figures/labels.png", "figures/crosscheck.png"):
+    for name in (*DATA, "figures/labelled_map.png", "figures/labels.png", "figures/crosscheck.png"):
         assert (dataset_job.out / name).stat().st_size > 0, name
 
 
@@ -66,7 +66,7 @@ def test_static_labels_agree_with_optimal_control(dataset_job: Job) -> None:
 
 def test_commands_in_the_map_have_labels_around_them(dataset_job: Job) -> None:
     dataset = Dataset.load(dataset_job.out / "dataset.npz")
-    region = FeasibleMap.load(dataset_job.out / "feasible.npz")
+    region = FeasibleMap.load(dataset_job.out / "labelled.npz")
     told = dataset.rejected_reason != "arms collide"
     rejected = region.contains(dataset.rejected_command[told, 0], dataset.rejected_command[told, 1]).sum()
     kept = region.contains(dataset.command[:, 0], dataset.command[:, 1]).sum()
@@ -111,13 +111,16 @@ def test_an_interrupted_stage_says_so_and_leaves_no_artifact(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sampling__height": {"low": 0.5, "high": 2.0}}, r"rg\.sampling\.height: 0\.5 to 2\.0 m; g1 stands between"),
+        ({"sampling__height": {"low": 0.5, "high": 2.0}}, r"rg\.sampling\.height: 0\.5 to 2: g1 is 0\.792 m high"),
         ({"sampling__pitch": {"low": -0.5, "high": 2.0}}, r"rg\.sampling\.pitch: .* valid is within"),
         (
             {"sampling__joint_ranges": {"left_elbo_joint": {"low": 0, "high": 1}}},
-            "no arm joint 'left_elbo_joint'; g1 has",
+            r"left_elbo_joint: is no joint of g1; valid: .*did you mean 'left_elbow_joint'",
         ),
-        ({"sampling__joint_ranges": {"left_elbow_joint": {"low": 0, "high": 9}}}, "passes the joint's range -1.0472"),
+        (
+            {"sampling__joint_ranges": {"left_elbow_joint": {"low": 0, "high": 9}}},
+            r"the joint's limits are -1\.047",
+        ),
         (
             {"sampling__height": {"low": 0.85, "high": 0.86}, "sampling__samples": 32, "feasible__heights": 3},
             "no sample has a label",
@@ -154,7 +157,8 @@ def test_the_fit_leaves_a_network_its_map_and_a_report(fit_job: Job, dataset_job
 def test_the_fitted_map_lies_inside_that_of_the_labels_and_holds_the_default_posture(
     fit_job: Job, dataset_job: Job, robot: Robot
 ) -> None:
-    labels, gentle = (FeasibleMap.load(job.out / "feasible.npz") for job in (dataset_job, fit_job))
+    labels = FeasibleMap.load(dataset_job.out / "labelled.npz")
+    gentle = FeasibleMap.load(fit_job.out / "feasible.npz")
     assert labels.contains(gentle.low, gentle.pitch).all()
     assert labels.contains(gentle.high, gentle.pitch).all()
     assert gentle.contains(np.array([robot.default_height]), np.zeros(1))[0]

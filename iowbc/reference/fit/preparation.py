@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.errors import Interrupted
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.fit.fitting import FitData
 from iowbc.reference.fit.network_inputs import base_columns
@@ -38,8 +39,8 @@ class Prepared:
 
 def prepare(
     dataset: Dataset, robot: Robot, recipe: ReferenceGenerator, seed: int, interrupted: Callable[[], bool]
-) -> Prepared | None:
-    """Splits by group and adds mirror images to the training part; None when interrupted."""
+) -> Prepared:
+    """Splits by group and adds mirror images to the training part. Raises `Interrupted`."""
     kinematics = TaskKinematics(SupportModel(robot, recipe.problem), recipe.height)
     samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, dataset.payload, strict=True)]
     configuration = np.concatenate(
@@ -49,7 +50,7 @@ def prepare(
     for row, (sample, q) in enumerate(zip(samples, configuration, strict=True)):
         jacobian[row] = kinematics.jacobian(sample, q)
         if row % 1000 == 0 and interrupted():
-            return None
+            raise Interrupted
     train, validation, held_out = split_by_group(dataset.group, recipe.fit.validation, recipe.fit.held_out, seed)
     whole = FitData(_inputs(recipe, dataset.arm, dataset.command, dataset.payload), dataset.support, jacobian)
     learnt = whole.take(train)

@@ -8,8 +8,8 @@ import pinocchio
 from numpy.typing import NDArray
 
 from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.soles import support_edges, support_margin
 from iowbc.reference.labels.support_model import SupportModel
-from iowbc.reference.labels.support_polygon import support_edges, support_margin
 
 Array = NDArray[Any]
 

@@ -11,9 +11,8 @@ from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.self_collision import SelfCollision
+from iowbc.reference.labels.soles import sole_limits, support_edges, support_margin
 from iowbc.reference.labels.support_model import SupportModel
-from iowbc.reference.labels.support_polygon import support_edges, support_margin
-from iowbc.reference.labels.wrench_cone import sole_limits
 
 Array = NDArray[Any]
 
@@ -36,7 +35,7 @@ class Judge:
     def __init__(self, support: SupportModel, gates: LabelGates, height: Literal["pelvis", "com"]) -> None:
         self.support, self.gates, self.height = support, gates, height
         robot, model = support.robot, support.full
-        self.collision = SelfCollision(robot)
+        self.collision = SelfCollision(robot, model)
         self.edges = support_edges(robot, support.problem)
         self.cone, self.bound = sole_limits(robot, support.problem).rows()
         self.soles = [model.getFrameId(site) for site in robot.soles]
@@ -51,7 +50,7 @@ class Judge:
         support = self.support
         q = support.whole(support.start(), sample.arm)
         pinocchio.forwardKinematics(support.full, support.full_data, q)
-        if self.collision.clearance(support.full_data.oMi)[0] < self.gates.collision_clearance:
+        if self.collision.clearance(support.full_data)[0] < self.gates.collision_clearance:
             raise Rejected("arms collide")
 
     def label(self, sample: Sample, posture: Posture) -> Evidence:
@@ -90,6 +89,6 @@ class Judge:
         margin = float(support_margin(self.edges, com[:2]))
         if margin < gates.support_margin:
             raise Rejected("support margin")
-        if self.collision.clearance(data.oMi)[0] < gates.collision_clearance:
+        if self.collision.clearance(data)[0] < gates.collision_clearance:
             raise Rejected("self-collision")
         return Evidence(torque[6 + robot.support], margin, height)

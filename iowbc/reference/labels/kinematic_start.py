@@ -7,9 +7,8 @@ import pinocchio
 from numpy.typing import NDArray
 
 from iowbc.reference.labels.constrained_step import constrained_step
-from iowbc.reference.labels.costs import posture_weights
 from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import SupportModel, posture_weights
 
 Array = NDArray[Any]
 

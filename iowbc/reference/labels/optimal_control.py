@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.costs import posture_weights
 from iowbc.reference.labels.kinematic_start import KinematicStart
 from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.support_model import SupportModel
-from iowbc.reference.labels.wrench_cone import sole_limits
-from iowbc.reference.labels.wrench_distribution import distribute
+from iowbc.reference.labels.soles import distribute, sole_limits
+from iowbc.reference.labels.support_model import SupportModel, posture_weights
 
 Array = NDArray[Any]
 

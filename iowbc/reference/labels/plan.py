@@ -14,8 +14,6 @@ from iowbc.robot.mirror import interaction_mirror
 
 Array = NDArray[Any]
 
-ABOVE_STRAIGHT = 1.1
-"""Heights up to this part of the straight-legged one may be tried; the feasible map finds the true bound."""
 COMMAND_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
 """Height and pitch stay, roll and yaw change sign."""
 
@@ -127,38 +125,12 @@ class SamplePlan:
         return np.asarray(arm)
 
 
-def check_ranges(robot: Robot, recipe: ReferenceGenerator) -> None:
-    """Raises ValueError where a sampling range makes no sense for this robot."""
-    _arm_ranges(robot, recipe)
-    straight = dict(zip(robot.joints, np.clip(0.0, robot.lower, robot.upper).tolist(), strict=True))
-    tallest = -ABOVE_STRAIGHT * float(robot.tree.forward(straight, robot.base, robot.soles[0])[0][2])
-    height = recipe.sampling.height
-    if height.low <= 0.0 or height.high > tallest:
-        raise ValueError(
-            f"rg.sampling.height: {height.low} to {height.high} m; {robot.name} stands between 0 and {tallest:.2f} m"
-        )
-    for name in ("pitch", "roll", "yaw"):
-        interval = getattr(recipe.sampling, name)
-        if interval is not None and (interval.low < -np.pi / 2 or interval.high > np.pi / 2):
-            raise ValueError(
-                f"rg.sampling.{name}: {interval.low} to {interval.high} rad; valid is within ±{np.pi / 2:.4f} rad"
-            )
-    if recipe.sampling.payload is not None and recipe.sampling.payload.low < 0.0:
-        raise ValueError(f"rg.sampling.payload: a mass of {recipe.sampling.payload.low} kg; valid is 0 or more")
-
-
 def _arm_ranges(robot: Robot, recipe: ReferenceGenerator) -> tuple[Array, Array]:
+    """Least and greatest arm positions of the uniform share, shape (14,) [rad]."""
     names = [robot.joints[index] for index in robot.interaction]
     lower, upper = robot.lower[robot.interaction].copy(), robot.upper[robot.interaction].copy()
     for name, interval in recipe.sampling.joint_ranges.items():
-        if name not in names:
-            raise ValueError(f"rg.sampling.joint_ranges: no arm joint {name!r}; {robot.name} has {', '.join(names)}")
         place = names.index(name)
-        if interval.low < lower[place] or interval.high > upper[place]:
-            raise ValueError(
-                f"rg.sampling.joint_ranges.{name}: {interval.low} to {interval.high} rad passes the joint's range "
-                f"{lower[place]} to {upper[place]} rad"
-            )
         lower[place], upper[place] = interval.low, interval.high
     return lower, upper
 

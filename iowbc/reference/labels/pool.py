@@ -80,7 +80,7 @@ def label_all(
     try:
         while len(done) < len(chunks):
             if interrupted():
-                raise Interrupted
+                raise Interrupted("finished shards are kept")
             for worker in team:
                 _assign(worker, book, chunks, paths)
             for worker in _with_news(team):

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import Problem
 from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
-from iowbc.reference.labels.costs import posture_weights
 from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.support_model import SupportModel
-from iowbc.reference.labels.wrench_cone import sole_limits
+from iowbc.reference.labels.soles import sole_limits
+from iowbc.reference.labels.support_model import SupportModel, posture_weights
 from iowbc.robot.description import GRAVITY
 
 Array = NDArray[Any]

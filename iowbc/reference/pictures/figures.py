@@ -13,10 +13,10 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.recipe.generator import FitGates
 from iowbc.reference.fit.smoothness import Jumps
 from iowbc.reference.fit.task_error import TaskErrors
-from iowbc.reference.labels.crosscheck import Check
+from iowbc.reference.labels.checks import MethodComparison
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.region import GentleRegion, Region
+from iowbc.reference.region import GentleRegion, LabelledRegion
 
 Array = NDArray[Any]
 
@@ -30,12 +30,12 @@ def dataset_figures(
     folder: Path,
     plan: SamplePlan,
     dataset: Dataset,
-    region: Region,
+    region: LabelledRegion,
     rejected: Mapping[str, int],
-    check: Check | None,
+    check: MethodComparison | None,
 ) -> None:
     """Feasible map, reasons of rejection, what the labels need, and the comparison with optimal control."""
-    _feasible_map(folder / "feasible_map.png", plan, region)
+    _labelled_map(folder / "labelled_map.png", plan, region)
     _rejections(folder / "rejections.png", len(dataset), rejected)
     _physics(folder / "labels.png", plan, dataset)
     if check is not None:
@@ -101,7 +101,7 @@ def learning_figure(folder: Path, training: Sequence[float], validation: Sequenc
     _write(figure, folder / "learning.png")
 
 
-def _feasible_map(path: Path, plan: SamplePlan, region: Region) -> None:
+def _labelled_map(path: Path, plan: SamplePlan, region: LabelledRegion) -> None:
     figure, (left, right) = _figure(1, 2, 10.0, 4.2)
     left.pcolormesh(plan.pitches, plan.heights, region.held.T, cmap="Blues", vmin=-0.6, vmax=1.6, shading="nearest")
     left.set_title("has a label with one of two arm postures")

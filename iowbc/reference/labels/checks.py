@@ -1,4 +1,4 @@
-"""Static labels held against the optimal control problem."""
+"""Labels held against each other: static ones against optimal control, mirrored samples against their originals."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +10,8 @@ from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.shards import Shard
+from iowbc.robot.description import Robot
+from iowbc.robot.mirror import support_mirror
 
 Array = NDArray[Any]
 
@@ -17,8 +19,8 @@ WORST = 5
 
 
 @dataclass(frozen=True)
-class Check:
-    """Differences between both methods."""
+class MethodComparison:
+    """Differences between static labels and optimal control."""
 
     difference: Array
     """Largest joint difference of each sample, shape (n,) [rad]."""
@@ -27,14 +29,14 @@ class Check:
     worst: list[str]
 
 
-def pick(dataset: Dataset, plan: SamplePlan, recipe: ReferenceGenerator) -> list[int]:
+def chosen_for_crosscheck(dataset: Dataset, plan: SamplePlan, recipe: ReferenceGenerator) -> list[int]:
     """Numbers of the drawn samples to solve again, spread evenly over the kept ones."""
     drawn = dataset.index[dataset.index < plan.drawn]
     count = min(recipe.crosscheck.samples, len(drawn))
     return [int(drawn[place]) for place in np.linspace(0, len(drawn) - 1, count).astype(int)] if count else []
 
 
-def compare(dataset: Dataset, again: Shard) -> Check | None:
+def compare_methods(dataset: Dataset, again: Shard) -> MethodComparison | None:
     """Differences where optimal control has a label too; None where it has none."""
     if not len(again.kept):
         return None
@@ -53,4 +55,19 @@ def compare(dataset: Dataset, again: Shard) -> Check | None:
         f"pitch {dataset.command[rows[i], 1]:+.3f} rad): {difference[i]:.4f} rad"
         for i in np.argsort(-difference)[:WORST]
     ]
-    return Check(difference, len(difference), metrics, worst)
+    return MethodComparison(difference, len(difference), metrics, worst)
+
+
+def mirror_error(robot: Robot, plan: SamplePlan, dataset: Dataset) -> Array | None:
+    """Largest joint difference of each mirrored sample from its original's mirror image, shape (pairs,) [rad].
+
+    None without pairs.
+    """
+    row = {int(index): place for place, index in enumerate(dataset.index)}
+    images = [index for index in row if plan.original <= index < plan.drawn and plan.group(index) in row]
+    if not images:
+        return None
+    own = dataset.support[[row[index] for index in images]]
+    source = dataset.support[[row[plan.group(index)] for index in images]]
+    error: Array = np.abs(support_mirror(robot)(source) - own).max(axis=1)
+    return error

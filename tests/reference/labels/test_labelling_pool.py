@@ -1,7 +1,6 @@
 """Labelling in processes: the same result for any number of them, after crashes, damage and interruption."""
 
 import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,9 +8,7 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # workers find the doubles by this path too
-from labelling_doubles import DoubleTask
+from reference_doubles import DoubleTask
 
 from iowbc.errors import Interrupted
 from iowbc.reference.labels.pool import CRASHED, label_all

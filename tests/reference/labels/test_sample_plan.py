@@ -10,7 +10,7 @@ from iowbc.control.arms import ArmKinematics
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import Grasps
-from iowbc.reference.labels.plan import COMMAND_MIRROR, SamplePlan, check_ranges
+from iowbc.reference.labels.plan import COMMAND_MIRROR, SamplePlan
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror
 
@@ -111,21 +111,3 @@ def test_joint_ranges_narrow_the_uniform_share(robot: Robot) -> None:
     elbows = np.array([sample.arm[place] for sample in samples])
     assert elbows.min() >= 0.2
     assert elbows.max() <= 0.4
-
-
-@pytest.mark.parametrize(
-    ("sampling", "message"),
-    [
-        (
-            {"joint_ranges": {"left_elbow": {"low": 0, "high": 1}}},
-            r"no arm joint 'left_elbow'; g1 has .*left_elbow_joint",
-        ),
-        ({"joint_ranges": {"left_elbow_joint": {"low": 0, "high": 4}}}, r"0\.0 to 4\.0 rad passes the joint's range"),
-        ({"height": {"low": 0.5, "high": 1.4}}, r"rg\.sampling\.height: 0\.5 to 1\.4 m; g1 stands between 0 and 0\.8"),
-        ({"pitch": {"low": -2.0, "high": 0.0}}, r"rg\.sampling\.pitch: -2\.0 to 0\.0 rad"),
-        ({"payload": {"low": -1.0, "high": 1.0}}, r"a mass of -1\.0 kg"),
-    ],
-)
-def test_ranges_beyond_the_robot_are_refused(robot: Robot, sampling: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        check_ranges(robot, generator(**sampling))

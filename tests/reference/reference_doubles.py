@@ -1,6 +1,12 @@
-"""Jobs for the two stages of the reference generator at a small size."""
+"""Doubles for the tests of the reference generator: solvers that crash, fail or hang, and small jobs of both stages.
+
+Labelling workers import this module.
+"""
 
 import json
+import os
+import signal
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from iowbc.errors import Rejected
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
+from iowbc.reference.labels.sample import Sample
 from iowbc.robot.description import robot_folder
 
 SMALL: dict[str, Any] = {
@@ -82,3 +90,39 @@ def make_job(
         report=Notes(),
         interrupted=interrupted,
     )
+
+
+class Double:
+    """Labels sample i with i; each third has none."""
+
+    def __init__(self, task: "DoubleTask") -> None:
+        self.task = task
+
+    def draw(self, indices: Any) -> list[Sample]:
+        return [Sample(np.full(14, float(index)), np.zeros(4), np.zeros(2)) for index in indices]
+
+    def solve(self, index: int, sample: Sample) -> dict[str, Any]:
+        assert sample.arm[0] == index
+        if index in self.task.crashes:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if index in self.task.mistakes:
+            raise KeyError(f"a mistake at {index}")
+        time.sleep(self.task.pause)
+        if index % 3 == 0:
+            raise Rejected("a third")
+        return {"support": np.array([float(index)])}
+
+
+@dataclass(frozen=True)
+class DoubleTask:
+    """Makes a double in a worker."""
+
+    crashes: tuple[int, ...] = ()
+    mistakes: tuple[int, ...] = ()
+    pause: float = 0.0
+    start: bool = True
+
+    def prepare(self) -> Double:
+        if not self.start:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return Double(self)

@@ -8,7 +8,7 @@ import pytest
 
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import LabelGates, ReferenceGenerator
-from iowbc.reference.labels.crosscheck import compare, pick
+from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.gates import Judge
 from iowbc.reference.labels.kinematic_start import KinematicStart
@@ -16,10 +16,9 @@ from iowbc.reference.labels.optimal_control import OptimalControlMethod
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.shards import Shard
+from iowbc.reference.labels.soles import distribute, sole_limits
 from iowbc.reference.labels.static import StaticMethod
 from iowbc.reference.labels.support_model import SupportModel
-from iowbc.reference.labels.wrench_cone import sole_limits
-from iowbc.reference.labels.wrench_distribution import distribute
 from iowbc.robot.description import Robot
 
 COMMANDS = ((0.70, 0.0), (0.60, 0.4), (0.66, -0.2), (0.68, 0.9))
@@ -105,7 +104,7 @@ def test_the_cross_check_measures_the_largest_joint_difference(robot: Robot, dat
     other[0, 3] += 0.01
     other[2, 14] -= 0.05
     again = Shard(dataset.index[rows[:3]], {"support": other}, dataset.index[rows[3:]], ["feet"])
-    check = compare(dataset, again)
+    check = compare_methods(dataset, again)
     assert check is not None
     np.testing.assert_allclose(check.difference, [0.01, 0.0, 0.05], atol=1e-12)
     assert check.metrics["crosscheck_max"] == pytest.approx(0.05)
@@ -117,7 +116,7 @@ def test_the_cross_check_takes_drawn_samples_from_all_over_the_dataset(robot: Ro
     dataset, rg = Dataset.load(dataset_job.out / "dataset.npz"), dataset_job.recipe.rg
     plan = SamplePlan(robot, rg, dataset_job.recipe.seed)
     wider = rg.model_copy(update={"crosscheck": rg.crosscheck.model_copy(update={"samples": 20})})
-    chosen = pick(dataset, plan, wider)
+    chosen = chosen_for_crosscheck(dataset, plan, wider)
     assert len(set(chosen)) == 20
     assert max(chosen) < plan.drawn
     assert set(chosen) <= set(dataset.index.tolist())

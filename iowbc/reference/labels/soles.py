@@ -1,0 +1,90 @@
+"""What two soles on the ground can carry: wrenches, the support polygon, and the wrenches that hold a posture."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from iowbc.recipe.generator import Problem
+from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
+from iowbc.reference.labels.sample import mean_stance
+from iowbc.reference.labels.support_model import SupportModel
+from iowbc.robot.description import Robot
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class SoleLimits:
+    """What one flat sole can carry: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
+
+    friction: float
+    """Friction coefficient."""
+    half_length: float
+    half_width: float
+    """Half sides of the rectangle for the centre of pressure [m]."""
+    smallest_load: float
+    """Least normal force [N]."""
+
+    def rows(self) -> tuple[Array, Array]:
+        """A and b of A f ≤ b for a wrench f (force, moment) in the sole's frame, shapes (17, 6) and (17,).
+
+        The friction coefficient is that of the pyramid inside the cone, μ/√2. The yaw rows bound the torsion that four
+        corner forces inside that pyramid can make (Caron, Pham, Nakamura, ICRA 2015).
+        """
+        x, y, mu = self.half_length, self.half_width, self.friction / np.sqrt(2.0)
+        pyramid = [[1, 0, -mu, 0, 0, 0], [-1, 0, -mu, 0, 0, 0], [0, 1, -mu, 0, 0, 0], [0, -1, -mu, 0, 0, 0]]
+        pressure = [[0, 0, -y, 1, 0, 0], [0, 0, -y, -1, 0, 0], [0, 0, -x, 0, 1, 0], [0, 0, -x, 0, -1, 0]]
+        torsion = [
+            [a * y, b * x, -mu * (x + y), -turn * a * mu, -turn * b * mu, -turn]
+            for turn in (1.0, -1.0)
+            for a in (1.0, -1.0)
+            for b in (1.0, -1.0)
+        ]
+        load = [[0, 0, -1, 0, 0, 0]]
+        rows = np.array([*pyramid, *pressure, *torsion, *load], dtype=np.float64)
+        bound = np.zeros(len(rows))
+        bound[-1] = -self.smallest_load
+        return rows, bound
+
+
+def sole_limits(robot: Robot, problem: Problem) -> SoleLimits:
+    """Limits of both soles: the rectangle inside the contact points, shrunk by the recipe."""
+    half_length, half_width = problem.sole_fraction * np.abs(robot.sole_polygon).min(axis=(0, 1))
+    return SoleLimits(problem.friction, float(half_length), float(half_width), problem.smallest_load)
+
+
+def support_edges(robot: Robot, problem: Problem) -> tuple[Array, Array]:
+    """Inward normals n (edges, 2) and offsets d (edges,) [m] of both soles' convex hull: distance inside is n·p + d."""
+    corners = robot.sole_polygon + mean_stance(problem.stance_width)[:, None, :2]
+    equations = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)
+    return -equations[:, :2], -equations[:, 2]
+
+
+def support_margin(edges: tuple[Array, Array], point: Array) -> Array:
+    """Distance of points (..., 2) to the nearest edge, positive inside [m]."""
+    normals, offsets = edges
+    margin: Array = (point @ normals.T + offsets).min(axis=-1)
+    return margin
+
+
+def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:
+    """The sole wrenches that hold a posture with the least joint torques, (2, 6), in the soles' frames.
+
+    `configuration` (22,) of the support model. Raises `Rejected` where the limits leave no equilibrium with gravity.
+    """
+    model, data = support.model, support.data
+    gravity = pinocchio.computeGeneralizedGravity(model, data, configuration).copy()
+    pinocchio.computeJointJacobians(model, data, configuration)
+    pinocchio.updateFramePlacements(model, data)
+    transposed = np.concatenate(
+        [pinocchio.getFrameJacobian(model, data, sole, pinocchio.LOCAL).T for sole in support.soles], axis=1
+    )
+    base, joints = transposed[:6], transposed[6:]
+    cone, bound = limits.rows()
+    rows, upper = np.kron(np.eye(2), cone), np.tile(bound, 2)
+    lower = np.full(len(upper), -UNBOUNDED)
+    return constrained_step(joints, -gravity[6:], base, -gravity[:6], rows, lower, upper).reshape(2, 6)
