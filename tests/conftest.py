@@ -1,10 +1,35 @@
-"""The robot that most tests are about."""
+"""The robot that most tests are about, and a smaller one."""
+
+import xml.etree.ElementTree as ElementTree
 
 import pytest
+import yaml
 
-from iowbc.robot.description import Robot, load_robot, robot_folder
+from iowbc.robot.description import DESCRIPTION, Robot, load_robot, robot_folder
+
+STIFF = ("waist_roll", "waist_pitch", "wrist_pitch", "wrist_yaw")
+"""Joints that the robot of 29 joints has and the one of 23 has not."""
 
 
 @pytest.fixture(scope="session")
 def robot() -> Robot:
     return load_robot(robot_folder("g1"))
+
+
+@pytest.fixture(scope="session")
+def robot_of_23(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    """The G1 of 23 joints: no roll and pitch in the waist, no pitch and yaw in the wrists."""
+    source, folder = robot_folder("g1"), tmp_path_factory.mktemp("robots") / "g1_23"
+    folder.mkdir()
+    tree = ElementTree.parse(source / "g1.xml")
+    for body in tree.iter("body"):
+        for joint in body.findall("joint"):
+            if any(kind in joint.attrib["name"] for kind in STIFF):
+                body.remove(joint)
+    tree.write(folder / "g1.xml")
+    entries = yaml.safe_load((source / DESCRIPTION).read_text())
+    entries["name"] = "g1_23"
+    entries["support"] = [name for name in entries["support"] if name.removesuffix("_joint") not in STIFF]
+    entries["joints"] = {kind: row for kind, row in entries["joints"].items() if kind not in STIFF}
+    (folder / DESCRIPTION).write_text(yaml.safe_dump(entries))
+    return load_robot(folder)

@@ -6,20 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.control.chain import Chain, turn
+from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Body
 
 Array = NDArray[Any]
 
-DAMPING = 0.05
-"""Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·DAMPING) next to a singular posture."""
-REACH = 0.2
-"""Further squared damping for each metre of error [m]: out of reach, a stretched arm settles instead of overshooting,
-since its reach falls off by no more than half of this times the squared angle of the elbow."""
-LONGEST = 0.1
-"""Longest error that a step answers to [m]: a wrist turns towards a distant target without overshooting."""
-POSTURE_GAIN = 1.0
-"""Rate at which the redundant joints return to the rest posture [1/s]."""
 X, Y = 0, 1
 IDENTITY = np.eye(3)
 
@@ -36,15 +28,7 @@ def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
 class ArmKinematics:
     """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left, then right."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        *,
-        joint_speed: float | None = None,
-        damping: float = DAMPING,
-        posture_gain: float = POSTURE_GAIN,
-    ) -> None:
-        """`joint_speed`: bound on the references' speed [rad/s]; without it each joint's own limit."""
+    def __init__(self, robot: Robot, settings: ArmReference | None = None) -> None:
         names = [robot.joints[index] for index in robot.interaction]
         chains, waist = arm_chains(robot)
         order = [names.index(body.hinge.name) for chain in chains for body in chain if body.hinge is not None]
@@ -53,13 +37,13 @@ class ArmKinematics:
         self.rest = robot.default_position[robot.interaction]
         self.lower, self.upper = robot.lower[robot.interaction], robot.upper[robot.interaction]
         own = robot.velocity_limit[robot.interaction]
-        self.speed = own if joint_speed is None else np.minimum(own, joint_speed)
-        self.damping, self.posture_gain = damping, posture_gain
+        self.settings = settings = settings or ArmReference()
+        self.speed = own if settings.joint_speed is None else np.minimum(own, settings.joint_speed)
         self._chain, self._waist = Chain(chains), Chain([waist])
         self._grip = robot.grip_offset.T[:, :, None]
 
     def forward(self, arm_position: Array) -> tuple[Array, Array]:
-        """Wrist positions (n, 2, 3) [m] in the torso frame, and their Jacobian (n, 2, 3, joints of an arm)."""
+        """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one)."""
         count, joints = len(arm_position), self._chain.length
         vectors = np.empty((3, joints + 1, 2, count))
         vectors[:, joints] = self._grip
@@ -71,19 +55,19 @@ class ArmKinematics:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
         `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
-        next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to LONGEST;
-        kept to the joint ranges and the joint speed.
+        next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to its
+        longest; kept to the joint ranges and the joint speed.
         """
-        count = len(arm_position)
+        count, settings = len(arm_position), self.settings
         wrist, jacobian = self.forward(arm_position)
         transposed = np.swapaxes(jacobian, -1, -2)
         error = target - wrist
         distance = np.sqrt(np.vecdot(error, error))
-        near = np.minimum(distance, LONGEST)
-        error *= (LONGEST / np.maximum(distance, LONGEST))[..., None]
-        damping = self.damping**2 + REACH * near
+        near = np.minimum(distance, settings.longest_step)
+        error *= (settings.longest_step / np.maximum(distance, settings.longest_step))[..., None]
+        damping = settings.damping**2 + settings.reach * near
         gram = jacobian @ transposed + damping[..., None, None] * IDENTITY
-        posture = (self.posture_gain * dt * (self.rest - arm_position)).reshape(count, 2, -1)
+        posture = (settings.posture_gain * dt * (self.rest - arm_position)).reshape(count, 2, -1)
         wanted = error - np.einsum("nsij,nsj->nsi", jacobian, posture)
         step = posture + np.einsum("nsji,nsj->nsi", jacobian, np.linalg.solve(gram, wanted[..., None])[..., 0])
         bound = self.speed * dt

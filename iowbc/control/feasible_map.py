@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+FEASIBLE = "feasible.npz"
+"""File beside a fitted generator: where its postures hold, to which the controller clamps its commands."""
 Run = tuple[int, int]
 """First and last place of a row of feasible heights."""
 

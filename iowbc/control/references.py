@@ -18,10 +18,6 @@ from iowbc.robot.mirror import VECTOR_SIGN
 
 Array = NDArray[np.floating[Any]]
 
-SETTLING, REFINING = 0.3, 0.02
-"""Time that an iteration of inverse kinematics stands for at the start [s]: the longer, the more it heeds the rest
-posture of the arms, and the less their targets."""
-
 
 def both_wrists(left: tuple[float, float, float]) -> Array:
     """Base grasp of both wrists, (2, 3), from the left one's position in the heading frame [m]."""
@@ -34,15 +30,15 @@ class ReferenceLayer:
     def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
         """`rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture, and commands are
         not clamped to a feasible map."""
-        self.arms = ArmKinematics(robot)
+        self.arms = ArmKinematics(robot, references.arms)
         self.network, self.feasible = None, None
         if rg is not None:
-            from iowbc.control.feasible_map import FeasibleMap
+            from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
             from iowbc.control.generator import ReferenceNetwork
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
-            self.feasible = FeasibleMap.load(rg / "feasible.npz")
-        self._settling, self._refining = references.arms.settling, references.arms.refining
+            self.feasible = FeasibleMap.load(rg / FEASIBLE)
+        self._start = references.arms
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
@@ -73,11 +69,11 @@ class ReferenceLayer:
         """
         arms = np.tile(self.default_arms, (len(command), 1))
         target = self.wrist_target(self.support(arms, command), command, grasp)
-        for _ in range(self._settling):
-            arms = self.arms.solve_step(arms, target, SETTLING)
+        for _ in range(self._start.settling):
+            arms = self.arms.solve_step(arms, target, self._start.settling_time)
         support = self.support(arms, command)
-        for _ in range(self._refining):
-            arms, support = self.advance(arms, support, command, grasp, REFINING)
+        for _ in range(self._start.refining):
+            arms, support = self.advance(arms, support, command, grasp, self._start.refining_time)
         return arms, support
 
     def advance(self, arms: Array, support: Array, command: Array, grasp: Array, dt: float) -> tuple[Array, Array]:

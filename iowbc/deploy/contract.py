@@ -1,15 +1,19 @@
 """The contract of an exported policy: everything that a caller on the robot must know, as JSON beside the graph."""
 
 import hashlib
+import math
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError, model_validator
 
+from iowbc.control.feasible_map import FEASIBLE
+from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
+from iowbc.robot.description import DESCRIPTION
 
 CONTRACT = "contract.json"
 GRAPH = "policy.onnx"
@@ -20,8 +24,7 @@ ROBOT = "robot"
 """Folder with the robot's description inside the exported folder."""
 GENERATOR = "rg"
 """Folder with the reference generator: its feasible map clamps commands; its network is in the graph already."""
-FEASIBLE = "feasible.npz"
-GENERATOR_FILES = ("rg.safetensors", "rg.json", FEASIBLE)
+GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
 
 
 class PortEntry(Section):
@@ -49,14 +52,14 @@ class PartEntry(Section):
 class Contract(Section):
     """What `contract.json` says."""
 
-    format: Literal[1] = 1
+    format: Literal[2] = 2
     """Raised when a reader of the old format would misread the new one."""
     recipe: str
     """Name of the recipe that was exported."""
     robot: str
     """Name of the robot."""
-    sha256: str
-    """Digest of the graph's file."""
+    files: dict[str, str] = Field(default_factory=dict)
+    """SHA-256 of every other file of the folder, by its path in the folder."""
     opset: int
     """ONNX operator set."""
     control_frequency: float
@@ -104,33 +107,55 @@ class Contract(Section):
     sources: dict[str, str]
     """Artifact keys of the stages that went into the graph."""
 
+    @model_validator(mode="after")
+    def _a_number_for_each_joint(self) -> Self:
+        joints = len(self.joints)
+        for name in ("kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position"):
+            values = getattr(self, name)
+            if len(values) != joints or not all(map(math.isfinite, values)):
+                raise ValueError(f"{name}: {len(values)} numbers {values} for {joints} joints")
+        if sorted((*self.support, *self.interaction)) != list(range(joints)):
+            raise ValueError(f"support {self.support} and interaction {self.interaction} do not cover {joints} joints")
+        if len(self.action_scale) != len(self.support):
+            raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
+        return self
+
 
 def digest(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal digits."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def write_contract(contract: Contract, folder: Path) -> None:
-    """Write `contract.json`."""
-    (folder / CONTRACT).write_text(contract.model_dump_json(indent=1) + "\n")
+def seal(contract: Contract, folder: Path) -> Contract:
+    """Write `contract.json` with the digest of every file that the folder holds now."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / CONTRACT)
+    sealed = contract.model_copy(update={"files": {str(path.relative_to(folder)): digest(path) for path in files}})
+    (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    return sealed
 
 
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
-    missing = [name for name in (CONTRACT, GRAPH, f"{ROBOT}/robot.yaml") if not (folder / name).is_file()]
-    if missing:
-        raise ContractBroken(
-            f"{folder}: no exported policy, {' and '.join(missing)} missing; give the folder that `export` made"
-        )
     try:
-        contract = Contract.model_validate_json((folder / CONTRACT).read_text())
-    except ValidationError as error:
-        raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 1: {error}; export again") from error
-    found = digest(folder / GRAPH)
-    if found != contract.sha256:
+        contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
+    except FileNotFoundError as error:
         raise ContractBroken(
-            f"{folder / GRAPH}: SHA-256 is {found}, the contract says {contract.sha256}; "
-            "the graph was changed or damaged after the export: export again"
-        )
+            f"{folder}: no exported policy, {CONTRACT} missing; give the folder that `export` made"
+        ) from error
+    except ValidationError as error:
+        raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 2: {error}; export again") from error
+    unsealed = [name for name in (GRAPH, f"{ROBOT}/{DESCRIPTION}") if name not in contract.files]
+    if unsealed:
+        raise ContractBroken(f"{folder / CONTRACT}: says nothing of {' and '.join(unsealed)}; export again")
+    missing = [name for name in contract.files if not (folder / name).is_file()]
+    if missing:
+        raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that `export` made")
+    for name, said in contract.files.items():
+        if (found := digest(folder / name)) != said:
+            raise ContractBroken(
+                f"{folder / name}: SHA-256 is {found}, the contract says {said}; "
+                "the file was changed or damaged after the export: export again"
+            )
     return contract

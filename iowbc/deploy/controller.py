@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from iowbc.control import gait
 from iowbc.control.command import COMMAND, approach, rate_limits
-from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import FEASIBLE, GENERATOR, GRAPH, ROBOT, Contract, read_contract
+from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, read_contract
 from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
@@ -102,8 +102,8 @@ class Controller:
         found = {port.name: tuple(port.shape[1:]) for port in session.get_inputs()}
         if found != (said := {port.name: port.shape for port in contract.inputs}):
             raise ContractBroken(f"{folder / GRAPH}: inputs are {found}, the contract says {said}; export again")
-        map_file = folder / GENERATOR / FEASIBLE
-        feasible = FeasibleMap.load(map_file) if map_file.is_file() else None
+        map_file = f"{GENERATOR}/{FEASIBLE}"
+        feasible = FeasibleMap.load(folder / map_file) if map_file in contract.files else None
         return cls(contract, robot, session, feasible, robots)
 
     def reset(self, which: NDArray[np.bool_] | None = None, *, scene: str | None = None) -> None:

@@ -12,6 +12,7 @@ from iowbc.export.onnx_graph import write_onnx
 from iowbc.recipe.evaluation import Evaluation
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import DESCRIPTION
 
 PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "torch")
 """Packages whose versions the contract records."""
@@ -26,7 +27,9 @@ def write_folder(
     """
     robot = graph.robot
     write_onnx(graph, out / contract.GRAPH, recipe.export.opset, {"recipe": recipe.name, **sources})
-    shutil.copytree(robot.folder, out / contract.ROBOT)
+    (out / contract.ROBOT).mkdir()
+    for source in (robot.folder / DESCRIPTION, robot.mjcf):
+        shutil.copy(source, out / contract.ROBOT / source.name)
     if rg is not None:
         (out / contract.GENERATOR).mkdir()
         for name in contract.GENERATOR_FILES:
@@ -35,7 +38,6 @@ def write_folder(
     statement = contract.Contract(
         recipe=recipe.name,
         robot=robot.name,
-        sha256=contract.digest(out / contract.GRAPH),
         opset=recipe.export.opset,
         control_frequency=recipe.task.control_frequency,
         physics_frequency=1.0 / recipe.simulation.physics.timestep,
@@ -61,8 +63,7 @@ def write_folder(
         versions={name: version(name) for name in PACKAGES},
         sources=dict(sources),
     )
-    contract.write_contract(statement, out)
-    return statement
+    return contract.seal(statement, out)
 
 
 def world_of(recipe: Recipe) -> Recipe:

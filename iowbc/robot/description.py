@@ -16,6 +16,7 @@ Indices = NDArray[np.int64]
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s²], as MuJoCo and pinocchio have it by default."""
+DESCRIPTION = "robot.yaml"
 ROW_KEYS = frozenset({"kp", "kd", "velocity", "default", "scale", "mirrored"})
 
 
@@ -81,7 +82,7 @@ def robot_folder(name: str) -> Path:
     package = Path(__file__).resolve().parents[1]
     roots = [Path.cwd() / "robots", package.parent / "robots", package / "robots"]
     for root in roots:
-        if (root / name / "robot.yaml").is_file():
+        if (root / name / DESCRIPTION).is_file():
             return root / name
     known = sorted({found.parent.name for root in roots for found in root.glob("*/robot.yaml")})
     raise FileNotFoundError(
@@ -92,7 +93,7 @@ def robot_folder(name: str) -> Path:
 
 def load_robot(folder: Path) -> Robot:
     """Reads `robot.yaml` and the MJCF it names. Errors name the file, the entry, and what would be valid."""
-    source = folder / "robot.yaml"
+    source = folder / DESCRIPTION
     entries = yaml.safe_load(source.read_text(encoding="utf-8"))
     if not isinstance(entries, Mapping):
         raise ValueError(f"{source}: expected a mapping of entries, found {type(entries).__name__}")

@@ -44,7 +44,7 @@ def run(job: Job) -> None:
         action_bound=task.action.bound,
     )
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
-    write_folder(job.out, graph, recipe, rg, sources)
+    statement = write_folder(job.out, graph, recipe, rg, sources)
     try:
         policy, played = try_out(recipe, job.robot, rg, job.out, job.interrupted)
     except Interrupted as stopped:
@@ -69,6 +69,7 @@ def run(job: Job) -> None:
     }
     job.report.metrics(metrics, 0)
     job.summarize(metrics, parity_by_output=differences, seconds=[trial.seconds for trial in played])
+    contract.seal(statement, job.out)
     job.report.say(
         f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(policy.inputs)} steps; "
         f"an inference takes {metrics['inference_ms']:.3f} ms"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.control.arms import ArmKinematics
+from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
 
 PERIOD = 0.02
@@ -60,13 +61,13 @@ def test_next_to_a_straight_elbow_steps_stay_bounded(robot: Robot, arms: ArmKine
     wrist, _ = arms.forward(straight)
     outward = wrist + 0.02 * wrist / np.linalg.norm(wrist, axis=-1, keepdims=True)
     step = arms.solve_step(straight, outward, 1.0) - straight
-    damped = 0.02 / (2.0 * arms.damping)
-    drawn = np.abs(arms.posture_gain * (arms.rest - straight)).max() * np.sqrt(7)
+    damped = 0.02 / (2.0 * arms.settings.damping)
+    drawn = np.abs(arms.settings.posture_gain * (arms.rest - straight)).max() * np.sqrt(7)
     assert np.linalg.norm(step.reshape(2, 7), axis=1).max() < damped + drawn
 
 
 def test_references_keep_to_joint_ranges_and_joint_speed(robot: Robot) -> None:
-    arms = ArmKinematics(robot, joint_speed=2.0)
+    arms = ArmKinematics(robot, ArmReference(joint_speed=2.0))
     random = np.random.default_rng(0)
     posture = np.tile(arms.rest, (64, 1))
     for _ in range(60):

@@ -121,31 +121,69 @@ def test_missing_or_broken_measurements_are_refused(exported: Path, robot: Robot
         Controller.load(exported).step(broken, NOMINAL)
 
 
-def test_a_changed_graph_is_noticed(exported: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "changed"
-    shutil.copytree(exported, folder)
-    with (folder / GRAPH).open("ab") as graph:
-        graph.write(b"x")
-    with pytest.raises(ContractBroken, match="SHA-256"):
-        Controller.load(folder)
+def files(exported: Path) -> list[str]:
+    return [str(path.relative_to(exported)) for path in sorted(exported.rglob("*")) if path.is_file()]
 
 
-@pytest.mark.parametrize("name", [GRAPH, CONTRACT, "robot/robot.yaml"])
-def test_an_incomplete_folder_is_named(name: str, exported: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "incomplete"
-    shutil.copytree(exported, folder)
-    (folder / name).unlink()
-    with pytest.raises(ContractBroken, match=f"{name} missing"):
-        Controller.load(folder)
+def test_a_changed_file_is_noticed_whichever_it_is(exported: Path, tmp_path: Path) -> None:
+    sealed = [name for name in files(exported) if name != CONTRACT]
+    assert {GRAPH, "robot/robot.yaml", "robot/g1.xml", "rg/feasible.npz", "rg/rg.safetensors"} <= set(sealed)
+    folder = shutil.copytree(exported, tmp_path / "changed")
+    for name in sealed:
+        whole = (folder / name).read_bytes()
+        (folder / name).write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
+        with pytest.raises(ContractBroken, match=f"{name}: SHA-256 is"):
+            Controller.load(folder)
+        (folder / name).write_bytes(whole)
+    Controller.load(folder)
+
+
+def test_an_incomplete_folder_is_named(exported: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(exported, tmp_path / "incomplete")
+    for name in files(exported):
+        whole = (folder / name).read_bytes()
+        (folder / name).unlink()
+        with pytest.raises(ContractBroken, match=f"{name} missing"):
+            Controller.load(folder)
+        (folder / name).write_bytes(whole)
+
+
+def changed(exported: Path, place: Path, **entries: Any) -> Path:
+    """A copy of the exported folder whose contract has other entries."""
+    folder = shutil.copytree(exported, place)
+    contract = json.loads((folder / CONTRACT).read_text())
+    (folder / CONTRACT).write_text(json.dumps(contract | entries))
+    return folder
 
 
 def test_a_contract_of_another_format_is_refused(exported: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "later"
-    shutil.copytree(exported, folder)
-    contract = json.loads((folder / CONTRACT).read_text())
-    (folder / CONTRACT).write_text(json.dumps(contract | {"format": 2}))
-    with pytest.raises(ContractBroken, match="not a contract of format 1"):
-        read_contract(folder)
+    with pytest.raises(ContractBroken, match="not a contract of format 2"):
+        read_contract(changed(exported, tmp_path / "later", format=3))
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "message"),
+    [
+        ("kp", [100.0] * 28, "kp: 28 numbers"),
+        ("kd", [float("nan")] * 29, "kd"),
+        ("action_scale", [0.2], "action_scale: 1 numbers for 15 support joints"),
+        ("support", [0, 1], "do not cover 29 joints"),
+        ("files", {}, "says nothing of policy.onnx"),
+    ],
+)
+def test_numbers_that_do_not_fit_the_joints_are_refused(
+    entry: str, value: Any, message: str, exported: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(ContractBroken, match=message):
+        read_contract(changed(exported, tmp_path / "wrong", **{entry: value}))
+
+
+def test_every_constant_of_the_arms_is_in_the_contract(exported: Path, recipe: Recipe) -> None:
+    references = read_contract(exported).references
+    assert references == recipe.task.references
+    assert {"damping", "reach", "longest_step", "posture_gain", "joint_speed"} <= set(
+        type(references.arms).model_fields
+    )
 
 
 def test_the_contract_says_what_every_number_is(exported: Path) -> None:

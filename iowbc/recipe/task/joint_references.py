@@ -32,6 +32,22 @@ class ArmReference(Section):
     """Iterations at the start of an episode that bring the arms near the grasp and to their rest posture."""
     refining: int = Field(default=3, ge=0)
     """Iterations after that which bring the wrists to their targets; without, arms creep in the first seconds."""
+    settling_time: float = Field(default=0.3, gt=0.0)
+    """Time that a settling iteration stands for [s]: the longer, the more it heeds the rest posture of the arms, and
+    the less their targets."""
+    refining_time: float = Field(default=0.02, gt=0.0)
+    """Time that a refining iteration stands for [s]: a control period, so that it ends where the episode goes on."""
+    damping: float = Field(default=0.05, gt=0.0)
+    """Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·damping) next to a singular posture."""
+    reach: float = Field(default=0.2, ge=0.0)
+    """Further squared damping for each metre of error [m]: out of reach, a stretched arm settles instead of
+    overshooting, since its reach falls off by no more than half of this times the squared angle of the elbow."""
+    longest_step: float = Field(default=0.1, gt=0.0)
+    """Longest error that a step answers to [m]: a wrist turns towards a distant target without overshooting."""
+    posture_gain: float = Field(default=1.0, ge=0.0)
+    """Rate at which the redundant joints return to the rest posture [1/s]; slow, for the wrists come first."""
+    joint_speed: float | None = Field(default=None, gt=0.0)
+    """Bound on the speed of the references [rad/s]; empty takes each joint's own limit from `robot.yaml`."""
 
 
 class GaitPrior(Section):

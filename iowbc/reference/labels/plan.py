@@ -8,6 +8,7 @@ from scipy.stats import qmc
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.recipe.generator import Interval, ReferenceGenerator
+from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.reference.labels.sample import Sample
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror
@@ -36,7 +37,7 @@ class SamplePlan:
         arms = robot.interaction
         self.rest, self.lower, self.upper = robot.default_position[arms], robot.lower[arms], robot.upper[arms]
         self.uniform_lower, self.uniform_upper = _arm_ranges(robot, recipe)
-        self.kinematics = ArmKinematics(robot, posture_gain=0.0)
+        self.kinematics = ArmKinematics(robot, ArmReference(posture_gain=0.0))
         self.mirror = interaction_mirror(robot)
         self.grid_arms = np.stack([np.tile(self.rest, (len(self.pitches), 1)), self._carrying()])
         self.grid_shape = (len(self.grid_arms), len(self.pitches), len(self.heights))
