@@ -9,13 +9,11 @@ from typing import Any, Self
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.processes import single_threaded
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
-
-Array = NDArray[Any]
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -26,7 +24,7 @@ def wander(step: int, rows: int, columns: int) -> Array:
 
 
 @dataclass
-class Course:
+class RecordedSteps:
     """What environments asked of MuJoCo in some control periods: models, and states with controls and forces."""
 
     models: list[Any]
@@ -49,13 +47,13 @@ class Course:
         return 2.0 * both - begin - time.perf_counter()
 
 
-def record(setup: Setup, first: int, last: int, periods: int) -> Course:
+def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
     """Lets environments of one scene play from a reset and keeps what they asked of MuJoCo."""
     batch = setup.batch(first, last, private_buffers(setup.buffer_fields(), last - first))
     batch.reset(np.arange(first, last, dtype=np.uint64) + np.uint64(setup.seed))
     (world,) = batch.simulation.worlds
     models = [batch.simulation.physics_model(index)[0] for index in range(batch.n)]
-    physics = setup.recipe.simulation.physics
+    physics = setup.specification.recipe.simulation.physics
     substeps = round(batch.period / physics.timestep)
     states = np.empty((periods, *world.batch.state.shape))
     for period in range(periods):
@@ -63,7 +61,7 @@ def record(setup: Setup, first: int, last: int, periods: int) -> Course:
         batch.step()
         states[period] = world.before
         _with_forces(world, states[period])
-    return Course(models, states, substeps)
+    return RecordedSteps(models, states, substeps)
 
 
 def _with_forces(world: Any, states: Array) -> None:
@@ -82,11 +80,11 @@ def _with_forces(world: Any, states: Array) -> None:
 
 
 def _serve(pipe: Connection, setup: Setup, first: int, last: int, periods: int) -> None:
-    course = record(setup, first, last, periods)
-    course.run()
+    recorded = record(setup, first, last, periods)
+    recorded.run()
     pipe.send(0.0)
     while pipe.recv():
-        pipe.send(course.run())
+        pipe.send(recorded.run())
 
 
 class BareLoops:

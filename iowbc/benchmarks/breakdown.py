@@ -8,7 +8,7 @@ import numpy as np
 
 from iowbc.benchmarks.bare_loop import wander
 from iowbc.task.vector.setup import Setup
-from iowbc.task.vector.workers import Alone, Workers
+from iowbc.task.vector.workers import InProcess, Workers
 
 PARTS = ("physics", "simulation", "references", "reward", "observation", "rest")
 """mj_step; partner, delays, sensors and gathering; commands and references; motion, reward and terminations; writing
@@ -58,22 +58,21 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
 
     Also `reset`: what the end of one episode adds.
     """
-    crew = Alone(setup)
-    batch, watch = crew.batch, Stopwatch()
+    workers = InProcess(setup)
+    batch, watch = workers.batch, Stopwatch()
     watch.watch(batch, "step", "step")
     watch_physics(batch, watch)
     watch.watch(batch.simulation, "step", "simulation")
-    watch.watch(batch, "_advance", "references")
-    for name in ("_motion", "_follow", "_score"):
-        watch.watch(batch, name, "reward")
-    watch.watch(batch, "_observe", "observation")
+    watch.watch(batch.guidance, "advance", "references")
+    watch.watch(batch.judge, "judge", "reward")
+    watch.watch(batch.observer, "write", "observation")
     rows: list[dict[str, float]] = []
     for _ in range(rounds):
         batch.reset()
         for name in watch.spent:
             watch.spent[name] = 0.0
         for period in range(periods):
-            crew.buffers["action"][:] = wander(period, batch.n, crew.buffers["action"].shape[1])
+            workers.buffers["action"][:] = wander(period, batch.n, workers.buffers["action"].shape[1])
             batch.step()
         row = {name: 1e3 * spent / periods for name, spent in watch.spent.items()}
         row["simulation"] -= row["physics"]
@@ -88,20 +87,20 @@ def _reset_time(batch: Any) -> float:
     times = []
     for index in range(batch.n):
         begin = time.perf_counter()
-        batch._begin(np.array([index]))
+        batch.begin(np.array([index]))
         times.append(time.perf_counter() - begin)
     return 1e3 * float(np.median(times))
 
 
-def transfer_time(crew: Workers, rounds: int) -> float:
+def transfer_time(workers: Workers, rounds: int) -> float:
     """Time to ask all workers for next to nothing and to copy what a step leaves behind [ms], median."""
     times = []
     for _ in range(rounds):
         begin = time.perf_counter()
-        crew.buffers["action"][:] = 0.0
-        crew.ask("__len__")
-        crew.answers()
+        workers.buffers["action"][:] = 0.0
+        workers.ask("__len__")
+        workers.answers()
         for name in ("observation", "reward", "done"):
-            crew.buffers[name].copy()
+            workers.buffers[name].copy()
         times.append(time.perf_counter() - begin)
     return 1e3 * float(np.median(times))

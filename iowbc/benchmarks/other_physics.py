@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.benchmarks.bare_loop import wander
 from iowbc.benchmarks.breakdown import Stopwatch, watch_physics
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,8 @@ LARGER = 1.1
 
 
 @dataclass(frozen=True)
-class Course:
-    """A stretch from a reset, played with small random actions."""
+class Trajectories:
+    """How environments moved from a reset, played with small random actions."""
 
     joints: Array
     """(periods, n, joints) [rad]."""
@@ -53,7 +52,7 @@ class Course:
     """Spent in MuJoCo [s]."""
 
 
-def play(setup: Setup, periods: int, size: float = 1.0) -> Course:
+def play(setup: Setup, periods: int, size: float = 1.0) -> Trajectories:
     """Plays the environments of a setup in this process, with actions of a relative size."""
     n = setup.count
     batch = setup.batch(0, n, private_buffers(setup.buffer_fields(), n))
@@ -67,11 +66,11 @@ def play(setup: Setup, periods: int, size: float = 1.0) -> Course:
         up &= ~batch.buffers["done"]
         joints.append(batch.simulation.state.joint_position.copy())
         base.append(batch.simulation.state.base_position.copy())
-    return Course(np.array(joints), np.array(base), up, watch.spent["physics"])
+    return Trajectories(np.array(joints), np.array(base), up, watch.spent["physics"])
 
 
-def apart(one: Course, other: Course) -> tuple[float, float]:
-    """Largest distance of two courses in any joint [rad] and of the base [m]: medians over what stays up in both."""
+def apart(one: Trajectories, other: Trajectories) -> tuple[float, float]:
+    """Largest distance in any joint [rad] and of the base [m]: medians over the environments that stay up in both."""
     both = one.up & other.up
     if not both.any():
         return np.nan, np.nan
@@ -82,17 +81,17 @@ def apart(one: Course, other: Course) -> tuple[float, float]:
 
 def compare(setup: Setup, periods: int, turns: int, say: Callable[[str], None]) -> dict[str, float]:
     """Prints and returns for each variant its cost and how far its trajectories are from the recipe's."""
-    physics = setup.recipe.simulation.physics
+    physics = setup.specification.recipe.simulation.physics
     others = [v for v in VARIANTS if any(getattr(physics, name) != value for name, value in v.physics.items())]
     setups = [setup, *(_with_physics(setup, variant.physics) for variant in others)]
     played = [[play(one, periods) for one in setups] for _ in range(turns)]
-    fastest = [min(course.time for course in courses) for courses in zip(*played, strict=True)]
+    fastest = [min(turn.time for turn in of_one) for of_one in zip(*played, strict=True)]
     plain = played[0][0]
-    seconds = periods / setup.recipe.task.control_frequency
+    seconds = periods / setup.specification.recipe.task.control_frequency
     say(f"{f'other physics, trajectories of {seconds:g} s':34}{'cost':>10}{'joint [rad]':>14}{'base [mm]':>12}")
     figures: dict[str, float] = {}
-    for one, course, time in zip(others, played[0][1:], fastest[1:], strict=True):
-        joint, base = apart(plain, course)
+    for one, trajectories, time in zip(others, played[0][1:], fastest[1:], strict=True):
+        joint, base = apart(plain, trajectories)
         cost = time / fastest[0]
         say(f"  {one.label:32}{cost:10.2f}{joint:14.4f}{1e3 * base:12.1f}")
         figures |= {f"{one.name}_cost": cost, f"{one.name}_joint": joint, f"{one.name}_base": base}
@@ -102,7 +101,9 @@ def compare(setup: Setup, periods: int, turns: int, say: Callable[[str], None]) 
 
 
 def _with_physics(setup: Setup, changes: dict[str, Any]) -> Setup:
-    simulation = setup.recipe.simulation
+    simulation = setup.specification.recipe.simulation
     physics = simulation.physics.model_copy(update=changes)
-    recipe = setup.recipe.model_copy(update={"simulation": simulation.model_copy(update={"physics": physics})})
-    return replace(setup, recipe=recipe)
+    recipe = setup.specification.recipe.model_copy(
+        update={"simulation": simulation.model_copy(update={"physics": physics})}
+    )
+    return replace(setup, specification=replace(setup.specification, recipe=recipe))

@@ -21,9 +21,9 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.task import SceneShares
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.task.gym.environment import Environment
+from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.vector_env import VectorEnv
-from iowbc.task.vector.workers import Workers
 
 PERIODS = 40
 """Control steps from a reset that are measured: nobody has fallen yet, so that both loops step the same states."""
@@ -55,25 +55,26 @@ def main(
     folder = robot or robot_folder(recipe.robot)
     cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})
-    only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
+    only = SceneShares.only(scene)
     recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
     say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
     with _generator(rg, folder, recipe) as generator:
-        parts = step_breakdown(Setup(recipe, folder, generator, environments, recipe.seed), PERIODS, turns // 2 + 1)
+        specification = Specification(recipe, folder, generator)
+        parts = step_breakdown(Setup(specification, environments, recipe.seed), PERIODS, turns // 2 + 1)
         say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
         figures: dict[str, float] = {}
         for count in counts:
-            setup = Setup(recipe, folder, generator, count * environments, recipe.seed)
+            setup = Setup(specification, count * environments, recipe.seed)
             figures |= _against_bare(setup, count, turns, environments * parts["reset"], say)
             if others:
-                figures |= _others(recipe, folder, generator, scene, count, figures[f"vector_env_{count}"], say)
+                figures |= _others(specification, scene, count, figures[f"vector_env_{count}"], say)
         parts["transfer"] = figures[f"transfer_ms_{counts[-1]}"]
         total = sum(parts[name] for name in (*PARTS, "transfer"))
         say(f"a step of {environments} environments: {total:.2f} ms")
         for name in (*PARTS, "transfer"):
             say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
         say(f"  an episode's end adds {parts['reset']:.2f} ms")
-        compared = compare(Setup(recipe, folder, generator, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
+        compared = compare(Setup(specification, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
         figures |= {f"variant_{name}": value for name, value in compared.items()}
         return figures | {f"step_{name}_ms": value for name, value in parts.items()}
 
@@ -94,18 +95,16 @@ def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Call
 
     `resets`: time in which all environments of a worker begin an episode, one after another [ms].
     """
-    env = VectorEnv(setup.recipe, setup.robot, rg=setup.rg, num_envs=setup.count, workers=count, seed=setup.seed)
+    env = VectorEnv(setup.specification, num_envs=setup.count, workers=count, seed=setup.seed)
     try:
-        crew = env._crew
-        assert isinstance(crew, Workers)
-        with BareLoops(setup, crew.groups, PERIODS) as bare:
+        with BareLoops(setup, env.workers.groups, PERIODS) as bare:
             pairs = np.array([(bare.rate(), _rate(env)) for _ in range(turns)])
-        transfer = transfer_time(crew, 20 * turns)
+        transfer = transfer_time(env.workers, 20 * turns)
     finally:
         env.close()
     rates = pairs.max(axis=0)
     ratio = float(np.median(pairs[:, 1] / pairs[:, 0]))
-    a_step = 1e-3 * resets / (EPISODE * setup.recipe.task.control_frequency)
+    a_step = 1e-3 * resets / (EPISODE * setup.specification.recipe.task.control_frequency)
     spread = 1.0 / (1.0 + a_step * rates[1] / setup.count)
     say(f"{f'bare mj_step loop, {count} process(es)':34}{rates[0]:10.0f}{1.0:10.2f}")
     say(f"{f'vector environment, {count} worker(s)':34}{rates[1]:10.0f}{ratio:10.2f}")
@@ -131,10 +130,10 @@ def _rate(env: VectorEnv) -> float:
 
 
 def _others(
-    recipe: Recipe, robot: Path, rg: Path | None, scene: str, count: int, own: float, say: Callable[[str], None]
+    specification: Specification, scene: str, count: int, own: float, say: Callable[[str], None]
 ) -> dict[str, float]:
     """Rates of the usual vector environments: one environment a process, `count` processes."""
-    make = partial(Environment, scene, recipe, robot, rg)
+    make = partial(Environment, scene, specification.recipe, specification.robot, specification.rg)
     figures = {}
     for name, label, build in (
         ("sb3", "SB3 SubprocVecEnv", partial(SubprocVecEnv, start_method="forkserver")),

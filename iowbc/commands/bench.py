@@ -9,14 +9,14 @@ from iowbc.pipeline.tracking.tracker import record_figures
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.task import SceneShares
+from iowbc.recipe.simulation.holding import SCENES
 
 
 def simulation(
     runs: Runs, file: Path | None, *, scene: str, environments: int, workers: Sequence[int], others: bool
 ) -> None:
     """Measure the vector environment, of the default recipe or of one in a file. Raises `UsageError`."""
-    require_known(scene, "scene", SceneShares.model_fields)
+    require_known(scene, "scene", SCENES)
     recipe = _recipe(file)
     require_writable_runs(runs)
     from iowbc.benchmarks import simulation

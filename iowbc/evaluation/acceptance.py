@@ -11,6 +11,7 @@ from iowbc.evaluation.trials.rollout import play_in
 from iowbc.recipe.evaluation import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 
@@ -36,7 +37,9 @@ def try_out(
     """
     episodes = [trial.episode for trial in acceptance_trials(recipe)]
     controller = Controller.load(exported, robots=len(episodes))
-    environment = VectorEnv(recipe, robot, rg=rg, num_envs=len(episodes), workers=0, seed=0, episodes=tuple(episodes))
+    environment = VectorEnv(
+        Specification(recipe, robot, rg), num_envs=len(episodes), workers=0, seed=0, episodes=tuple(episodes)
+    )
     try:
         policy = ExportedPolicy(controller, environment, golden_steps=recipe.export.golden_steps)
         outcomes = play_in(environment, recipe, policy, interrupted)

@@ -31,7 +31,7 @@ class ExportedPolicy:
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         del observation, privileged
         batch = self.environment.batch
-        measured = Measured.of(batch.simulation.measured)
+        measured = Measured.of(batch.measured)
         targets = self.controller.step(measured, batch.command, limit_rates=False)
         expected = batch.targets(targets.action)
         self.largest_difference = max(self.largest_difference, float(np.abs(expected - targets.position).max()))

@@ -18,6 +18,7 @@ from iowbc.evaluation.trials.table import replayed
 from iowbc.recipe.evaluation import Video
 from iowbc.recipe.recipe import Recipe
 from iowbc.sim.rendering.renderer import SceneRenderer
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 Frame = NDArray[np.uint8]
@@ -136,7 +137,7 @@ def film_trial(
     interrupted: Callable[[], bool] = lambda: False,
 ) -> Outcome:
     """Play the trial in a row of `trials.parquet` again and film it. Raises Interrupted when interrupted."""
-    environment = VectorEnv(recipe, robot, rg=rg, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
+    environment = VectorEnv(Specification(recipe, robot, rg), num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     title = [f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"]
     try:
         with EpisodeFilm(environment, path, recipe.eval.video, title) as film:

@@ -19,6 +19,7 @@ from iowbc.evaluation.viewer import play_in_viewer, require_display
 from iowbc.learning.acting import load_policy
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.episodes import Episode
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 
@@ -36,7 +37,9 @@ class Source:
 
     def environment(self, episode: Episode) -> VectorEnv:
         """One environment, in this process, that plays an episode."""
-        return VectorEnv(self.recipe, self.robot, rg=self.rg, num_envs=1, workers=0, seed=0, episodes=(episode,))
+        return VectorEnv(
+            Specification(self.recipe, self.robot, self.rg), num_envs=1, workers=0, seed=0, episodes=(episode,)
+        )
 
 
 def exported_source(folder: Path) -> Source:

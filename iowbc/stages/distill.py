@@ -16,15 +16,14 @@ def run(job: Job) -> None:
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import StudentTraining
     from iowbc.robot.description import load_robot
+    from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
     torch.manual_seed(recipe.seed)
     teacher, about = load_teacher(job.inputs["teacher"])
     environments = VectorEnv(
-        recipe,
-        job.robot,
-        rg=job.inputs.get("rg-fit"),
+        Specification(recipe, job.robot, job.inputs.get("rg-fit")),
         num_envs=settings.environments,
         workers=job.workers,
         seed=recipe.seed + 1,

@@ -22,13 +22,12 @@ def run(job: Job) -> None:
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.robot.description import load_robot
+    from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings, robot = job.recipe, job.recipe.teacher, load_robot(job.robot)
     environments = VectorEnv(
-        recipe,
-        job.robot,
-        rg=job.inputs.get("rg-fit"),
+        Specification(recipe, job.robot, job.inputs.get("rg-fit")),
         num_envs=settings.environments,
         workers=job.workers,
         seed=recipe.seed,

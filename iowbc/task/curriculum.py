@@ -1,15 +1,11 @@
 """The curriculum: how hard the world is at a level, and how an environment's level moves."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.curriculum import Curriculum
-
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

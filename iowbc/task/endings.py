@@ -1,15 +1,52 @@
-"""When an episode ends early: falls and drops."""
+"""When an episode ends, and why: falls, drops, time limits, divergence."""
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.termination import Termination
 from iowbc.task.motion import Motion
 
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
+
+@dataclass(frozen=True)
+class Ending:
+    """Why episodes end in a step, each (n,). What diverged neither fell nor dropped anything."""
+
+    fallen: Mask
+    dropped: Mask
+    time_limit: Mask
+    diverged: Mask
+
+    @classmethod
+    def none(cls, n: int) -> Self:
+        """Nothing ends."""
+        return cls(*np.zeros((4, n), np.bool_))
+
+    @property
+    def failed(self) -> Mask:
+        """Fell or dropped the object."""
+        return self.fallen | self.dropped
+
+    @property
+    def done(self) -> Mask:
+        """Ended for whatever reason."""
+        return self.fallen | self.dropped | self.time_limit | self.diverged
+
+    @property
+    def truncated(self) -> Mask:
+        """Reached the time limit, and nothing worse."""
+        return self.time_limit & ~(self.fallen | self.dropped | self.diverged)
+
+    def reasons(self) -> dict[str, Mask]:
+        """Exactly one reason for each that ended."""
+        return {
+            "fallen": self.fallen,
+            "dropped": self.dropped & ~self.fallen,
+            "time_limit": self.truncated,
+            "diverged": self.diverged,
+        }
 
 
 def fallen(motion: Motion, pitch_command: Array, termination: Termination) -> Mask:

@@ -1,15 +1,13 @@
 """What the task remembers of each environment between two control steps."""
 
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.control.command import COMMAND
-from iowbc.task.rewards.total import TERMS, TRACKED
-
-Array = NDArray[Any]
+from iowbc.task.rewards.table import TRACKED
 
 
 @dataclass
@@ -32,6 +30,8 @@ class Memory:
     """C in force, rate-limited and clamped, (n, 11)."""
     goal: Array
     """Where the command goes, (n, 11)."""
+    height_rate: Array
+    """Rate of change of the commanded height, (n,) [m/s]."""
     phase: Array
     """Gait phase, (n,)."""
     stepping: Array
@@ -59,11 +59,11 @@ class Memory:
     def blank(cls, n: int, arms: int, support: int) -> Self:
         """All zero."""
         counters = {name: np.zeros(n, np.int64) for name in ("episode", "draws", "steps", "limit", "goal_until")}
-        scalars = ("level", "phase", "heading_reference", "total")
+        scalars = ("level", "height_rate", "phase", "heading_reference", "total")
         return cls(
             **counters,
             **{name: np.zeros(n) for name in scalars},
-            tracking=np.zeros((n, len(TERMS[TRACKED]))),
+            tracking=np.zeros((n, len(TRACKED))),
             stepping=np.zeros(n, np.bool_),
             command=np.zeros((n, len(COMMAND))),
             goal=np.zeros((n, len(COMMAND))),
@@ -74,6 +74,11 @@ class Memory:
             filtered_velocity=np.zeros((n, 3)),
             object_place=np.zeros((n, 3)),
         )
+
+    def clear(self, which: Indices) -> None:
+        """Forgets what belongs to the episode that has ended in some environments, (k,)."""
+        for values in (self.action, self.filtered_velocity, self.tracking, self.total):
+            values[which] = 0.0
 
     def arrays(self) -> dict[str, Array]:
         """Copies of all arrays, by name."""

@@ -1,15 +1,13 @@
 """How the robot and the object move, seen from the heading frame: what reward, terminations and signals look at."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.robot import rotations
 from iowbc.sim.state import SimulationState
-
-Array = NDArray[np.floating[Any]]
 
 UPRIGHT = 1e-9
 """Keeps a base that points straight up or down from dividing by zero."""

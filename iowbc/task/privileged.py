@@ -5,17 +5,12 @@ To add a part, write a function that computes it from `Truth` and a line of the 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from iowbc.arrays import Array
 from iowbc.control.layout import Layout, Part
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import axial_vector, polar_vector, polar_vector_each_side, scalar
 from iowbc.task.motion import Motion
-
-Array = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)

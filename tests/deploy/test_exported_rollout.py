@@ -17,6 +17,7 @@ from iowbc.learning.acting import StudentPolicy
 from iowbc.recipe.evaluation import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 TOLERANCE = 1e-5
@@ -51,7 +52,7 @@ def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, expor
         trials_at("test", scene, mass, script, count=1, seed=3, fixed={})[0].episode
         for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
     )
-    environment = VectorEnv(recipe, robot.folder, rg=rg, num_envs=3, workers=0, seed=0, episodes=episodes)
+    environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
     controller = Controller.load(exported, robots=3)
     both = Both(ExportedPolicy(controller, environment, golden_steps=30), StudentPolicy(graph.student, graph.history))
     try:

@@ -9,6 +9,7 @@ from task_worlds import with_changes
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot, load_robot, robot_folder
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 
@@ -36,7 +37,7 @@ def make(recipe: Recipe, folder: Path) -> Iterator[Callable[..., VectorEnv]]:
 
     def maker(num_envs: int = 4, workers: int = 0, seed: int = 7, changes: Any = None, **options: Any) -> VectorEnv:
         world = with_changes(recipe, changes or {})
-        env = VectorEnv(world, folder, rg=None, num_envs=num_envs, workers=workers, seed=seed, **options)
+        env = VectorEnv(Specification(world, folder), num_envs=num_envs, workers=workers, seed=seed, **options)
         made.append(env)
         return env
 

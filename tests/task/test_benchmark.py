@@ -17,12 +17,13 @@ from iowbc.control.command import COMMAND, HEIGHT, PITCH
 from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
+from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 
 
 @pytest.fixture
 def setup(recipe: Recipe, folder: Path) -> Setup:
-    return Setup(with_changes(recipe, {"task.scenes.free": 0.0}), folder, None, 3, 0)
+    return Setup(Specification(with_changes(recipe, {"task.scenes.free": 0.0}), folder), 3, 0)
 
 
 def test_the_bare_loop_takes_the_course_of_the_environments(setup: Setup) -> None:
@@ -69,7 +70,9 @@ def test_the_stand_in_for_a_fitted_generator_keeps_the_default_posture(
 
 def test_a_process_that_fails_ends_the_benchmark_instead_of_blocking_it(setup: Setup, tmp_path: Path) -> None:
     with pytest.raises(EOFError):
-        BareLoops(replace(setup, rg=tmp_path / "nothing"), [(0, 3)], periods=2)
+        BareLoops(
+            replace(setup, specification=replace(setup.specification, rg=tmp_path / "nothing")), [(0, 3)], periods=2
+        )
 
 
 @pytest.mark.slow

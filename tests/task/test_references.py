@@ -16,6 +16,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
 from iowbc.task.commands.drawing import nominal_command
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
@@ -133,7 +134,7 @@ def test_rollouts_with_a_generator_do_not_depend_on_the_number_of_workers(
 ) -> None:
     courses = []
     for workers in (0, 2):
-        env = VectorEnv(recipe, folder, rg=generator, num_envs=5, workers=workers, seed=3)
+        env = VectorEnv(Specification(recipe, folder, generator), num_envs=5, workers=workers, seed=3)
         try:
             courses.append({"start": env.reset()} | rollout(env, 40))
         finally:

@@ -1,16 +1,23 @@
 """The terms of the reward, by worked examples."""
 
 from collections.abc import Callable
+from operator import attrgetter
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from task_worlds import QUIET, rollout
+from task_worlds import QUIET, changed, rollout
 
-from iowbc.recipe.task.reward import Reward
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.task.reward import Kernel, Reward, Smoothness
 from iowbc.task.rewards import gait, smooth, sync
 from iowbc.task.rewards import object as equilibrium
 from iowbc.task.rewards.kernel import kernel, squared_norm
-from iowbc.task.rewards.total import TERMS
+from iowbc.task.rewards.reward import RewardFunction
+from iowbc.task.rewards.table import TERMS, Step
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
@@ -63,8 +70,9 @@ def test_contact_timing_counts_from_minus_one_to_one() -> None:
 
 def test_a_foot_on_its_swing_profile_scores_one_and_a_standing_foot_nothing() -> None:
     height, progress = np.array([[0.08, 0.0]]), np.array([[0.5, 0.0]])
-    assert gait.swing_height(height, progress, np.array([[True, False]]), 0.08, 0.04)[0] == pytest.approx(1.0)
-    assert gait.swing_height(height, progress, np.array([[False, False]]), 0.08, 0.04)[0] == 0.0
+    one, none = np.array([[True, False]]), np.array([[False, False]])
+    assert kernel(gait.swing_height(height, progress, one, 0.08), 0.04)[0] == pytest.approx([1.0, 0.0])
+    assert kernel(gait.swing_height(height, progress, none, 0.08), 0.04)[0].tolist() == [0.0, 0.0]
 
 
 def test_slipping_counts_on_the_ground_alone_and_feet_too_close_cost() -> None:
@@ -84,8 +92,8 @@ def test_every_weight_of_the_recipe_moves_its_own_term_and_no_other(make: Make) 
     rollout(doubled, 10)
     after = doubled.statistics()
     for term in TERMS:
-        name = f"reward/{term.replace('/', '.')}"
-        factor = 2.0 if term == "sync/height" else 1.0
+        name = f"reward/{term}"
+        factor = 2.0 if term == "sync.height" else 1.0
         assert after[name] == pytest.approx(factor * before[name]), name
 
 
@@ -97,6 +105,41 @@ def test_a_fall_costs_its_price_once_and_is_not_scaled_by_the_period(make: Make)
     figures = env.statistics()
     assert falls > 0
     assert figures["reward/termination"] * 400 * 0.02 == pytest.approx(falls * Reward().termination)
+
+
+def test_a_new_term_is_a_function_and_a_line_in_the_table(
+    recipe: Recipe, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class WithMadeUp(Smoothness):
+        made_up: float = 3.0
+
+    def made_up(step: Step) -> Any:
+        return np.full(len(step.command), 2.0)
+
+    monkeypatch.setitem(TERMS, "smooth.made_up", made_up)
+    env = VectorEnv(
+        Specification(changed(recipe, "task.reward.smooth", WithMadeUp()), folder), num_envs=2, workers=0, seed=0
+    )
+    env.reset()
+    rollout(env, 10)
+    assert env.statistics()["reward/smooth.made_up"] == pytest.approx(6.0)
+
+
+def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot_tracks() -> None:
+    called: list[str] = []
+    terms = {path: (lambda step, path=path: called.append(path) or np.ones(1)) for path in TERMS}
+    weightless = {"weight": 0.0}
+    recipe = Reward.model_validate({"alive": 0.0, "sync": {"support_reference": weightless | {"width": 1.0}}})
+    recipe = recipe.model_copy(
+        update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
+    )
+    RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))))  # type: ignore[arg-type]
+    assert set(TERMS) - set(called) == {"alive", "sync.support_reference"}
+
+
+def test_every_number_of_the_recipes_reward_that_is_a_weight_has_its_term() -> None:
+    for path in TERMS:
+        assert isinstance(attrgetter(path)(Reward()), float | Kernel), path
 
 
 def test_squared_norm_goes_over_all_but_the_first_axis() -> None:

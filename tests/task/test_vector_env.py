@@ -10,7 +10,7 @@ from task_worlds import actions, rollout, with_changes
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.gym.environment import Environment
 from iowbc.task.record.signals import REASONS, SIGNALS
-from iowbc.task.rewards.total import TERMS
+from iowbc.task.rewards.table import TERMS
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
@@ -98,7 +98,7 @@ def test_statistics_are_complete_and_finite_from_the_first_call(make: Make) -> N
     env = make()
     env.reset()
     expected = {"reward", "episode_seconds", "episode_return", "curriculum_level", "tracking", "divergences"}
-    expected |= {f"reward/{term.replace('/', '.')}" for term in TERMS} | {f"terminations/{name}" for name in REASONS}
+    expected |= {f"reward/{term}" for term in TERMS} | {f"terminations/{name}" for name in REASONS}
     for _ in range(2):
         figures = env.statistics()
         assert figures.keys() == expected

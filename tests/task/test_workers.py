@@ -18,17 +18,18 @@ import pytest
 from task_worlds import actions
 
 from iowbc.errors import WorkerFailed
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
-from iowbc.task.vector.workers import Workers
+from iowbc.task.vector.workers import WorkerProcesses
 
 Make = Callable[..., VectorEnv]
 SOON = 5.0
 """What "within seconds" means here [s]."""
 
 
-def crew(env: VectorEnv) -> Workers:
-    assert isinstance(env._crew, Workers)
-    return env._crew
+def processes_of(env: VectorEnv) -> list[int]:
+    assert isinstance(env.workers, WorkerProcesses)
+    return env.workers.processes
 
 
 def gone(processes: list[int], patience: float = SOON) -> bool:
@@ -49,7 +50,7 @@ def test_two_workers_start_and_reset_in_less_than_five_seconds(make: Make) -> No
 
 def test_workers_do_not_import_what_only_the_learner_needs(make: Make) -> None:
     env = make(num_envs=2, workers=1)
-    maps = Path(f"/proc/{crew(env).processes[0]}/maps").read_text()
+    maps = Path(f"/proc/{processes_of(env)[0]}/maps").read_text()
     assert "mujoco" in maps
     assert not [name for name in ("libtorch", "pandas", "pinocchio", "matplotlib") if name in maps]
 
@@ -57,7 +58,7 @@ def test_workers_do_not_import_what_only_the_learner_needs(make: Make) -> None:
 def test_closing_ends_the_workers_and_may_be_repeated(make: Make) -> None:
     env = make(num_envs=4, workers=2)
     env.reset()
-    processes = crew(env).processes
+    processes = processes_of(env)
     env.close()
     env.close()
     assert gone(processes)
@@ -66,8 +67,8 @@ def test_closing_ends_the_workers_and_may_be_repeated(make: Make) -> None:
 
 
 def test_a_forgotten_environment_takes_its_workers_along(make: Make, folder: Path, recipe: Any) -> None:
-    env = VectorEnv(recipe, folder, rg=None, num_envs=2, workers=2, seed=0)
-    processes = crew(env).processes
+    env = VectorEnv(Specification(recipe, folder), num_envs=2, workers=2, seed=0)
+    processes = processes_of(env)
     del env
     assert gone(processes)
 
@@ -75,7 +76,7 @@ def test_a_forgotten_environment_takes_its_workers_along(make: Make, folder: Pat
 def test_a_killed_worker_is_noticed_at_once_and_nothing_is_left(make: Make) -> None:
     env = make(num_envs=4, workers=2)
     env.reset()
-    processes = crew(env).processes
+    processes = processes_of(env)
     os.kill(processes[1], signal.SIGKILL)
     start = time.monotonic()
     with pytest.raises(WorkerFailed, match=r"worker 1 .*environments 2 to 3\) died with exit status -9"):
@@ -87,7 +88,7 @@ def test_a_killed_worker_is_noticed_at_once_and_nothing_is_left(make: Make) -> N
 def test_a_crashed_worker_leaves_its_traceback(make: Make) -> None:
     env = make(num_envs=2, workers=1)
     env.reset()
-    os.kill(crew(env).processes[0], signal.SIGSEGV)
+    os.kill(processes_of(env)[0], signal.SIGSEGV)
     with pytest.raises(WorkerFailed, match=r"(?s)status -11.*Segmentation fault.*in _serve"):
         env.step(actions(0, 2))
 
@@ -95,7 +96,7 @@ def test_a_crashed_worker_leaves_its_traceback(make: Make) -> None:
 def test_an_exception_in_a_worker_arrives_with_its_traceback(make: Make) -> None:
     env = make(num_envs=2, workers=1)
     env.reset()
-    processes = crew(env).processes
+    processes = processes_of(env)
     env._call("__setattr__", [("step", functools.partial(operator.truediv, 1, 0))])
     with pytest.raises(WorkerFailed, match=r"(?s)worker 0 .*Traceback.*ZeroDivisionError"):
         env.step(actions(0, 2))
@@ -104,13 +105,13 @@ def test_an_exception_in_a_worker_arrives_with_its_traceback(make: Make) -> None
 
 def test_an_exception_while_starting_arrives_too(make: Make, tmp_path: Path, recipe: Any, folder: Path) -> None:
     with pytest.raises(WorkerFailed, match=r"(?s)Traceback.*FileNotFoundError"):
-        VectorEnv(recipe, folder, rg=tmp_path / "nothing", num_envs=2, workers=2, seed=0)
+        VectorEnv(Specification(recipe, folder, tmp_path / "nothing"), num_envs=2, workers=2, seed=0)
 
 
 def test_a_hung_worker_is_noticed_and_says_where_it_hangs(make: Make) -> None:
     env = make(num_envs=4, workers=2, patience=1.0)
     env.reset()
-    processes = crew(env).processes
+    processes = processes_of(env)
     env._call("__setattr__", [("step", functools.partial(time.sleep, 60.0))] * 2)
     start = time.monotonic()
     with pytest.raises(WorkerFailed, match=r"(?s)has not answered for 1 s.*in _serve"):
@@ -132,13 +133,14 @@ PARENT = """
     import signal, sys, time
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
+    from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
     import numpy as np
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
-    env = VectorEnv(Recipe(name="x"), robot_folder("g1"), rg=None, num_envs=4, workers=2, seed=0)
+    env = VectorEnv(Specification(Recipe(name="x"), robot_folder("g1")), num_envs=4, workers=2, seed=0)
     env.reset()
-    print(*env._crew.processes, flush=True)
+    print(*env.workers.processes, flush=True)
     while True:
         env.step(np.zeros((4, 15), np.float32))
         {then}
@@ -203,5 +205,5 @@ def test_workers_take_little_memory_beyond_their_imports(make: Make) -> None:
         env.step(actions(step, 48))
     code = "import iowbc.task.vector.setup, psutil; print(psutil.Process().memory_info().rss)"
     imports = int(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
-    used = psutil.Process(crew(env).processes[0]).memory_info().rss
+    used = psutil.Process(processes_of(env)[0]).memory_info().rss
     assert (used - imports) / 1e6 < 150.0

@@ -13,6 +13,7 @@ from iowbc.evaluation.trials.metrics import Trace
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.episodes import Episode
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def play_episodes(
     progress: told the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
     """
     environment = VectorEnv(
-        recipe, robot, rg=rg, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)
+        Specification(recipe, robot, rg), num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)
     )
     try:
         return play_in(environment, recipe, policy, interrupted, progress)

@@ -15,20 +15,27 @@ from iowbc.recipe.task.termination import Termination
 
 
 class SceneShares(Section):
-    """Which part of the environments plays which scene; only the proportions matter."""
+    """Which part of the environments plays which scene of `simulation.scenes`; only the proportions matter."""
 
     free: float = Field(default=0.1, ge=0.0)
     """No object: walking, standing and posture alone."""
     lift: float = Field(default=0.9, ge=0.0)
     """The box, held between the wrists."""
+    squeeze: float = Field(default=0.0, ge=0.0)
+    """The box, held between the palms by friction alone."""
     tyre: float = Field(default=0.0, ge=0.0)
     """The tyre, held between the wrists."""
     push: float = Field(default=0.0, ge=0.0)
     """The crate on wheels before the hands."""
 
+    @classmethod
+    def only(cls, scene: str) -> Self:
+        """One scene alone. Raises ValidationError for a name that no scene has."""
+        return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
+
     @model_validator(mode="after")
     def _some_scene(self) -> Self:
-        if self.free + self.lift + self.tyre + self.push <= 0.0:
+        if sum(share for _, share in self) <= 0.0:
             raise ValueError("every share is zero: give at least one scene a positive share")
         return self
 

@@ -1,13 +1,11 @@
 """Where commands come from: drawn goals in training, scripts in trials; rate-limited, clamped to what is feasible."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc import counter_random as random
-from iowbc.arrays import Keys
+from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.command import COMMAND, VELOCITY, approach, rate_limits
 from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.task.task import Task
@@ -15,10 +13,6 @@ from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpola
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty
 from iowbc.task.memory import Memory
-
-Array = NDArray[np.floating[Any]]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 
 class Commander:

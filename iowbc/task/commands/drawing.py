@@ -1,17 +1,12 @@
 """Drawing commands in training: 11-D goals, and how long each is held."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc import counter_random as random
-from iowbc.arrays import Keys
+from iowbc.arrays import Array, Keys
 from iowbc.control.command import COMMAND, HEIGHT, PITCH
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.curriculum import Difficulty
-
-Array = NDArray[np.floating[Any]]
 
 
 def nominal_command(commands: Commands) -> Array:

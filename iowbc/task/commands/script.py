@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

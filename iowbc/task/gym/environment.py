@@ -12,8 +12,9 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.task import SceneShares
 from iowbc.robot.description import robot_folder
 from iowbc.sim.rendering.renderer import SceneRenderer
+from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
-from iowbc.task.vector.workers import Alone
+from iowbc.task.vector.workers import InProcess
 
 Observation = NDArray[np.float32]
 RENDER_MODE = "rgb_array"
@@ -34,20 +35,20 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
         rg: Path | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """`scene`: free, lift, tyre or push. `recipe`: defaults without one. `robot`: folder of its description, else
+        """`scene`: one of `simulation.scenes`. `recipe`: defaults without one. `robot`: folder of its description, else
         the recipe's. `rg`: folder of the fitted reference generator; without one θ_S_ref is the default posture."""
         if render_mode not in (None, RENDER_MODE):
             raise ValueError(f"render_mode is None or {RENDER_MODE!r}, got {render_mode!r}")
         recipe = recipe or Recipe(name=scene)
         task = recipe.task
-        shares = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
+        shares = SceneShares.only(scene)
         curriculum = task.curriculum.model_copy(update={"enabled": False})
         task = task.model_copy(update={"scenes": shares, "curriculum": curriculum})
         recipe = recipe.model_copy(update={"task": task})
         self.metadata = self.metadata | {"render_fps": round(task.control_frequency)}
         self.render_mode = render_mode
-        self._crew = Alone(Setup(recipe, robot or robot_folder(recipe.robot), rg, 1, recipe.seed))
-        self.batch, self._buffers = self._crew.batch, self._crew.buffers
+        self._workers = InProcess(Setup(Specification(recipe, robot or robot_folder(recipe.robot), rg), 1, recipe.seed))
+        self.batch, self._buffers = self._workers.batch, self._workers.buffers
         bound = task.action.bound
         self.observation_space = spaces.Box(-np.inf, np.inf, self._buffers["observation"].shape[1:], np.float32)
         self.action_space = spaces.Box(-bound, bound, self._buffers["action"].shape[1:], np.float32)

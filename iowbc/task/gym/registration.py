@@ -1,11 +1,12 @@
-"""Importing this module gives single environments their names: `gymnasium.make("iowbc/Lift-v0")`."""
+"""Importing this module names single environments, one for each scene: `gymnasium.make("iowbc/Lift-v0")`."""
 
 import gymnasium
 
-SCENES = {"Free": "free", "Lift": "lift", "Tyre": "tyre", "Push": "push"}
-"""Scene of each environment, by the name between `iowbc/` and `-v0`."""
+from iowbc.recipe.simulation.holding import SCENES
 
-for _name, _scene in SCENES.items():
+for _scene in SCENES:
     gymnasium.register(
-        f"iowbc/{_name}-v0", entry_point="iowbc.task.gym.environment:Environment", kwargs={"scene": _scene}
+        f"iowbc/{_scene.capitalize()}-v0",
+        entry_point="iowbc.task.gym.environment:Environment",
+        kwargs={"scene": _scene},
     )

@@ -1,63 +1,19 @@
-"""What is written down of each step: signals, counters, and why episodes end."""
-
-from dataclasses import dataclass
-from typing import Any, Self
+"""What is written down of each step: signals and counters."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY
 from iowbc.sim.state import SimulationState
+from iowbc.task.endings import Ending
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.record.signals import COUNTERS, REASONS
 from iowbc.task.rewards import smooth
-from iowbc.task.rewards.total import TERMS, Scored
+from iowbc.task.rewards.reward import Scored
 from iowbc.task.vector.shared import Buffers
 
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
-
 COLUMN = {name: index for index, name in enumerate(COUNTERS)}
-
-
-@dataclass(frozen=True)
-class Ending:
-    """Why episodes end in a step, each (n,). What diverged neither fell nor dropped anything."""
-
-    fallen: Mask
-    dropped: Mask
-    time_limit: Mask
-    diverged: Mask
-
-    @classmethod
-    def none(cls, n: int) -> Self:
-        """Nothing ends."""
-        return cls(*np.zeros((4, n), np.bool_))
-
-    @property
-    def failed(self) -> Mask:
-        """Fell or dropped the object."""
-        return self.fallen | self.dropped
-
-    @property
-    def done(self) -> Mask:
-        """Ended for whatever reason."""
-        return self.fallen | self.dropped | self.time_limit | self.diverged
-
-    @property
-    def truncated(self) -> Mask:
-        """Reached the time limit, and nothing worse."""
-        return self.time_limit & ~(self.fallen | self.dropped | self.diverged)
-
-    def reasons(self) -> dict[str, Mask]:
-        """Exactly one reason for each that ended."""
-        return {
-            "fallen": self.fallen,
-            "dropped": self.dropped & ~self.fallen,
-            "time_limit": self.truncated,
-            "diverged": self.diverged,
-        }
 
 
 def write_signals(
@@ -95,7 +51,7 @@ def write_signals(
 def count_step(buffers: Buffers, scored: Scored) -> None:
     """Adds a step to the counters."""
     counters = buffers["counters"]
-    counters[:, : len(TERMS)] += scored.terms
+    buffers["terms"][:] += scored.terms
     counters[:, COLUMN["steps"]] += 1.0
     counters[:, COLUMN["tracking"]] += scored.tracking.mean(axis=1)
 

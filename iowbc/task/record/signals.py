@@ -1,6 +1,6 @@
 """The signals and counters that an environment batch leaves for its parent each step."""
 
-from iowbc.task.rewards.total import TERMS
+from iowbc.task.rewards.table import TERMS
 from iowbc.task.vector.shared import Fields
 
 SIGNALS = {
@@ -34,7 +34,7 @@ time in the episode [s]."""
 
 REASONS = ("fallen", "dropped", "time_limit", "diverged")
 """Why an episode ended."""
-COUNTERS = (*(f"reward/{term}" for term in TERMS), "steps", "tracking", "episodes", "length", "return", *REASONS)
+COUNTERS = ("steps", "tracking", "episodes", "length", "return", *REASONS)
 """Columns of the statistics: sums since they were last read. Length in steps."""
 
 
@@ -50,5 +50,6 @@ def buffer_fields(observation: int, action: int) -> Fields:
         "episode_return": ((), "float64"),
         "episode_length": ((), "int64"),
         "counters": ((len(COUNTERS),), "float64"),
+        "terms": ((len(TERMS),), "float64"),
         **{f"signal/{name}": ((size,), "float64") for name, size in SIGNALS.items()},
     }

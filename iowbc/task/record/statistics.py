@@ -1,14 +1,10 @@
 """From the counters of the environments to the figures of a stretch of training."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.task.record.signals import COUNTERS, REASONS
-from iowbc.task.rewards.total import TERMS
-
-Array = NDArray[Any]
+from iowbc.task.rewards.table import TERMS
 
 EPISODIC = ("episode_seconds", "episode_return", *(f"terminations/{reason}" for reason in REASONS))
 """Figures of episodes that ended; where none did, the last value is carried on."""
@@ -23,23 +19,25 @@ class Statistics:
         self.carried = np.zeros(len(EPISODIC))
         """The last values of `EPISODIC`."""
 
-    def read(self, counters: Array, level: Array) -> dict[str, float]:
-        """Figures from counters (n, len(COUNTERS)) and curriculum levels (n,); sets the counters back.
+    def read(self, counters: Array, terms: Array, level: Array) -> dict[str, float]:
+        """Figures from counters (n, len(COUNTERS)), sums of the reward's terms (n, len(TERMS)) and levels (n,); sets
+        counters and sums back.
 
         Rewards are means per second, terminations parts of the episodes that ended, divergences a number.
         """
         total = dict(zip(COUNTERS, counters.sum(axis=0).tolist(), strict=True))
-        counters[:] = 0.0
-        seconds = max(total["steps"], 1.0) * self._period
+        rewards = dict(
+            zip(TERMS, (terms.sum(axis=0) / (max(total["steps"], 1.0) * self._period)).tolist(), strict=True)
+        )
+        counters[:], terms[:] = 0.0, 0.0
         if ended := total["episodes"]:
             ways = [total[reason] / ended for reason in REASONS]
             self.carried[:] = [total["length"] / ended * self._period, total["return"] / ended, *ways]
-        terms = {f"reward/{term.replace('/', '.')}": total[f"reward/{term}"] / seconds for term in TERMS}
         return {
-            "reward": sum(terms.values()),
+            "reward": sum(rewards.values()),
             **dict(zip(EPISODIC, self.carried.tolist(), strict=True)),
             "tracking": total["tracking"] / max(total["steps"], 1.0),
             "curriculum_level": float(level.mean()),
             "divergences": total["diverged"],
-            **terms,
+            **{f"reward/{path}": value for path, value in rewards.items()},
         }

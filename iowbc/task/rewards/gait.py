@@ -1,14 +1,9 @@
 """r_gait: foot swing and contact timing by the phase."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.task.rewards.kernel import kernel, squared_norm
-
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
+from iowbc.arrays import Array, Mask
+from iowbc.task.rewards.kernel import squared_norm
 
 
 def contact_timing(contact: Mask, expected: Mask) -> Array:
@@ -17,11 +12,10 @@ def contact_timing(contact: Mask, expected: Mask) -> Array:
     return score
 
 
-def swing_height(sole_height: Array, progress: Array, swinging: Mask, clearance: float, width: float) -> Array:
-    """Σ over swinging feet of exp(−(z − clearance·sin(π s))²/width²), (n,); sole height z [m], progress s, (n, 2)."""
+def swing_height(sole_height: Array, progress: Array, swinging: Mask, clearance: float) -> Array:
+    """(z − clearance·sin(π s))² of swinging feet, infinite for others, (n, 2) [m²]; sole height z [m], progress s."""
     profile = clearance * np.sin(np.pi * progress)
-    score: Array = (kernel(np.square(sole_height - profile), width) * swinging).sum(axis=1)
-    return score
+    return np.where(swinging, np.square(sole_height - profile), np.inf)
 
 
 def foot_slip(foot_velocity: Array, contact: Mask) -> Array:

@@ -1,11 +1,8 @@
 """The kernel of tracking rewards."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating[Any]]
+from iowbc.arrays import Array
 
 
 def kernel(squared_error: Array, width: float | Array) -> Array:

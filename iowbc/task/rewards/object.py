@@ -1,14 +1,9 @@
 """r_obj: equilibrium of the held object; every term is zero where nothing is held."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Mask
 from iowbc.task.rewards.kernel import squared_norm
-
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
 
 
 def position(object_offset: Array, place: Array, held: Mask) -> Array:

@@ -1,14 +1,9 @@
 """r_smooth: whole-body smoothness."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Mask
 from iowbc.task.rewards.kernel import squared_norm
-
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
 
 
 def joint_acceleration(acceleration: Array) -> Array:

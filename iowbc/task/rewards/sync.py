@@ -3,14 +3,10 @@
 Squared errors; all but the roll are scored by `kernel`.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.task.rewards.kernel import squared_norm
-
-Array = NDArray[np.floating[Any]]
 
 
 def support_reference(support_position: Array, support_reference: Array) -> Array:
@@ -25,19 +21,23 @@ def system_velocity(velocity: Array, command: Array) -> Array:
 
 def yaw_rate(rate: Array, command: Array) -> Array:
     """(ω − ω_yaw)², (n,) [rad²/s²]; filtered rate (n,)."""
-    return np.square(rate - command)
+    squared: Array = np.square(rate - command)
+    return squared
 
 
 def height(pelvis_height: Array, command: Array) -> Array:
     """(h − H)², (n,) [m²]."""
-    return np.square(pelvis_height - command)
+    squared: Array = np.square(pelvis_height - command)
+    return squared
 
 
 def torso_pitch(pitch: Array, command: Array) -> Array:
     """(α − α_pitch)², (n,) [rad²]."""
-    return np.square(pitch - command)
+    squared: Array = np.square(pitch - command)
+    return squared
 
 
 def torso_roll(roll: Array) -> Array:
     """roll², (n,) [rad²]. The command asks for none."""
-    return np.square(roll)
+    squared: Array = np.square(roll)
+    return squared

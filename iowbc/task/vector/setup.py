@@ -8,13 +8,13 @@ from typing import Self
 
 import numpy as np
 
-from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import buffer_fields
 from iowbc.task.scenes import scene_of
+from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
 
 
@@ -22,11 +22,7 @@ from iowbc.task.vector.shared import Buffers, Fields
 class Setup:
     """All environments of a vector environment."""
 
-    recipe: Recipe
-    robot: Path
-    """Folder of the robot's description."""
-    rg: Path | None
-    """Folder of the fitted reference generator."""
+    specification: Specification
     count: int
     """Number of environments."""
     seed: int
@@ -46,19 +42,17 @@ class Setup:
         """Name of each environment's scene."""
         if self.episodes is not None:
             return [episode.scene for episode in self.episodes]
-        return scene_of(self.count, self.recipe.task.scenes)
+        return scene_of(self.count, self.specification.recipe.task.scenes)
 
     def buffer_fields(self) -> Fields:
         """What passes between the environments and the learner."""
-        robot = load_robot(self.robot)
-        return buffer_fields(full_layout(self.recipe, robot).size, len(robot.support))
+        robot = load_robot(self.specification.robot)
+        return buffer_fields(full_layout(self.specification.recipe, robot).size, len(robot.support))
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
         return Batch(
-            self.recipe,
-            self.robot,
-            self.rg,
+            self.specification,
             environments=np.arange(first, last),
             scenes=self.scenes[first:last],
             seed=self.seed,
@@ -71,13 +65,11 @@ class Setup:
         """Text from which `from_json` makes the same setup."""
         return json.dumps(
             {
-                "recipe": self.recipe.model_dump(mode="json"),
-                "robot": str(self.robot),
-                "rg": _text(self.rg),
+                "specification": self.specification.as_json(),
                 "count": self.count,
                 "seed": self.seed,
                 "episodes": None if self.episodes is None else [episode.as_json() for episode in self.episodes],
-                "divergences": _text(self.divergences),
+                "divergences": None if self.divergences is None else str(self.divergences.resolve()),
             }
         )
 
@@ -85,26 +77,16 @@ class Setup:
     def from_json(cls, text: str) -> Self:
         """Inverse of `as_json`."""
         values = json.loads(text)
-        episodes = values["episodes"]
+        episodes, divergences = values["episodes"], values["divergences"]
         return cls(
-            recipe=Recipe.model_validate(values["recipe"]),
-            robot=Path(values["robot"]),
-            rg=_path(values["rg"]),
+            specification=Specification.from_json(values["specification"]),
             count=values["count"],
             seed=values["seed"],
             episodes=None if episodes is None else tuple(Episode.from_json(episode) for episode in episodes),
-            divergences=_path(values["divergences"]),
+            divergences=None if divergences is None else Path(divergences),
         )
 
 
 def shares(count: int, parts: int) -> list[tuple[int, int]]:
     """First and last environment (excluded) of each of `parts` nearly equal groups."""
     return list(pairwise(round(part * count / parts) for part in range(parts + 1)))
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path.resolve())
-
-
-def _path(text: str | None) -> Path | None:
-    return None if text is None else Path(text)

@@ -11,18 +11,18 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from iowbc.recipe.recipe import Recipe
+from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import REASONS, SIGNALS
 from iowbc.task.record.statistics import Statistics
+from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.snapshots import join, split
-from iowbc.task.vector.workers import Alone, Crew, Workers
+from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 
-Array = NDArray[Any]
 Indices = None | int | Iterable[int]
 
 PATIENCE = 15.0
@@ -34,10 +34,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(
         self,
-        recipe: Recipe,
-        robot: Path,
+        specification: Specification,
         *,
-        rg: Path | None,
         num_envs: int,
         workers: int,
         seed: int,
@@ -45,19 +43,19 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         divergences: Path | None = None,
         patience: float = PATIENCE,
     ) -> None:
-        """`robot`: folder of its description. `rg`: folder of the fitted reference generator; without one θ_S_ref is
-        the default posture. `workers`: processes; 0 steps the environments in this one. `episodes`: one an
-        environment, played anew after every reset. `divergences`: folder for simulations that diverged.
+        """`workers`: processes; 0 steps the environments in this one. `episodes`: one an environment, played anew after
+        every reset. `divergences`: folder for simulations that diverged.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
         raises.
         """
         trials = None if episodes is None else tuple(episodes)
-        self.setup = Setup(recipe, robot, rg, num_envs, seed, trials, divergences)
-        self.layout = full_layout(recipe, load_robot(robot))
+        self.setup = Setup(specification, num_envs, seed, trials, divergences)
+        recipe = specification.recipe
+        self.layout = full_layout(recipe, load_robot(specification.robot))
         self._scenes = self.setup.scenes
-        self._crew: Crew = Workers(self.setup, workers, patience) if workers else Alone(self.setup)
-        self._buffers = self._crew.buffers
+        self.workers: Workers = WorkerProcesses(self.setup, workers, patience) if workers else InProcess(self.setup)
+        self._buffers = self.workers.buffers
         self.signals: dict[str, Array] = {name: self._buffers[f"signal/{name}"] for name in SIGNALS}
         """Values of the last step, before an automatic reset, (num_envs, k); see `iowbc.task.record.signals`."""
         self._statistics = Statistics(1.0 / recipe.task.control_frequency)
@@ -72,16 +70,16 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     @property
     def batch(self) -> Batch:
         """The environments themselves, where they are stepped in this process."""
-        if not isinstance(self._crew, Alone):
+        if not isinstance(self.workers, InProcess):
             raise AttributeError(
                 "the environments live in worker processes; make the vector environment with workers=0"
             )
-        return self._crew.batch
+        return self.workers.batch
 
     def reset(self) -> NDArray[np.float32]:
         """Begins an episode everywhere; after `seed` with those seeds."""
         seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
-        self._call("reset", [(None if seeds is None else seeds[first:last],) for first, last in self._crew.groups])
+        self._call("reset", [(None if seeds is None else seeds[first:last],) for first, last in self.workers.groups])
         self._reset_seeds()
         self._reset_options()
         return self._buffers["observation"].copy()
@@ -95,11 +93,11 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             rows = np.flatnonzero(~np.isfinite(given).all(axis=1))
             raise ValueError(f"actions of environments {rows.tolist()} are not finite, the first is {given[rows[0]]}")
         self._buffers["action"][:] = given
-        self._crew.ask("step")
+        self.workers.ask("step")
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Results of the step: observations, rewards, dones, infos; ended environments have begun anew."""
-        self._crew.answers()
+        self.workers.answers()
         buffers = self._buffers
         done = buffers["done"].copy()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -124,7 +122,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def statistics(self) -> dict[str, float]:
         """Figures since the last call; see `Statistics`."""
-        return self._statistics.read(self._buffers["counters"], self._levels())
+        return self._statistics.read(self._buffers["counters"], self._buffers["terms"], self._levels())
 
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (num_envs,) or (num_envs, k)."""
@@ -144,7 +142,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         for name in dict.fromkeys(self._scenes):
             rows = np.flatnonzero(scenes == name)
             levels[rows] = np.quantile(known.get(name) or every, (np.arange(len(rows)) + 0.5) / len(rows))
-        self._call("set_levels", [(levels[first:last],) for first, last in self._crew.groups])
+        self._call("set_levels", [(levels[first:last],) for first, last in self.workers.groups])
 
     def state(self) -> dict[str, Array]:
         """Everything that the future depends on; the same however many workers there are."""
@@ -154,13 +152,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """Inverse of `state`: the environments then take bit for bit the same course."""
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
-        parts = split(own, [self._scenes[first:last] for first, last in self._crew.groups])
+        parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
         self._call("restore", [(part,) for part in parts])
         self._reset_seeds()
 
     def close(self) -> None:
         """Ends the worker processes."""
-        self._crew.close()
+        self.workers.close()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
         """`render_mode`, `scene`, `level`, or an attribute of this vector environment, for each environment."""
@@ -184,7 +182,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             raise AttributeError(f"{attr_name!r} of an environment cannot be set; `level` can")
         levels = self._levels()
         levels[list(self._get_indices(indices))] = value
-        self._call("set_levels", [(levels[first:last],) for first, last in self._crew.groups])
+        self._call("set_levels", [(levels[first:last],) for first, last in self.workers.groups])
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
@@ -205,5 +203,5 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return np.concatenate(self._call("levels"))
 
     def _call(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
-        self._crew.ask(request, arguments)
-        return self._crew.answers()
+        self.workers.ask(request, arguments)
+        return self.workers.answers()

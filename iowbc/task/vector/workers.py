@@ -33,7 +33,7 @@ DUMPING = 0.5
 """Time that a hung worker gets to write down where it is [s]."""
 
 
-class Crew(Protocol):
+class Workers(Protocol):
     """Whoever steps the environments, in consecutive groups."""
 
     groups: list[tuple[int, int]]
@@ -51,7 +51,7 @@ class Crew(Protocol):
         """Ends it all."""
 
 
-class Alone:
+class InProcess:
     """All environments in this process."""
 
     def __init__(self, setup: Setup) -> None:
@@ -61,28 +61,28 @@ class Alone:
         self._answer: Any = None
 
     def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
-        """See `Crew`."""
+        """See `Workers`."""
         self._answer = getattr(self.batch, request)(*(arguments[0] if arguments else ()))
 
     def answers(self) -> list[Any]:
-        """See `Crew`."""
+        """See `Workers`."""
         return [self._answer]
 
     def close(self) -> None:
-        """See `Crew`."""
+        """See `Workers`."""
 
 
 @dataclass
-class Member:
+class WorkerProcess:
     """One worker process."""
 
-    process: subprocess.Popen[bytes]
+    popen: subprocess.Popen[bytes]
     connection: Connection
     log: int
     """File descriptor to which the worker writes where it is when it crashes or hangs."""
 
 
-class Workers:
+class WorkerProcesses:
     """Environments spread over worker processes, which share memory with this one."""
 
     def __init__(self, setup: Setup, count: int, patience: float) -> None:
@@ -91,20 +91,20 @@ class Workers:
         self._patience = patience
         fields = setup.buffer_fields()
         memory, self.buffers = create_shared(fields, setup.count)
-        self._members: list[Member] = []
+        self._processes: list[WorkerProcess] = []
         self._pipes: dict[int, int] = {}
         self._poll = select.poll()
-        self._ended = weakref.finalize(self, _end, self._members, os.getpid())
+        self._ended = weakref.finalize(self, _end, self._processes, os.getpid())
         self._asked: set[int] = set()
         self._answers: list[Any] = [None for _ in self.groups]
         try:
             for _ in self.groups:
-                member = _start(memory)
-                self._pipes[member.connection.fileno()] = len(self._members)
-                self._poll.register(member.connection.fileno(), select.POLLIN)
-                self._members.append(member)
-            for index, ((first, last), member) in enumerate(zip(self.groups, self._members, strict=True)):
-                member.connection.send((setup.as_json(), first, last))
+                process = _start(memory)
+                self._pipes[process.connection.fileno()] = len(self._processes)
+                self._poll.register(process.connection.fileno(), select.POLLIN)
+                self._processes.append(process)
+            for index, ((first, last), process) in enumerate(zip(self.groups, self._processes, strict=True)):
+                process.connection.send((setup.as_json(), first, last))
                 self._asked.add(index)
             self._wait(STARTING)
         except BaseException:
@@ -116,29 +116,29 @@ class Workers:
     @property
     def processes(self) -> list[int]:
         """Process numbers of the workers."""
-        return [member.process.pid for member in self._members]
+        return [process.popen.pid for process in self._processes]
 
     def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
-        """See `Crew`. Answers that an interruption left lying are thrown away first."""
+        """See `Workers`. Answers that an interruption left lying are thrown away first."""
         if not self._ended.alive:
             raise WorkerFailed("the worker processes have ended; make a new vector environment")
         self._wait(self._patience)
-        given = arguments or [()] * len(self._members)
+        given = arguments or [()] * len(self._processes)
         messages = [pickle.dumps((request, own)) for own in given]
-        for index, (member, message) in enumerate(zip(self._members, messages, strict=True)):
+        for index, (process, message) in enumerate(zip(self._processes, messages, strict=True)):
             try:
-                member.connection.send_bytes(message)
+                process.connection.send_bytes(message)
             except (BrokenPipeError, ConnectionResetError):
                 self._fail(index)
             self._asked.add(index)
 
     def answers(self) -> list[Any]:
-        """See `Crew`. Raises WorkerFailed."""
+        """See `Workers`. Raises WorkerFailed."""
         self._wait(self._patience)
         return self._answers
 
     def close(self) -> None:
-        """See `Crew`. Workers leave when their pipe closes; those that do not are killed."""
+        """See `Workers`. Workers leave when their pipe closes; those that do not are killed."""
         self._ended()
 
     def _wait(self, patience: float) -> None:
@@ -153,7 +153,7 @@ class Workers:
 
     def _receive(self, index: int) -> None:
         try:
-            fine, answer = self._members[index].connection.recv()
+            fine, answer = self._processes[index].connection.recv()
         except (EOFError, ConnectionResetError):
             self._fail(index)
         if not fine:
@@ -162,26 +162,26 @@ class Workers:
         self._asked.discard(index)
 
     def _fail(self, index: int, *, text: str = "", hung: float | None = None) -> None:
-        member = self._members[index]
+        process = self._processes[index]
         first, last = self.groups[index]
-        who = f"worker {index} (process {member.process.pid}, environments {first} to {last - 1})"
+        who = f"worker {index} (process {process.popen.pid}, environments {first} to {last - 1})"
         if hung is not None:
-            member.process.send_signal(signal.SIGUSR1)
+            process.popen.send_signal(signal.SIGUSR1)
             time.sleep(DUMPING)
             what = f"has not answered for {hung:g} s"
         elif text:
             what = "failed"
         else:
             try:
-                what = f"died with exit status {member.process.wait(LEAVING)}"
+                what = f"died with exit status {process.popen.wait(LEAVING)}"
             except subprocess.TimeoutExpired:
                 what = "closed its pipe"
-        text = text or _read(member.log)
+        text = text or _read(process.log)
         self.close()
         raise WorkerFailed(f"{who} {what}\n{text.rstrip() or 'it left no traceback; see its output above'}")
 
 
-def _start(memory: int) -> Member:
+def _start(memory: int) -> WorkerProcess:
     """A new worker process; SIGINT and SIGTERM are blocked from its first moment, for the parent decides the end."""
     ours, theirs = socket.socketpair()
     log = os.memfd_create("iowbc-worker-log", os.MFD_CLOEXEC)
@@ -191,7 +191,7 @@ def _start(memory: int) -> Member:
     arguments = [json.dumps(sys.path), os.getpid(), int(bound), *descriptors]
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
-        process = subprocess.Popen(
+        popen = subprocess.Popen(
             [sys.executable, "-c", worker.ASKED, *map(str, arguments)],
             stdin=subprocess.DEVNULL,
             pass_fds=descriptors,
@@ -200,23 +200,23 @@ def _start(memory: int) -> Member:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         theirs.close()
-    return Member(process, Connection(ours.detach()), log)
+    return WorkerProcess(popen, Connection(ours.detach()), log)
 
 
-def _end(members: list[Member], owner: int) -> None:
+def _end(processes: list[WorkerProcess], owner: int) -> None:
     if os.getpid() != owner:
         return
-    for member in members:
-        member.connection.close()
+    for process in processes:
+        process.connection.close()
     deadline = time.monotonic() + LEAVING
-    for member in members:
+    for process in processes:
         try:
-            member.process.wait(max(deadline - time.monotonic(), 0.0))
+            process.popen.wait(max(deadline - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
-            member.process.kill()
-            member.process.wait()
-        os.close(member.log)
-    members.clear()
+            process.popen.kill()
+            process.popen.wait()
+        os.close(process.log)
+    processes.clear()
 
 
 def _read(log: int) -> str:

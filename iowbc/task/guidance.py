@@ -1,0 +1,84 @@
+"""Guidance: what the robots are to follow. The command, the gait clock, and the joint references that come of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from iowbc import counter_random as random
+from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
+from iowbc.control import gait
+from iowbc.control.action import action_scale
+from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
+from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.robot.description import Robot
+from iowbc.task.commands.commander import Commander
+from iowbc.task.commands.script import CommandScript
+from iowbc.task.memory import Memory
+from iowbc.task.specification import Specification
+
+
+class Guidance:
+    """Commands, gait clocks and references of n environments, kept in their memory."""
+
+    def __init__(
+        self,
+        specification: Specification,
+        robot: Robot,
+        *,
+        scenes: Sequence[str],
+        holding: Mask,
+        scripts: Sequence[CommandScript | None],
+        period: float,
+    ) -> None:
+        """`scenes`: name of each environment's; `holding`: those that begin with an object in the hands, (n,)."""
+        task = specification.recipe.task
+        self._settings, self._period = task.references.gait, period
+        self.references = ReferenceLayer(robot, task.references, specification.rg)
+        self.commander = Commander(task, self.references, scripts, holding, period)
+        self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
+        self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
+        self._joints, self._scale, self._bound = len(robot.joints), action_scale(robot, task.action), task.action.bound
+
+    def start(self, which: Indices, memory: Memory, key: Keys) -> tuple[Array, Array]:
+        """Begins new episodes with keys (k,): joints (k, joints) and pitch of the base (k,) to start in [rad]."""
+        self.commander.start(which, memory, key)
+        command = memory.command[which]
+        arms, posture = self.references.start(command, self._grasp[which])
+        memory.arms[which], memory.posture[which], memory.support[which] = arms, posture, posture
+        memory.stepping[which] = False
+        halves = np.floor(2.0 * random.uniform(key, "gait/phase", 1)[:, 0])
+        memory.phase[which] = np.where(self.commander.scripted[which], 0.0, 0.5 * halves)
+        memory.height_rate[which] = 0.0
+        joints = np.empty((len(which), self._joints))
+        joints[:, self._support], joints[:, self._arms] = posture, arms
+        return joints, self.references.start_pitch(posture, command)
+
+    def advance(self, memory: Memory, key: Keys) -> None:
+        """Command, gait clock and references of the step to come; keys of the episodes, (n,)."""
+        settings, period = self._settings, self._period
+        height = memory.command[:, HEIGHT].copy()
+        self.commander.advance(memory, key)
+        memory.height_rate[:] = (memory.command[:, HEIGHT] - height) / period
+        moving = gait.wants_to_move(memory.command, settings)
+        phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
+        memory.phase[:], memory.stepping[:] = phase, stepping
+        arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self._grasp, period)
+        memory.arms[:], memory.posture[:] = arms, posture
+        memory.support[:] = self.references.with_swing(posture, phase, stepping)
+
+    def turn(self, memory: Memory) -> None:
+        """Turns the heading reference by the yaw rate that was commanded in the step just made."""
+        memory.heading_reference += memory.command[:, YAW_RATE] * self._period
+
+    def targets(self, memory: Memory, action: Array) -> Array:
+        """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref."""
+        target = np.empty((len(action), self._joints))
+        target[:, self._support] = memory.support + self._scale * action.clip(-self._bound, self._bound)
+        target[:, self._arms] = memory.arms
+        return target
+
+    def object_place(self, memory: Memory) -> Array:
+        """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
+        wrists = self._grasp + memory.command[:, OFFSET].reshape(-1, 2, 3)
+        place: Array = 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place
+        return place

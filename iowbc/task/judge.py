@@ -1,0 +1,81 @@
+"""What came of a control step: the motion, whether the episode ends, and the reward."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.arrays import Array, Mask
+from iowbc.control import gait
+from iowbc.control.command import PITCH, YAW_RATE
+from iowbc.recipe.recipe import Recipe
+from iowbc.sim.state import SimulationState
+from iowbc.task.endings import Ending, dropped, fallen
+from iowbc.task.memory import Memory
+from iowbc.task.motion import Motion, low_pass, motion
+from iowbc.task.rewards.reward import RewardFunction, Scored
+from iowbc.task.rewards.table import Step
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What came of a control step of n environments."""
+
+    motion: Motion
+    ending: Ending
+    scored: Scored
+
+
+class Judge:
+    """Judges the control steps of n environments by a recipe."""
+
+    def __init__(self, recipe: Recipe, support: slice | NDArray[np.intp], holding: Mask, period: float) -> None:
+        """`support`: places of the support joints; `holding`: environments that begin with an object in the hands."""
+        self._task, self._height = recipe.task, recipe.rg.height
+        self._support, self._holding, self._period = support, holding, period
+        self._reward = RewardFunction(recipe.task.reward, period)
+        self._velocity = np.zeros((len(holding), 3))
+
+    def motion(self, state: SimulationState) -> Motion:
+        """The motion in a simulation state."""
+        return motion(state, self._height)
+
+    def judge(self, state: SimulationState, memory: Memory, action: Array, place: Array) -> Judgement:
+        """The step just made with an action (n, 15); `place`: where a held object belongs, (n, 3) [m]."""
+        moved = self.motion(state)
+        self._filter(memory, moved)
+        ending = self._ending(state, memory, moved, place)
+        foot_phase, stance = gait.foot_phase(memory.phase), self._task.references.gait.stance
+        step = Step(
+            state=state,
+            motion=moved,
+            recipe=self._task.reward,
+            support=self._support,
+            command=memory.command,
+            height_rate=memory.height_rate,
+            support_reference=memory.support,
+            filtered_velocity=memory.filtered_velocity,
+            action=action,
+            previous_action=memory.action,
+            swing_progress=gait.swing_progress(foot_phase, stance),
+            stance=gait.expected_stance(foot_phase, memory.stepping, stance),
+            held=self._holding & state.grasped.any(axis=1),
+            object_place=place,
+            ended=ending.failed,
+        )
+        return Judgement(moved, ending, self._reward(step).without(ending.diverged))
+
+    def _filter(self, memory: Memory, moved: Motion) -> None:
+        self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
+        self._velocity[:, YAW_RATE] = moved.yaw_rate
+        time_constant = self._task.reward.sync.filter_time
+        memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
+
+    def _ending(self, state: SimulationState, memory: Memory, moved: Motion, place: Array) -> Ending:
+        termination, diverged = self._task.termination, state.diverged.copy()
+        return Ending(
+            fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
+            dropped=dropped(moved, place, self._holding, state.grasped, termination) & ~diverged,
+            time_limit=memory.steps >= memory.limit,
+            diverged=diverged,
+        )

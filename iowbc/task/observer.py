@@ -1,0 +1,54 @@
+"""Writes the rows of s_t and s_priv."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.arrays import Array, Indices, as_slice
+from iowbc.control import gait
+from iowbc.control.observation import Sensed
+from iowbc.control.sensors import Measured
+from iowbc.robot.description import Robot
+from iowbc.sim.state import MeasuredState
+from iowbc.task.layout import FullLayout
+from iowbc.task.memory import Memory
+from iowbc.task.motion import Motion
+from iowbc.task.privileged import Truth
+
+EVERY = slice(None)
+"""All environments."""
+
+
+class Observer:
+    """Writes what policy and critic see of n environments."""
+
+    def __init__(self, robot: Robot, layout: FullLayout, n: int) -> None:
+        self._layout, self._support, self._arms = layout, as_slice(robot.support), as_slice(robot.interaction)
+        self._joint_reference = np.tile(robot.default_position, (n, 1))
+
+    def write(
+        self,
+        rows: NDArray[np.float32],
+        measured: MeasuredState,
+        drawn: Mapping[str, Array],
+        moved: Motion,
+        memory: Memory,
+        which: Indices | slice = EVERY,
+    ) -> None:
+        """Writes the rows of some environments among all, (n, layout.size)."""
+        self._joint_reference[:, self._support] = memory.support
+        self._joint_reference[:, self._arms] = memory.arms
+        sensed = Sensed(
+            measured=Measured.of(measured),
+            command=memory.command,
+            joint_reference=self._joint_reference,
+            phase=gait.phase_signal(memory.phase, memory.stepping),
+            last_action=memory.action,
+            support_reference=memory.support,
+        )
+        layout = self._layout
+        seen = np.empty((len(moved.heading[which]), layout.size), np.float32)
+        layout.state.gather(sensed, seen[:, layout.observation], which)
+        layout.extra.gather(Truth(moved, drawn), seen[:, layout.privileged], which)
+        rows[which] = seen

@@ -1,0 +1,84 @@
+"""The weighted sum of the terms, with its parts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from operator import attrgetter
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.recipe.task.reward import Kernel, Reward
+from iowbc.task.rewards.kernel import kernel
+from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
+
+
+@dataclass(frozen=True)
+class Scored:
+    """The reward of one step."""
+
+    reward: Array
+    """(n,)."""
+    terms: Array
+    """Each term's part of the reward, in the order of the table, (n, terms)."""
+    tracking: Array
+    """The scores of the terms `TRACKED`, between 0 and 1, (n, tracked)."""
+
+    def without(self, which: Mask) -> "Scored":
+        """The same with nothing for some environments, (n,): what they did cannot be judged."""
+        if not which.any():
+            return self
+        kept = ~which
+        terms = np.where(kept[:, None], self.terms, 0.0)
+        tracking = np.where(kept[:, None], self.tracking, 0.0)
+        return Scored(reward=np.where(kept, self.reward, 0.0), terms=terms, tracking=tracking)
+
+
+@dataclass(frozen=True)
+class WeightedTerm:
+    """A term as a recipe wants it."""
+
+    column: int
+    """Its place in the table."""
+    function: Term
+    weight: float
+    """Reward of a control step at the value 1."""
+    width: float | None
+    """Of its kernel; none where the value counts as it is."""
+
+    def value(self, step: Step) -> Array:
+        """What is weighted, (n,)."""
+        value: Array = np.asarray(self.function(step))
+        if self.width is not None:
+            value = kernel(value, self.width)
+        return value if value.ndim == 1 else value.sum(axis=1)
+
+
+class RewardFunction:
+    """The reward of a recipe. Terms without a weight are not computed, unless they say how well it tracks."""
+
+    def __init__(self, recipe: Reward, period: float, terms: Mapping[str, Term] | None = None) -> None:
+        """`period`: control period [s]; `terms`: by dotted path in the recipe, by default those of the table."""
+        table = TERMS if terms is None else terms
+        self._columns = len(table)
+        weighted = {
+            path: _weighted(column, function, attrgetter(path)(recipe), 1.0 if path in ONCE else period)
+            for column, (path, function) in enumerate(table.items())
+        }
+        self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
+        self._tracked = [weighted[path].column for path in TRACKED]
+        self._weights = np.array([term.weight for term in weighted.values()])
+
+    def __call__(self, step: Step) -> Scored:
+        """Reward of one control step."""
+        terms = np.zeros((len(step.command), self._columns))
+        for term in self._terms:
+            terms[:, term.column] = term.value(step)
+        tracking = terms[:, self._tracked]
+        terms *= self._weights
+        return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
+
+
+def _weighted(column: int, function: Term, setting: float | Kernel, seconds: float) -> WeightedTerm:
+    if isinstance(setting, Kernel):
+        return WeightedTerm(column, function, setting.weight * seconds, setting.width)
+    return WeightedTerm(column, function, setting * seconds, None)

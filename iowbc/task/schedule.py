@@ -1,0 +1,110 @@
+"""Which episode each environment plays: drawn ones that the curriculum makes harder, or planned trials."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc import counter_random as random
+from iowbc.arrays import Array, Indices, Keys
+from iowbc.recipe.task.task import Task
+from iowbc.task.commands.script import CommandScript
+from iowbc.task.curriculum import difficulty, initial_level, next_level
+from iowbc.task.endings import Ending
+from iowbc.task.episodes import Episode
+from iowbc.task.memory import Memory
+
+
+class Schedule:
+    """Random keys, time limits and levels of n environments."""
+
+    def __init__(
+        self,
+        task: Task,
+        memory: Memory,
+        *,
+        environments: NDArray[np.int64],
+        seed: int,
+        trials: Sequence[Episode] | None,
+        period: float,
+    ) -> None:
+        """`environments`: global indices, (n,); `trials`: one an environment; without, episodes are drawn."""
+        n = len(environments)
+        self._task, self._memory, self._trials, self._period = task, memory, trials, period
+        self.seeds, self.streams = np.full(n, seed, np.uint64), environments
+        if trials is not None:
+            self.seeds = np.array([episode.seed for episode in trials], np.uint64)
+            self.streams = np.zeros(n, np.int64)
+        self.key = random.environment_key(self.seeds, self.streams)
+        """Key of all that is random in each environment, (n,)."""
+        self.episode_key = self.key.copy()
+        """Key of all that is random in each environment's episode, (n,)."""
+        memory.level[:] = initial_level(task.curriculum, n) if trials is None else task.curriculum.fixed_level
+        self._scales = {name: np.ones(n) for name in ("load_scale", "impulse_scale", "push_scale")}
+
+    @property
+    def fixed(self) -> dict[str, Array]:
+        """What each trial holds fixed, by name, (n,); NaN where it leaves a quantity to be drawn."""
+        trials = self._trials or ()
+        names = sorted({name for episode in trials for name in episode.fixed})
+        return {name: np.array([episode.fixed.get(name, np.nan) for episode in trials]) for name in names}
+
+    @property
+    def scripts(self) -> list[CommandScript | None]:
+        """Script of each environment, if it has one."""
+        return [None] * len(self.key) if self._trials is None else [episode.script for episode in self._trials]
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a reset begins the same episodes again."""
+        return self._trials is not None
+
+    def reseed(self, seeds: NDArray[np.uint64]) -> None:
+        """All that is random starts anew from seeds (n,)."""
+        self.key[:] = random.environment_key(seeds, np.zeros(len(seeds), np.int64))
+
+    def start(self, which: Indices) -> Keys:
+        """Begins new episodes: their keys, (k,)."""
+        memory = self._memory
+        memory.episode[which] += 1
+        key = random.absorb(self.key[which], memory.episode[which])
+        self.episode_key[which] = key
+        memory.steps[which] = 0
+        memory.limit[which] = self._time_limits(which, key)
+        return key
+
+    def scales(self, which: Indices) -> dict[str, Array]:
+        """How hard the simulation is to make new episodes, by name, (n,); trials say it themselves."""
+        if self._trials is not None:
+            return {}
+        hardness = difficulty(self._task.curriculum, self._memory.level[which])
+        self._scales["load_scale"][which] = hardness.load
+        self._scales["impulse_scale"][which] = self._scales["push_scale"][which] = hardness.disturbance
+        return self._scales
+
+    def _time_limits(self, which: Indices, key: Keys) -> NDArray[np.int64]:
+        """Time limits of new episodes, (k,) [control steps]."""
+        low, high = self._task.episode_duration
+        seconds = low + (high - low) * random.uniform(key, "episode/duration", 1)[:, 0]
+        if self._trials is not None:
+            seconds = np.array([self._trials[index].duration for index in which])
+        return np.maximum(np.round(seconds / self._period), 1).astype(np.int64)
+
+    def promote(self, ending: Ending, which: Indices) -> None:
+        """Moves the level of environments whose episode ended by itself, (k,); trials keep theirs."""
+        if self._trials is not None:
+            return
+        memory = self._memory
+        moved = next_level(
+            self._task.curriculum,
+            memory.level,
+            survived=ending.truncated,
+            progress=memory.steps / memory.limit,
+            tracking=memory.tracking.min(axis=1) / np.maximum(memory.steps, 1),
+        )
+        chosen = which[~ending.diverged[which]]
+        memory.level[chosen] = moved[chosen]
+
+    def set_levels(self, levels: Array) -> None:
+        """Sets the curriculum levels (n,), from the next episodes on."""
+        self._memory.level[:] = np.clip(levels, 0.0, self._task.curriculum.limit)

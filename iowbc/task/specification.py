@@ -1,0 +1,32 @@
+"""What an environment is made from: a recipe, a robot and a reference generator."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from iowbc.recipe.recipe import Recipe
+
+
+@dataclass(frozen=True)
+class Specification:
+    """Recipe, robot and reference generator of an environment."""
+
+    recipe: Recipe
+    robot: Path
+    """Folder of the robot's description."""
+    rg: Path | None = None
+    """Folder of the fitted reference generator; without one θ_S_ref is the default posture."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values, read back by `from_json`; folders in full, for another process."""
+        return {
+            "recipe": self.recipe.model_dump(mode="json"),
+            "robot": str(self.robot.resolve()),
+            "rg": None if self.rg is None else str(self.rg.resolve()),
+        }
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Self:
+        """Inverse of `as_json`."""
+        rg = values["rg"]
+        return cls(Recipe.model_validate(values["recipe"]), Path(values["robot"]), None if rg is None else Path(rg))
