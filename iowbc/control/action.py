@@ -1,15 +1,11 @@
 """The residual action a of the support branch."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.recipe.task.action import Action
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import MirrorMap, support_mirror
-
-Array = NDArray[np.floating[Any]]
 
 
 def action_scale(robot: Robot, action: Action) -> Array:

@@ -1,16 +1,12 @@
 """Kinematics of both arms, many rows at once in NumPy: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.control.chain import Chain, turn
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Body
-
-Array = NDArray[Any]
 
 X, Y = 0, 1
 IDENTITY = np.eye(3)

@@ -19,15 +19,12 @@ hinges at a quarter turn its end lies 0.3 m below the elbow, which lies 0.2 m to
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.robot import rotations
 from iowbc.robot.mjcf import Body
-
-Array = NDArray[Any]
 
 PLANES = (slice(1, 3), slice(2, None, -2), slice(0, 2))
 """Components that a turn about x, y and z mixes, in the order in which the first turns towards the second."""

@@ -1,15 +1,11 @@
 """The 11-D skill-level command C: names, places of its parts, and its rate limits."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.recipe.task.commands import CommandRates
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import VECTOR_SIGN, MirrorMap
-
-Array = NDArray[np.floating[Any]]
 
 COMMAND = (
     "v_x",

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from iowbc.arrays import Array
+
 FEASIBLE = "feasible.npz"
 """File beside a fitted generator: where its postures hold, to which the controller clamps its commands."""
 Run = tuple[int, int]

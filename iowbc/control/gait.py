@@ -1,16 +1,11 @@
 """The gait clock φ_t: when it runs, which foot should be on the ground, and the swing it adds to the reference."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import in_place
-
-Array = NDArray[np.floating[Any]]
-Mask = NDArray[np.bool_]
 
 phase_mirror = in_place(-1.0, -1.0)
 """Half a stride later: (sin, cos) of the phase change sign, and the zero of standing stays."""

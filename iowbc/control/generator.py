@@ -3,13 +3,11 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from safetensors.numpy import load_file, save_file
 
-Array = NDArray[Any]
+from iowbc.arrays import Array
 
 WEIGHTS, ARCHITECTURE = "rg.safetensors", "rg.json"
 FORMAT = 1

@@ -1,15 +1,11 @@
 """Torques with which the arms carry their own weight, and a load in the hands: a feed-forward for their motors."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.control.arms import arm_chains
 from iowbc.control.chain import Chain, Weights
 from iowbc.robot.description import GRAVITY, Robot
-
-Array = NDArray[Any]
 
 
 class ArmGravity:

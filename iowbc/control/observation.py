@@ -8,17 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from iowbc.arrays import Array
 from iowbc.control.command import command_mirror
 from iowbc.control.gait import phase_mirror
 from iowbc.control.layout import Layout, Part
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import axial_vector, joint_mirror, polar_vector, support_mirror
-
-Array = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)

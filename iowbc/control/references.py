@@ -4,19 +4,17 @@ Pure arrays over n environments; the deployed controller uses it too.
 """
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.control import gait
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import VECTOR_SIGN
-
-Array = NDArray[np.floating[Any]]
 
 
 def both_wrists(left: tuple[float, float, float]) -> Array:

@@ -2,14 +2,10 @@
 
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from typing import Annotated, Any, Self, get_type_hints
+from typing import Annotated, Self, get_type_hints
 
-import numpy as np
-from numpy.typing import NDArray
-
+from iowbc.arrays import Array
 from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, rotation
-
-Array = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.control import gait
 from iowbc.control.command import COMMAND, approach, rate_limits
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
@@ -23,7 +24,6 @@ from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
 
-Array = NDArray[np.floating[Any]]
 Generator = Callable[[Array, Array], Array]
 
 

@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.robot.mjcf import Hinge, Tree, read_tree
-
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s²], as MuJoCo and pinocchio have it by default."""

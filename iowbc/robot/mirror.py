@@ -2,15 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.robot.description import Robot
-
-Array = NDArray[Any]
-Indices = NDArray[np.int64]
 
 VECTOR_SIGN = np.array([1.0, -1.0, 1.0])
 """A polar vector (position, velocity, force) in a frame of the sagittal plane."""

@@ -4,14 +4,11 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.robot import rotations
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.robot.description import Robot
-
-Array = NDArray[Any]
 
 BASE_RANGE = 10.0
 """Bound on the floating base's position [m]; pinocchio's reader leaves ±1.01, which optimisers take for a limit."""

@@ -1,12 +1,8 @@
 """Batched rotations: unit quaternions (w, x, y, z) and matrices, any leading shape; no np.cross, which is slow."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
-
+from iowbc.arrays import Array
 
 NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Places of the components that follow x, y and z in turn, and of those that follow these."""

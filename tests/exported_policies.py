@@ -1,0 +1,58 @@
+"""A small untrained policy and its reference generator, for tests of exporting and of what was exported."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.generator import ReferenceNetwork
+from iowbc.control.observation import observation_layout
+from iowbc.export.graph import ControllerGraph
+from iowbc.learning.networks import StudentNetwork
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+
+HISTORY = 25
+
+
+def made_up_generator(robot: Robot, folder: Path) -> Path:
+    """A generator whose postures are the default one and a little that depends on arms, height and pitch."""
+    random = np.random.default_rng(0)
+    joints = np.array(robot.joints)
+    inputs = (*joints[robot.interaction], "pelvis_height", "torso_pitch")
+    network = ReferenceNetwork(
+        inputs=inputs,
+        outputs=tuple(joints[robot.support]),
+        layers=tuple(
+            (random.normal(size=(rows, columns)) / columns**0.5, 0.1 * random.normal(size=rows))
+            for rows, columns in ((8, len(inputs)), (15, 8))
+        ),
+        input_mean=np.full(len(inputs), 0.1),
+        input_std=np.full(len(inputs), 0.7),
+        output_mean=robot.default_position[robot.support],
+        output_std=np.full(15, 0.05),
+        lower=robot.lower[robot.support],
+        upper=robot.upper[robot.support],
+    )
+    network.save(folder)
+    pitch = np.linspace(-0.25, 0.75, 5)
+    FeasibleMap(pitch, np.full(5, 0.5), np.full(5, 0.78)).save(folder / "feasible.npz")
+    return folder
+
+
+def untrained(recipe: Recipe, robot: Robot, rg: Path | None, observe_object: bool = True) -> ControllerGraph:
+    """The graph of an untrained student."""
+    torch.manual_seed(0)
+    layout = observation_layout(robot, observe_object)
+    student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16], "elu", 10.0)
+    return ControllerGraph(
+        student,
+        None if rg is None else ReferenceNetwork.load(rg),
+        robot,
+        layout,
+        recipe.task.references.gait,
+        history=HISTORY,
+        action_scale=robot.action_scale,
+        action_bound=recipe.task.action.bound,
+    )
