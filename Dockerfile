@@ -10,8 +10,8 @@ COPY pyproject.toml constraints.txt ./
 # The heavy packages are a layer of their own, made again only when the versions change.
 RUN python3 -m venv /opt/venv \
  && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt torch==2.13.0 \
- && mkdir iowbc robots && touch iowbc/__init__.py README.md LICENSE NOTICE \
- && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt --editable .
+ && mkdir iowbc recipes robots && touch iowbc/__init__.py README.md LICENSE NOTICE \
+ && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt --editable '.[train]'
 COPY README.md LICENSE NOTICE ./
 COPY iowbc iowbc
 COPY robots robots

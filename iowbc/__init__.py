@@ -1,3 +1,52 @@
-"""Interaction-oriented whole-body control: recipes, training, evaluation and export of the paper's controller."""
+"""Interaction-oriented whole-body control: recipes, training, evaluation and export of the paper's controller.
+
+The names below are what users' own code imports; each is read from its module when it is first asked for.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from iowbc.commands.named import open_artifact
+    from iowbc.control.sensors import Measured
+    from iowbc.deploy.controller import Controller, Targets
+    from iowbc.errors import IowbcError
+    from iowbc.pipeline.store.store import Artifact
+    from iowbc.recipe.reading.loading import load_recipe
+    from iowbc.recipe.recipe import Recipe
+    from iowbc.task.vector.vector_env import VectorEnv
 
 __version__ = "0.1.0"
+__all__ = [
+    "Artifact",
+    "Controller",
+    "IowbcError",
+    "Measured",
+    "Recipe",
+    "Targets",
+    "VectorEnv",
+    "load_recipe",
+    "open_artifact",
+]
+
+_PLACES = {
+    "Artifact": "iowbc.pipeline.store.store",
+    "Controller": "iowbc.deploy.controller",
+    "IowbcError": "iowbc.errors",
+    "Measured": "iowbc.control.sensors",
+    "Recipe": "iowbc.recipe.recipe",
+    "Targets": "iowbc.deploy.controller",
+    "VectorEnv": "iowbc.task.vector.vector_env",
+    "load_recipe": "iowbc.recipe.reading.loading",
+    "open_artifact": "iowbc.commands.named",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'iowbc' has no attribute '{name}'; it has: {', '.join(__all__)}")
+    return getattr(import_module(_PLACES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from iowbc.commands.training import require_training
 from iowbc.errors import require_known
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.tracker import record_figures
@@ -18,6 +19,7 @@ def simulation(
     """Measure the vector environment, of the default recipe or of one in a file. Raises `UsageError`."""
     require_known(scene, "scene", SCENES)
     recipe = _recipe(file)
+    require_training("bench")
     require_writable_runs(runs)
     from iowbc.benchmarks import simulation
 
@@ -28,6 +30,7 @@ def simulation(
 def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
     """Measure the labelling of samples, of the default recipe or of one in a file. Raises `UsageError`."""
     recipe = _recipe(file)
+    require_training("bench")
     require_writable_runs(runs)
     from iowbc.benchmarks import reference
 

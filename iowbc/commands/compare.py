@@ -8,6 +8,7 @@ from rich.console import Console
 
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
+from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
@@ -20,6 +21,7 @@ def compare(store: Store, console: Console, words: Sequence[str], output: Path) 
     found = [named(store, word) for word in words]
     if len(found) < 2:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
+    require_training("compare")
     require_writable(output, "--output")
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = [run for run in found if _trials(run).is_file()]

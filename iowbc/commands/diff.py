@@ -25,7 +25,7 @@ def diff(store: Store, console: Console, first: str, second: str) -> None:
 def _either(store: Store, word: str) -> Named:
     """A recipe file counts as it is now; its artifacts are those that it used last."""
     if Path(word).suffix in (".yaml", ".yml") and Path(word).is_file():
-        resolved = load_recipe(Path(word)).recipe.model_dump(mode="json")
+        resolved = load_recipe(word).recipe.model_dump(mode="json")
         try:
             return Named(word, named(store, resolved["name"]).artifacts, resolved)
         except UsageError:

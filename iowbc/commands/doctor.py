@@ -2,7 +2,6 @@
 
 import importlib.metadata
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from packaging.requirements import Requirement
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -109,22 +109,24 @@ def _python() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    """Installed versions against those that iowbc asks for."""
-    found = []
-    for requirement in importlib.metadata.requires("iowbc") or []:
-        if "extra ==" in requirement:
+    """Installed versions against the ranges that iowbc asks for, those of its extra `train` too."""
+    fitting = []
+    for requirement in map(Requirement, importlib.metadata.requires("iowbc") or []):
+        if requirement.marker is not None and not requirement.marker.evaluate({"extra": "train"}):
             continue
-        name = re.split(r"[^\w.\-]", requirement, maxsplit=1)[0]
+        wanted = f"{requirement.name}{requirement.specifier}"
         try:
-            version = importlib.metadata.version(name)
+            version = importlib.metadata.version(requirement.name)
         except importlib.metadata.PackageNotFoundError:
-            yield Finding(name, "bad", f"not installed; `pip install '{requirement}'`")
+            yield Finding(requirement.name, "bad", f"not installed; `pip install '{wanted}'`")
             continue
-        pinned = re.search(r"==([\w.]+)", requirement)
-        if pinned and version.partition("+")[0] != pinned[1]:
-            yield Finding(name, "bad", f"{version} instead of {pinned[1]}; `pip install '{requirement}'`")
-        found.append(f"{name} {version}")
-    yield Finding("packages", "good", ", ".join(found))
+        if requirement.specifier.contains(version, prereleases=True):
+            fitting.append(f"{requirement.name} {version}")
+        else:
+            yield Finding(
+                requirement.name, "bad", f"{version} is not {requirement.specifier}; `pip install '{wanted}'`"
+            )
+    yield Finding("packages", "good", ", ".join(fitting))
 
 
 def _robot() -> Finding:

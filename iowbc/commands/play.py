@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from iowbc.commands.named import named
+from iowbc.commands.training import require_training
 from iowbc.errors import Damaged, Interrupted, UsageError
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.store.last_used import remaking
@@ -22,6 +23,7 @@ CONTRACT = "contract.json"
 
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
     """Play an episode of what a word names. Returns the exit code."""
+    require_training("play")
     artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
     generator = None
     if artifact is not None:

@@ -6,6 +6,7 @@ from rich.console import Console
 
 from iowbc.commands.request import Request, prepared
 from iowbc.commands.results import print_results
+from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, PipelineFailed
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveDisplay
@@ -23,6 +24,7 @@ DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 def run(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`."""
     planner, robot = prepared(request, registry)
+    require_training("run")
     require_writable_runs(request.runs)
     loaded = planner.loaded
     tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None

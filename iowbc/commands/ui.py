@@ -8,6 +8,7 @@ import sys
 
 from rich.console import Console
 
+from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import client, set_up
@@ -20,6 +21,7 @@ LAST_PORT = 65_535
 
 def serve(runs: Runs, console: Console, port: int) -> int:
     """Serve until interrupted; returns the server's exit code. Raises `UsageError` where it cannot begin."""
+    require_training("ui")
     require_writable_runs(runs)
     if not _free(port):
         other = next((other for other in range(port + 1, LAST_PORT + 1) if _free(other)), None)

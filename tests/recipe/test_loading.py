@@ -129,6 +129,18 @@ def test_a_missing_file_lists_the_recipes_beside_it(tmp_path: Path) -> None:
         load_recipe(tmp_path / "ful.yaml")
 
 
+def test_a_recipe_is_found_by_its_name_here_first_then_in_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert load_recipe("quickstart").recipe.name == "quickstart"
+    (tmp_path / "recipes").mkdir()
+    write(tmp_path / "recipes", "seed: 77\n", "quickstart.yaml")
+    assert load_recipe("quickstart").recipe.seed == 77
+    with pytest.raises(RecipeError, match=r"recipes by name: quickstart, .*did you mean 'quickstart'"):
+        load_recipe("quikstart")
+
+
 def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -> None:
     found = loaded(tmp_path, "teacher:\n  steps: 4096\n", "teacher.steps=1e4", "seed=7")
     assert (found.recipe.teacher.steps, found.recipe.seed) == (10000, 7)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, nearest
 from iowbc.recipe.reading.document import Located, leaves, merged, read_document
+from iowbc.recipe.reading.finding import SUFFIXES, known_files, recipe_file
 from iowbc.recipe.reading.overrides import overridden
 from iowbc.recipe.reading.validation import validate
 from iowbc.recipe.recipe import Recipe
@@ -35,11 +36,13 @@ class LoadedRecipe:
         return next((place for known, place in self.places.items() if known.startswith(path + ".")), "default")
 
 
-def load_recipe(file: Path, overrides: Sequence[str] = ()) -> LoadedRecipe:
+def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe:
     """Load, inherit, override and validate. Raises `RecipeError` with every problem and its line.
 
-    A recipe's name is its file's name unless it says otherwise; name and description are not inherited.
+    `file` may also be the name of a recipe that lies in a folder `recipes`, here or in the package. A recipe's name is
+    its file's name unless it says otherwise; name and description are not inherited.
     """
+    file = recipe_file(file)
     tree = _resolve(os.fspath(file), (), f"{file}:1:1")
     if isinstance(tree.value, dict) and "name" not in tree.value:
         tree = Located({"name": Located(Path(file).stem.lower(), f"{file}:1:1"), **tree.value}, tree.place)
@@ -86,6 +89,9 @@ def _text(file: str, place: str) -> str:
         folder = Path(file).parent
         known = sorted(str(found.name) for found in folder.glob("*.yaml")) if folder.is_dir() else []
         listing = f"; recipes in {folder}: {', '.join(known)}" if known else ""
+        if Path(file).suffix not in SUFFIXES:
+            known = list(dict.fromkeys(found.stem for found in known_files()))
+            listing = f"; recipes by name: {', '.join(known)}" if known else ""
         reason = "no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")
         text = f"recipe {file}: {reason}{listing}{nearest(Path(file).name, known)}"
         raise RecipeError([Problem(place, text)]) from None
