@@ -23,7 +23,7 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
 
 
 def test_importing_the_package_imports_nothing_else() -> None:
-    script = "import importlib, sys, typing; old = set(sys.modules); import iowbc; print(sorted(set(sys.modules) - old))"
+    script = "import sys, typing, importlib; a = set(sys.modules); import iowbc; print(sorted(set(sys.modules) - a))"
     assert python(script) == "['iowbc']"
 
 

@@ -1,7 +1,6 @@
 """The stage `eval` from a policy on disk to its tables, figures and film."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from stage_jobs import make_job
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.evaluation.report.aggregate import COSTS
@@ -43,23 +43,6 @@ QUESTION = {
 }
 
 
-class Quiet:
-    """A report that keeps what it is told."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.values: dict[str, float] = {}
-
-    def metrics(self, values: Mapping[str, float], step: int) -> None:
-        self.values |= values
-
-    def progress(self, done: float, total: float, note: str = "") -> None:
-        assert 0 <= done <= total
-
-    def say(self, text: str) -> None:
-        self.lines.append(text)
-
-
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
     return Recipe.model_validate(QUESTION)
@@ -85,19 +68,7 @@ def student(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def job(recipe: Recipe, student: Path, folder: Path) -> Job:
-    for name in ("out", "work"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    return Job(
-        recipe=recipe,
-        key="k",
-        robot=robot_folder("g1"),
-        inputs={"distill": student, "teacher": student},
-        out=folder / "out",
-        work=folder / "work",
-        workers=1,
-        report=Quiet(),
-        interrupted=lambda: False,
-    )
+    return make_job(folder, recipe, inputs={"distill": student, "teacher": student})
 
 
 @pytest.fixture(scope="session")

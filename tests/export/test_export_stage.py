@@ -2,11 +2,11 @@
 
 import json
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
+from stage_jobs import make_job
 
 from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
 from iowbc.deploy.controller import open_session
@@ -24,22 +24,6 @@ from iowbc.robot.description import Robot
 from iowbc.stages import export
 
 STAND = [{"duration": 0.3, "ramp": 0.0}]
-
-
-class Quiet:
-    """A report that keeps what it is told."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def metrics(self, values: Mapping[str, float], step: int) -> None:
-        assert all(isinstance(value, float) for value in values.values())
-
-    def progress(self, done: float, total: float, note: str = "") -> None:
-        pass
-
-    def say(self, text: str) -> None:
-        self.lines.append(text)
 
 
 @pytest.fixture(scope="session")
@@ -61,19 +45,9 @@ def student(graph: ControllerGraph, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def job(folder: Path, robot: Robot, rg: Path, student: Path, *, stop: bool = False, **settings: Any) -> Job:
-    for name in ("out", "work"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    return Job(
-        recipe=Recipe.model_validate({"name": "test", "export": {"golden_steps": 10, "timing_steps": 20, **settings}}),
-        key="e" * 8,
-        robot=robot.folder,
-        inputs={"rg-fit": rg, "distill": student},
-        out=folder / "out",
-        work=folder / "work",
-        workers=2,
-        report=Quiet(),
-        interrupted=lambda: stop,
-    )
+    values = {"name": "test", "export": {"golden_steps": 10, "timing_steps": 20, **settings}}
+    inputs = {"rg-fit": rg, "distill": student}
+    return make_job(folder, Recipe.model_validate(values), inputs=inputs, workers=2, interrupted=lambda: stop)
 
 
 @pytest.fixture(scope="session")
@@ -88,7 +62,7 @@ def test_the_folder_holds_all_that_a_robot_needs(done: Job, rg: Path) -> None:
     names = {path.name for path in done.out.iterdir()}
     assert {GRAPH, CONTRACT, GOLDEN, "recipe.json", "robot", "rg", "summary.json"} <= names
     contract = read_contract(done.out)
-    assert contract.sources == {"rg-fit": rg.name, "distill": "d" * 8, "export": "e" * 8}
+    assert contract.sources == {"rg-fit": rg.name, "distill": "d" * 8, "export": done.key}
 
 
 def test_the_folder_depends_on_nothing_outside_of_the_stages_key(done: Job) -> None:

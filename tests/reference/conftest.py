@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference_doubles import make_job, small_recipe
+from reference_doubles import small_recipe
+from stage_jobs import make_job
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.pipeline.stage import Job

@@ -1,4 +1,4 @@
-"""Doubles for the tests of the reference generator: solvers that crash, fail or hang, and small jobs of both stages.
+"""Doubles for the tests of the reference generator: solvers that crash, fail or hang, and a recipe of both stages.
 
 Labelling workers import this module.
 """
@@ -7,18 +7,14 @@ import json
 import os
 import signal
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from iowbc.errors import Rejected
-from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.sample import Sample
-from iowbc.robot.description import robot_folder
 
 SMALL: dict[str, Any] = {
     "sampling": {"samples": 400, "mirrored_share": 0.1},
@@ -40,22 +36,6 @@ SMALL: dict[str, Any] = {
 }
 
 
-@dataclass
-class Notes:
-    """A stage's report, kept."""
-
-    said: list[str] = field(default_factory=list)
-
-    def metrics(self, values: Mapping[str, float], step: int) -> None:
-        assert all(np.isfinite(value) for value in values.values())
-
-    def progress(self, done: float, total: float, note: str = "") -> None:
-        assert 0 <= done <= total
-
-    def say(self, text: str) -> None:
-        self.said.append(text)
-
-
 def small_recipe(**changes: Any) -> Recipe:
     """The small recipe with other values, by dotted path with `__` for the dots."""
     rg = json.loads(json.dumps(SMALL))
@@ -66,30 +46,6 @@ def small_recipe(**changes: Any) -> Recipe:
             place = place.setdefault(section, {})
         place[name] = value
     return Recipe.model_validate({"name": "small", "rg": rg})
-
-
-def make_job(
-    folder: Path,
-    recipe: Recipe,
-    *,
-    inputs: Mapping[str, Path] | None = None,
-    workers: int = 1,
-    key: str = "key",
-    interrupted: Callable[[], bool] = lambda: False,
-) -> Job:
-    for name in ("out", "work"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    return Job(
-        recipe=recipe,
-        key=key,
-        robot=robot_folder("g1"),
-        inputs=inputs or {},
-        out=folder / "out",
-        work=folder / "work",
-        workers=workers,
-        report=Notes(),
-        interrupted=interrupted,
-    )
 
 
 class Double:

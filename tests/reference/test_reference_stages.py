@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference_doubles import make_job, small_recipe
+from reference_doubles import small_recipe
+from stage_jobs import make_job
 
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
@@ -29,9 +30,10 @@ DATA = ("dataset.npz", "labelled.npz", "summary.json")
 KILLED = """
 import sys
 from pathlib import Path
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {tests!r}
 if __name__ == "__main__":
-    from reference_doubles import make_job, small_recipe
+    from reference_doubles import small_recipe
+    from stage_jobs import make_job
     from iowbc.stages import rg_dataset
     rg_dataset.run(make_job(Path({folder!r}), small_recipe(), workers=1))
 """
@@ -83,7 +85,7 @@ def test_the_number_of_workers_changes_no_byte(dataset_job: Job, tmp_path: Path)
 
 def test_after_kill_9_finished_shards_are_used_and_the_result_is_the_same(dataset_job: Job, tmp_path: Path) -> None:
     script = tmp_path / "killed.py"
-    script.write_text(KILLED.format(tests=str(Path(__file__).parent), folder=str(tmp_path)))
+    script.write_text(KILLED.format(tests=[str(folder) for folder in Path(__file__).parents[:2]], folder=str(tmp_path)))
     process = subprocess.Popen([sys.executable, str(script)], env=os.environ | {"OMP_NUM_THREADS": "1"})
     first = tmp_path / "work" / "shards" / "00000.npz"
     deadline = time.monotonic() + 120.0

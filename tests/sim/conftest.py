@@ -5,20 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from changes import changed
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
-from iowbc.robot.description import Robot, load_robot, robot_folder
+from iowbc.robot.description import Robot
 from iowbc.sim import world
 from iowbc.sim.simulation import Simulation
 
 IMMOVABLE = 1e6
 """Inertia [kg, kg·m²] that leaves a base where it is."""
-
-
-@pytest.fixture(scope="session")
-def robot() -> Robot:
-    return load_robot(robot_folder("g1"))
 
 
 @pytest.fixture(scope="session")
@@ -31,12 +27,6 @@ def carrying(robot: Robot) -> Any:
     posture = robot.default_position.copy()
     posture[robot.interaction] = arms.solve(posture[None, robot.interaction], target)[0]
     return posture
-
-
-def changed(section: Any, path: str, value: Any) -> Any:
-    """A recipe section with one field, by dotted path, at another value."""
-    name, _, rest = path.partition(".")
-    return section.model_copy(update={name: changed(getattr(section, name), rest, value) if rest else value})
 
 
 @pytest.fixture(scope="session")
@@ -84,8 +74,3 @@ def hold_base(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         monkeypatch.setattr(world, "compile_scene", held)
 
     return hold
-
-
-def run(simulation: Simulation, steps: int) -> None:
-    for _ in range(steps):
-        simulation.step()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import changed
+from changes import changed
 
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import run
+from stepping import run
 
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.sim.rendering import appearance as look

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 from safetensors.numpy import load_file
-from training_jobs import ENVIRONMENTS, job, rows, small_recipe, stopped_and_resumed
+from stage_jobs import make_job
+from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.learning.acting import load_policy
 from iowbc.stages import distill, teacher
@@ -15,8 +16,10 @@ from iowbc.stages import distill, teacher
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where a teacher and a student were trained without a break."""
     place = tmp_path_factory.mktemp("trained")
-    teacher.STAGE.run(job(place / "teacher", small_recipe()))
-    distill.STAGE.run(job(place / "distill", small_recipe(), {"teacher": place / "teacher" / "out"}))
+    teacher.STAGE.run(make_job(place / "teacher", small_recipe(), workers=0))
+    distill.STAGE.run(
+        make_job(place / "distill", small_recipe(), inputs={"teacher": place / "teacher" / "out"}, workers=0)
+    )
     return place
 
 

@@ -1,15 +1,15 @@
 """A recipe of the smallest trainings, and jobs for the stages that train."""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from stage_jobs import make_job
 
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import robot_folder
 
 ENVIRONMENTS = 4
 
@@ -43,45 +43,15 @@ def small_recipe(**teacher: Any) -> Recipe:
     )
 
 
-@dataclass
-class Heard:
-    """A report that keeps what it is told."""
-
-    rows: list[tuple[int, dict[str, float]]] = field(default_factory=list)
-    lines: list[str] = field(default_factory=list)
-
-    def metrics(self, values: Mapping[str, float], step: int) -> None:
-        self.rows.append((step, dict(values)))
-
-    def progress(self, done: float, total: float, note: str = "") -> None:
-        assert done <= total
-
-    def say(self, text: str) -> None:
-        self.lines.append(text)
-
-
-def job(
-    place: Path,
-    recipe: Recipe,
-    inputs: Mapping[str, Path] | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
-) -> Job:
-    """A job in `place`, stepped in this process; another one in the same place goes on where that one stopped."""
-    out, work = place / "out", place / "work"
-    out.mkdir(parents=True, exist_ok=True)
-    work.mkdir(exist_ok=True)
-    return Job(recipe, "key", robot_folder(recipe.robot), inputs or {}, out, work, 0, Heard(), interrupted)
-
-
 def stopped_and_resumed(stage: Stage, place: Path, recipe: Recipe, inputs: Mapping[str, Path] | None = None) -> Job:
     """Runs a stage that is asked to stop after its first update, then again to its end."""
     try:
-        stage.run(job(place, recipe, inputs, interrupted=lambda: True))
+        stage.run(make_job(place, recipe, inputs=inputs, workers=0, interrupted=lambda: True))
     except Interrupted:
         assert not list((place / "out").iterdir()), "an interrupted stage leaves no output"
     else:
         raise AssertionError("the stage did not stop when it was asked to")
-    resumed = job(place, recipe, inputs)
+    resumed = make_job(place, recipe, inputs=inputs, workers=0)
     stage.run(resumed)
     return resumed
 

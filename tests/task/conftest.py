@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from task_worlds import with_changes
+from changes import with_changes
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot, load_robot, robot_folder

@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from task_worlds import with_changes
+from changes import with_changes
 
 from iowbc.benchmarks import simulation
 from iowbc.benchmarks.bare_loop import STATE, BareLoops, record

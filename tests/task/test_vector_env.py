@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from changes import with_changes
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-from task_worlds import actions, rollout, with_changes
+from task_worlds import actions, rollout
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.gym.environment import Environment

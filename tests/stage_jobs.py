@@ -1,0 +1,53 @@
+"""Jobs for tests that run a stage, and a report that keeps what it is told."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import robot_folder
+
+
+@dataclass
+class Heard:
+    """A report that keeps what it is told."""
+
+    rows: list[tuple[int, dict[str, float]]] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        assert all(isinstance(value, float) and math.isfinite(value) for value in values.values()), values
+        self.rows.append((step, dict(values)))
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        assert 0 <= done <= total
+
+    def say(self, text: str) -> None:
+        self.lines.append(text)
+
+
+def make_job(
+    folder: Path,
+    recipe: Recipe,
+    *,
+    inputs: Mapping[str, Path] | None = None,
+    workers: int = 1,
+    key: str = "key",
+    interrupted: Callable[[], bool] = lambda: False,
+) -> Job:
+    """A job in `folder`; another one in the same folder goes on where that one stopped."""
+    for name in ("out", "work"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    return Job(
+        recipe=recipe,
+        key=key,
+        robot=robot_folder(recipe.robot),
+        inputs=inputs or {},
+        out=folder / "out",
+        work=folder / "work",
+        workers=workers,
+        report=Heard(),
+        interrupted=interrupted,
+    )
