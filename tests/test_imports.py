@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "export": WORLD | {"task", "reference", "learning", "deploy"},
     "stages": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
-    "cli": {"commands", "stages", "pipeline", "recipe", "errors"},
+    "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
 ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "mlflow", "matplotlib"}

@@ -9,7 +9,7 @@ from iowbc.commands.results import print_results
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, PipelineFailed
 from iowbc.pipeline.console.display import Display, PlainDisplay
-from iowbc.pipeline.console.live_table import LiveDisplay
+from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
@@ -68,5 +68,5 @@ def _rest(request: Request, runner: Runner | None) -> str:
 
 def _display(loaded: LoadedRecipe, console: Console) -> Display:
     if console.is_terminal:
-        return LiveDisplay(console)
+        return LiveTable(console)
     return PlainDisplay(loaded.recipe.execution.line_interval, console.file)

@@ -1,15 +1,16 @@
 """What the tests of the pipeline share."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 from workplace import RECIPE, Workplace
 
+from iowbc.robot.description import robot_folder
+
 
 @pytest.fixture
 def workplace(tmp_path: Path) -> Workplace:
-    robot = tmp_path / "robots" / "g1"
-    robot.mkdir(parents=True)
-    (robot / "robot.yaml").write_text("name: g1\n")
+    shutil.copytree(robot_folder("g1"), tmp_path / "robots" / "g1")
     (tmp_path / "small.yaml").write_text(RECIPE)
     return Workplace(tmp_path)

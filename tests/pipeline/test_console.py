@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from iowbc.pipeline.console.display import CURVE_POINTS, PlainDisplay, StageView
-from iowbc.pipeline.console.live_table import LiveDisplay, sparkline
+from iowbc.pipeline.console.live_table import LiveTable, sparkline
 from iowbc.pipeline.console.wording import short, size
 
 
@@ -61,7 +61,7 @@ def test_plain_lines_come_once_in_an_interval() -> None:
 
 def test_the_live_table_shows_every_stage() -> None:
     console = Console(file=io.StringIO(), force_terminal=True, width=120)
-    display = LiveDisplay(console)
+    display = LiveTable(console)
     views = [StageView("rg-fit", state="cached"), StageView("teacher", state="runs", started=0.0)]
     views[1].progress(1, 4, "at 1")
     views[1].measured("reward", 2.5)

@@ -39,7 +39,7 @@ def sparkline(values: Sequence[float], width: int = CURVE_WIDTH) -> str:
     return "".join(BLOCKS[round((mean - low) * scale)] for mean in means)
 
 
-class LiveDisplay:
+class LiveTable:
     """One row a stage, redrawn in place; lines that are said scroll by above it."""
 
     def __init__(self, console: Console) -> None:
