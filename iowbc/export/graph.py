@@ -15,7 +15,8 @@ from iowbc.control.gait import swing_amplitude
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.observation import OBJECT, PROPRIOCEPTION, ObservationLayout, Sensed
 from iowbc.control.sensors import Measured, quantities
-from iowbc.learning.networks import ACTIVATIONS, StudentNetwork
+from iowbc.learning.activations import ACTIVATIONS
+from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.description import Robot
 
@@ -57,7 +58,7 @@ class ReferenceModule(nn.Module):
         for weight, bias in network.layers:
             linear = nn.Linear(*reversed(weight.shape))
             linear.weight.data, linear.bias.data = _tensor(weight), _tensor(bias)
-            layers += [linear, ACTIVATIONS[network.activation]()]
+            layers += [linear, ACTIVATIONS[network.activation].module()]
         self.body = nn.Sequential(*layers[:-1])
 
     def forward(self, arm_reference: Tensor, base_command: Tensor) -> Tensor:

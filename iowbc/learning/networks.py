@@ -1,21 +1,43 @@
 """The networks of teacher and student, with their observation normalisation inside."""
 
-import itertools
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
-ACTIVATIONS: dict[str, type[nn.Module]] = {"elu": nn.ELU, "relu": nn.ReLU, "tanh": nn.Tanh}
+from iowbc.learning.activations import ACTIVATIONS
+from iowbc.learning.perceptron import DenseMlp, Perceptron, mlp
+from iowbc.learning.symmetric import SymmetricMlp
+from iowbc.robot.mirror import MirrorMap
+
+Mirrors = tuple[MirrorMap, MirrorMap]
+"""Of an input and of an output."""
 
 
-def mlp(sizes: Sequence[int], activation: str) -> nn.Sequential:
-    """Linear layers of the given sizes with an activation between them; the last one is linear."""
-    layers: list[nn.Module] = []
-    for inputs, outputs in itertools.pairwise(sizes):
-        layers += [nn.Linear(inputs, outputs), ACTIVATIONS[activation]()]
-    return nn.Sequential(*layers[:-1])
+def perceptron(
+    inputs: int, hidden: Sequence[int], outputs: int, activation: str, mirrors: Mirrors | None
+) -> Perceptron:
+    """A multilayer perceptron that commutes with the mirrors of its input and output, where they are given."""
+    if mirrors is None:
+        return DenseMlp(inputs, hidden, outputs, activation)
+    return SymmetricMlp(mirrors[0], hidden, mirrors[1], activation)
+
+
+def mirror_as_json(mirror: MirrorMap) -> dict[str, list[float]]:
+    """A mirror as plain values, read back by `mirror_from_json`."""
+    return {"permutation": mirror.permutation.tolist(), "sign": np.asarray(mirror.sign).tolist()}
+
+
+def mirror_from_json(plain: Any) -> MirrorMap:
+    """Inverse of `mirror_as_json`."""
+    return MirrorMap(np.array(plain["permutation"], np.int64), np.array(plain["sign"], np.float32))
+
+
+def mirrors_from_json(plain: Any) -> Mirrors | None:
+    """Both mirrors of a network's architecture, if it has any."""
+    return None if plain is None else (mirror_from_json(plain[0]), mirror_from_json(plain[1]))
 
 
 class Normalizer(nn.Module):
@@ -39,10 +61,19 @@ class TeacherNetwork(nn.Module):
 
     log_std: Tensor
 
-    def __init__(self, inputs: int, actions: int, hidden: Sequence[int], activation: str, clip: float) -> None:
+    def __init__(
+        self,
+        inputs: int,
+        actions: int,
+        hidden: Sequence[int],
+        activation: str,
+        clip: float,
+        mirrors: Any = None,
+    ) -> None:
+        """`mirrors`: of observation and action, as `mirror_as_json` gives them; the network then commutes with them."""
         super().__init__()
         self.normalizer = Normalizer(inputs, clip)
-        self.body = mlp([inputs, *hidden, actions], activation)
+        self.body = perceptron(inputs, hidden, actions, activation, mirrors_from_json(mirrors))
         self.register_buffer("log_std", torch.zeros(actions))
 
     def forward(self, observation: Tensor) -> Tensor:
@@ -69,8 +100,9 @@ class StudentNetwork(nn.Module):
     ) -> None:
         super().__init__()
         self.normalizer = Normalizer(observation, clip)
-        self.frame = nn.Sequential(nn.Linear(observation, frame_features), ACTIVATIONS[activation]())
-        self.encoder = nn.Sequential(nn.Linear(history * frame_features, latent), ACTIVATIONS[activation]())
+        activate = ACTIVATIONS[activation].module
+        self.frame = nn.Sequential(nn.Linear(observation, frame_features), activate())
+        self.encoder = nn.Sequential(nn.Linear(history * frame_features, latent), activate())
         self.body = mlp([observation + latent, *hidden, actions], activation)
 
     def forward(self, history: Tensor) -> Tensor:

@@ -1,51 +1,207 @@
-"""PPO of stable-baselines3 as the recipe sets it up, its complete state, and the network it leaves behind."""
+"""PPO of stable-baselines3 with a rollout and an update of its own: whole arrays, few copies, and a true KL divergence.
 
-from collections.abc import Mapping
+What differs from stable-baselines3's: the networks see a sample in a prepared form that is made once; values of a whole
+rollout are computed at once; the KL divergence is that of the two Gaussians, not a sampled estimate, whose heavy tail
+would starve the step size; no update ends early on it; the standard deviation has a step size and bounds of its own.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from stable_baselines3 import PPO
-from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from torch import Tensor
 
-from iowbc.learning import checkpoint
-from iowbc.learning.networks import ACTIVATIONS, TeacherNetwork
-from iowbc.learning.symmetry import MirroredRolloutBuffer, SymmetricMeanStd
+from iowbc.learning.gaussian import divergence, entropy, log_density
+from iowbc.learning.networks import Mirrors, mirror_as_json
+from iowbc.learning.normalization import Normalization
+from iowbc.learning.policy import ActorCritic
+from iowbc.learning.precision import reduced, threads
+from iowbc.learning.rollout import Rollout
+from iowbc.learning.symmetry import MirroredSamples, half_mirrored
 from iowbc.recipe.teacher import Teacher
-from iowbc.robot.mirror import MirrorMap
 
-VARIANCE_FLOOR = 1e-4
-"""Added to variances: an input that hardly moves in training is not blown up when it does."""
-
-
-Mirrors = tuple[MirrorMap, MirrorMap]
-"""Of the observation and of the action."""
+FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
+"""Means over minibatches: of all, and of the last epoch's for the two divergences."""
 
 
-SB3_KL_MARGIN = 1.5
-"""PPO of stable-baselines3 ends an update beyond this many times its `target_kl`."""
-
-
-def normalize(env: VecEnv, teacher: Teacher, mirrors: Mirrors | None) -> VecNormalize:
-    """Normalise observations and rewards of `env` by running statistics."""
-    normalized = VecNormalize(env, gamma=teacher.gamma, clip_obs=teacher.normalization_clip, epsilon=VARIANCE_FLOOR)
-    if mirrors is not None:
-        normalized.obs_rms = SymmetricMeanStd(mirrors[0])
-    return normalized
-
-
-def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | None) -> PPO:
+class Learner(PPO):  # type: ignore[misc]
     """PPO with the recipe's numbers; starts as the reference itself (the mean action begins near zero)."""
-    buffer: dict[str, Any] = {"rollout_buffer_class": RolloutBuffer}
-    if mirrors is not None:
-        arguments = {"observation_mirror": mirrors[0], "action_mirror": mirrors[1]}
-        buffer = {"rollout_buffer_class": MirroredRolloutBuffer, "rollout_buffer_kwargs": arguments}
-    hidden = list(teacher.hidden)
-    model = PPO(
-        "MlpPolicy",
+
+    policy: ActorCritic
+    rollout_buffer: Rollout
+    _last_obs: Any
+    learning_rate: float
+
+    def configure(self, teacher: Teacher, mirrors: Mirrors, cores: int) -> None:
+        """What stable-baselines3's constructor does not know; `cores`: on which the networks learn."""
+        self.settings, self.cores = teacher, cores
+        symmetric = teacher.symmetry != "none"
+        (size,) = self.observation_space.shape
+        self.normalization = Normalization(size, self.n_envs, self.gamma, mirrors[0] if symmetric else None)
+        self.mirrored = MirroredSamples(mirrors, teacher.mirror_gap) if teacher.symmetry == "augment" else None
+        self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
+        """Time spent since they were last set back [s]."""
+        self.kl = 0.0
+        """Of the last update's last epoch."""
+
+    def _excluded_save_params(self) -> list[str]:
+        own = ["settings", "normalization", "mirrored", "seconds", "cores", "kl", "rollout_buffer"]
+        return [*super()._excluded_save_params(), *own]
+
+    @contextmanager
+    def _timed(self, part: str) -> Iterator[None]:
+        begin = time.perf_counter()
+        yield
+        self.seconds[part] += time.perf_counter() - begin
+
+    def collect_rollouts(self, env: Any, callback: Any, rollout_buffer: Rollout, n_rollout_steps: int) -> bool:
+        """See stable-baselines3; observations and rewards of `env` are raw."""
+        policy, columns = self.policy, rollout_buffer.columns
+        policy.set_training_mode(False)
+        callback.on_rollout_start()
+        self.normalization.frozen = self.num_timesteps >= self.settings.statistics_until
+        low, high = self.action_space.low, self.action_space.high
+        cut: list[tuple[int, int, Any]] = []
+        observation = self._last_obs
+        for step in range(n_rollout_steps):
+            with self._timed("inference"), torch.inference_mode():
+                self.normalization.observe(observation, policy.normalizer)
+                prepared = policy.prepared(torch.from_numpy(observation))
+                mean = policy.actor.head(policy.actor.hidden(prepared))
+                action = mean + torch.randn_like(mean) * torch.exp(policy.log_std)
+                columns["observation"][step], columns["action"][step] = prepared, action
+            with self._timed("simulation"):
+                observation, reward, ended, infos = env.step(np.clip(action.numpy(), low, high))
+            rollout_buffer.rewards[step] = self.normalization.reward(reward, ended)
+            rollout_buffer.ended[step] = ended
+            for index in np.flatnonzero(ended).tolist():
+                if infos[index].get("TimeLimit.truncated", False):
+                    cut.append((step, index, infos[index]["terminal_observation"]))
+            self.num_timesteps += env.num_envs
+            callback.update_locals({"infos": infos, "dones": ended})
+            if not callback.on_step():
+                return False
+        self._last_obs = observation
+        self._last_episode_starts = ended
+        with self._timed("learning"), threads(self.cores), torch.inference_mode():
+            self._look_back(rollout_buffer, cut)
+        callback.on_rollout_end()
+        return True
+
+    def _look_back(self, rollout: Rollout, cut: list[tuple[int, int, Any]]) -> None:
+        """What policy and value were during a rollout, and its advantages; `cut`: where time limits ended episodes."""
+        policy, columns, flat = self.policy, rollout.columns, rollout.named(rollout.flat)
+        with reduced(self.settings.precision):
+            hidden = policy.actor.hidden(flat["observation"])
+        flat["mean"].copy_(policy.actor.head(hidden))
+        flat["log_density"].copy_(log_density(flat["action"], flat["mean"], policy.log_std))
+        flat["value"].copy_(policy.critic.head(policy.critic.hidden(flat["observation"]))[:, 0])
+        behind = np.concatenate([self._last_obs, *(observation[None] for _, _, observation in cut)])
+        values = policy.predict_values(torch.from_numpy(behind))[:, 0].numpy()
+        for (step, index, _), value in zip(cut, values[self.n_envs :], strict=True):
+            rollout.rewards[step, index] += self.gamma * value
+        rollout.finish(values[: self.n_envs], self.gamma, self.gae_lambda)
+        self.explained = explained_variance(columns["value"], columns["target"])
+
+    def train(self) -> None:
+        """Gradient steps on the rollout in the buffer."""
+        with self._timed("learning"), threads(self.cores):
+            self._train()
+
+    def _train(self) -> None:
+        settings, rollout, optimizer = self.settings, self.rollout_buffer, self.policy.optimizer
+        self.policy.set_training_mode(True)
+        rate = self.learning_rate
+        optimizer.param_groups[0]["lr"] = rate
+        before = self.policy.log_std.detach().clone()
+        samples = rollout.flat
+        images = None if self.mirrored is None else self.mirrored.images(rollout, self.policy)
+        parameters = [*self.policy.actor.parameters(), *self.policy.critic.parameters(), self.policy.log_stds]
+        found: list[Tensor] = []
+        for _ in range(self.n_epochs):
+            shuffled = (samples if images is None else half_mirrored(samples, images))[torch.randperm(len(samples))]
+            for batch in torch.split(shuffled, self.batch_size):
+                loss, figures = self._loss(rollout.named(batch), before)
+                optimizer.zero_grad()
+                loss.backward()  # type: ignore[no-untyped-call]
+                torch.nn.utils.clip_grad_norm_(parameters, self.max_grad_norm)
+                optimizer.step()
+                self._bound_deviation()
+                found.append(figures)
+            self._n_updates += 1
+        every = torch.stack(found).view(self.n_epochs, -1, len(FIGURES))
+        means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
+        last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
+        self.kl = last["kl"]
+        values = means | {"kl": last["kl"], "approx_kl": last["approx_kl"], "explained_variance": self.explained}
+        values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
+        for name, value in values.items():
+            self.logger.record(f"train/{name}", value)
+        self.learning_rate = adapted(rate, self.kl, settings)
+
+    def _loss(self, batch: dict[str, Tensor], before: Tensor) -> tuple[Tensor, Tensor]:
+        """The loss of a minibatch, and `FIGURES`; `before`: log std before the update."""
+        policy, settings = self.policy, self.settings
+        with reduced(settings.precision):
+            acting, judging = policy.actor.hidden(batch["observation"]), policy.critic.hidden(batch["observation"])
+        mean, value, log_std = policy.actor.head(acting), policy.critic.head(judging)[:, 0], policy.log_std
+        advantage = batch["advantage"]
+        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        difference = log_density(batch["action"], mean, log_std) - batch["log_density"]
+        ratio = torch.exp(difference)
+        clipped = torch.clamp(ratio, 1.0 - settings.clip, 1.0 + settings.clip)
+        policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
+        value_loss = torch.nn.functional.mse_loss(value, batch["target"])
+        loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
+        with torch.no_grad():
+            kl = divergence(batch["mean"], before, mean, log_std).mean()
+            sampled = (ratio - 1.0 - difference).mean()
+            share = ((ratio - 1.0).abs() > settings.clip).float().mean()
+            figures = torch.stack([policy_loss, value_loss, kl, sampled, share])
+        return loss, figures
+
+    def _bound_deviation(self) -> None:
+        """Keeps the standard deviation below its ceiling, which falls with the steps, and above its floor."""
+        low, high = deviation_bounds(self.settings, self.num_timesteps)
+        with torch.no_grad():
+            self.policy.log_stds.clamp_(float(np.log(low)), float(np.log(high)))
+
+
+def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
+    """Least and largest standard deviation of the action after some environment steps."""
+    if teacher.std_half_life is None:
+        return teacher.std_floor, np.inf
+    ceiling = teacher.initial_std * 0.5 ** (steps / teacher.std_half_life)
+    return teacher.std_floor, max(ceiling, teacher.std_end)
+
+
+def adapted(rate: float, kl: float, teacher: Teacher) -> float:
+    """The next update's step size: a fifth less or more where the KL divergence was far from the desired one."""
+    if teacher.desired_kl is None:
+        return rate
+    if kl > 1.5 * teacher.desired_kl:
+        rate *= 0.8
+    elif kl < teacher.desired_kl / 1.5:
+        rate *= 1.2
+    low, high = teacher.learning_rate_range
+    return min(max(rate, low), high)
+
+
+def explained_variance(values: Tensor, targets: Tensor) -> float:
+    """Share of the targets' variance that the values foresaw; 1 is all of it, below 0 is worse than their mean."""
+    return float(1.0 - (targets - values).var() / (targets.var() + 1e-8))
+
+
+def make_learner(teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int) -> Learner:
+    """The learner of a recipe on a vector environment with raw observations and rewards."""
+    symmetric = teacher.symmetry == "construction"
+    model = Learner(
+        ActorCritic,
         env,
         learning_rate=teacher.learning_rate,
         n_steps=teacher.rollout,
@@ -57,98 +213,18 @@ def make_ppo(teacher: Teacher, env: VecNormalize, seed: int, mirrors: Mirrors | 
         ent_coef=teacher.entropy,
         vf_coef=teacher.value_weight,
         max_grad_norm=teacher.gradient_norm,
-        target_kl=teacher.largest_kl / SB3_KL_MARGIN if teacher.largest_kl else None,
         seed=seed,
         device="cpu",
+        rollout_buffer_class=Rollout,
         policy_kwargs={
-            "net_arch": {"pi": hidden, "vf": hidden},
-            "activation_fn": ACTIVATIONS[teacher.activation],
-            "log_std_init": float(np.log(teacher.initial_std)),
+            "hidden": list(teacher.hidden),
+            "activation": teacher.activation,
+            "clip": teacher.normalization_clip,
+            "initial_std": teacher.initial_std,
+            "std_learning_rate": teacher.std_learning_rate,
+            "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
         },
-        **buffer,
     )
-    if isinstance(model.rollout_buffer, MirroredRolloutBuffer):
-        model.rollout_buffer.policy = model.policy
+    model.configure(teacher, mirrors, cores)
     model.set_logger(Logger(folder=None, output_formats=[]))
     return model
-
-
-def adapt_learning_rate(model: PPO, teacher: Teacher, kl: float) -> float:
-    """Move the step size of the next update towards the desired KL divergence; returns it."""
-    rate = float(model.learning_rate)
-    if teacher.desired_kl is not None:
-        if kl > 1.5 * teacher.desired_kl:
-            rate *= 0.8
-        elif kl < teacher.desired_kl / 1.5:
-            rate *= 1.2
-        low, high = teacher.learning_rate_range
-        set_learning_rate(model, min(max(rate, low), high))
-    return float(model.learning_rate)
-
-
-def set_learning_rate(model: PPO, rate: float) -> None:
-    """Use a step size from the next update on."""
-    model.learning_rate = rate
-    model._setup_lr_schedule()
-
-
-def ppo_arrays(model: PPO, env: VecNormalize) -> checkpoint.Arrays:
-    """Networks, optimiser, normalisation, last observation and random states, between two rollouts."""
-    assert model._last_obs is not None
-    assert model._last_episode_starts is not None
-    return {
-        **checkpoint.prefixed("policy", checkpoint.module_arrays(model.policy)),
-        **checkpoint.prefixed("optimizer", checkpoint.optimizer_arrays(model.policy.optimizer)),
-        **checkpoint.prefixed("random", checkpoint.random_arrays()),
-        **{f"normalization/observation_{name}": value for name, value in _moments(env.obs_rms).items()},
-        **{f"normalization/return_{name}": value for name, value in _moments(env.ret_rms).items()},
-        "normalization/returns": env.returns,
-        "last/observation": np.asarray(model._last_obs),
-        "last/episode_starts": np.asarray(model._last_episode_starts),
-        "counters": np.array([model.num_timesteps, model._n_updates]),
-        "learning_rate": np.array([model.learning_rate]),
-    }
-
-
-def restore_ppo(model: PPO, env: VecNormalize, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Inverse of `ppo_arrays`, on a model made from the same recipe."""
-    checkpoint.restore_module(model.policy, checkpoint.under("policy", arrays))
-    checkpoint.restore_optimizer(model.policy.optimizer, checkpoint.under("optimizer", arrays))
-    for statistics, name in ((env.obs_rms, "observation"), (env.ret_rms, "return")):
-        statistics.mean = np.array(arrays[f"normalization/{name}_mean"])
-        statistics.var = np.array(arrays[f"normalization/{name}_var"])
-        statistics.count = float(arrays[f"normalization/{name}_count"][0])
-    env.returns = np.array(arrays["normalization/returns"])
-    model._last_obs = np.array(arrays["last/observation"])
-    model._last_episode_starts = np.array(arrays["last/episode_starts"])
-    model.num_timesteps, model._n_updates = (int(value) for value in arrays["counters"])
-    set_learning_rate(model, float(arrays["learning_rate"][0]))
-    checkpoint.restore_random(checkpoint.under("random", arrays))
-
-
-def _moments(statistics: Any) -> checkpoint.Arrays:
-    return {
-        "mean": np.asarray(statistics.mean),
-        "var": np.asarray(statistics.var),
-        "count": np.array([statistics.count], np.float64),
-    }
-
-
-def teacher_network(model: PPO, env: VecNormalize, teacher: Teacher) -> tuple[TeacherNetwork, dict[str, Any]]:
-    """The deterministic policy with its normalisation, and the arguments that rebuild it."""
-    (inputs,), (actions,) = env.observation_space.shape, env.action_space.shape
-    architecture: dict[str, Any] = {
-        "inputs": int(inputs),
-        "actions": int(actions),
-        "hidden": list(teacher.hidden),
-        "activation": teacher.activation,
-        "clip": teacher.normalization_clip,
-    }
-    network = TeacherNetwork(**architecture)
-    source = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-    for target, layer in zip(network.body, source, strict=True):
-        target.load_state_dict(layer.state_dict())
-    network.normalizer.mean.copy_(torch.from_numpy(env.obs_rms.mean))
-    network.normalizer.std.copy_(torch.from_numpy(np.sqrt(env.obs_rms.var + VARIANCE_FLOOR)))
-    network.log_std.copy_(model.policy.log_std.detach())
-    return network.requires_grad_(False), architecture

@@ -13,8 +13,7 @@ from iowbc.learning.acting import TeacherPolicy
 from iowbc.learning.distillation import Experience, gradient_step, mirror_half, spread
 from iowbc.learning.environments import Environments
 from iowbc.learning.history import History
-from iowbc.learning.networks import StudentNetwork, TeacherNetwork
-from iowbc.learning.ppo import Mirrors
+from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork
 from iowbc.recipe.distillation import Distillation
 
 

@@ -1,71 +1,48 @@
-"""Left-right mirror symmetry in learning: normalisation that commutes with the mirror, and mirrored samples."""
-
-from collections.abc import Generator
-from typing import Any
+"""Learning from mirror images: the alternative to networks that are symmetric by construction."""
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from stable_baselines3.common.buffers import RolloutBuffer
-from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.running_mean_std import RunningMeanStd
-from stable_baselines3.common.type_aliases import RolloutBufferSamples
-from stable_baselines3.common.vec_env.vec_normalize import VecNormalize
+from torch import Tensor
 
+from iowbc.learning.gaussian import log_density
+from iowbc.learning.networks import Mirrors
+from iowbc.learning.policy import ActorCritic
+from iowbc.learning.rollout import Rollout
 from iowbc.robot.mirror import MirrorMap
 
 
-def mirror_tensor(mirror: MirrorMap, x: torch.Tensor) -> torch.Tensor:
+def mirror_tensor(mirror: MirrorMap, x: Tensor) -> Tensor:
     """The mirror image of a float32 tensor along its last axis."""
     return x[..., torch.from_numpy(mirror.permutation)] * torch.from_numpy(mirror.sign.astype(np.float32))
 
 
-class SymmetricMeanStd(RunningMeanStd):  # type: ignore[misc]
-    """Running mean and variance over samples and their mirror images, so that normalising commutes with the mirror."""
+class MirroredSamples:
+    """The mirror images of a rollout's samples.
 
-    def __init__(self, mirror: MirrorMap) -> None:
-        super().__init__(shape=mirror.sign.shape)
-        self.mirror = mirror
-
-    def update(self, arr: NDArray[np.float32]) -> None:
-        super().update(np.concatenate([arr, self.mirror(arr)]))
-
-
-class MirroredRolloutBuffer(RolloutBuffer):  # type: ignore[misc]
-    """A rollout buffer that shows a random half of every minibatch as its mirror image.
-
-    Observations must have been normalised with `SymmetricMeanStd`. Advantage and return are those of the original,
-    for the task is symmetric; the old probability is what the policy gives the mirrored action before the update, so
-    that the probability ratio begins at one.
+    Advantage and return are those of the original, for the task is symmetric. The old policy is what it was in the
+    mirrored state, so that the probability ratio begins at one. An action that the policy would hardly have taken there
+    is not shown: its gradient would grow without bound.
     """
 
-    def __init__(self, *args: Any, observation_mirror: MirrorMap, action_mirror: MirrorMap, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.observation_mirror = observation_mirror
-        self.action_mirror = action_mirror
-        self.policy: ActorCriticPolicy | None = None
-        self.mirrored_log_probs = torch.zeros(0)
+    def __init__(self, mirrors: Mirrors, gap: float) -> None:
+        """`mirrors`: of observation and action; `gap`: how much less likely an image may be than its original [nat]."""
+        self.mirrors, self.gap = mirrors, gap
 
-    def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
-        if not self.generator_ready:
-            assert self.policy is not None, "set `policy` before the first update"
-            observations = torch.from_numpy(self.swap_and_flatten(self.observations))
-            actions = torch.from_numpy(self.swap_and_flatten(self.actions))
-            with torch.no_grad():
-                _, self.mirrored_log_probs, _ = self.policy.evaluate_actions(
-                    mirror_tensor(self.observation_mirror, observations), mirror_tensor(self.action_mirror, actions)
-                )
-        yield from super().get(batch_size)
+    def images(self, rollout: Rollout, policy: ActorCritic) -> Tensor:
+        """The mirror image of every sample; the sample itself where its image is too unlikely."""
+        samples = rollout.flat
+        images = samples.clone()
+        old, new = rollout.named(samples), rollout.named(images)
+        with torch.no_grad():
+            new["observation"].copy_(mirror_tensor(self.mirrors[0], old["observation"]))
+            new["action"].copy_(mirror_tensor(self.mirrors[1], old["action"]))
+            new["mean"].copy_(policy.actor.head(policy.actor.hidden(new["observation"])))
+            new["log_density"].copy_(log_density(new["action"], new["mean"], policy.log_std))
+        unlikely = new["log_density"] < old["log_density"] - self.gap
+        images[unlikely] = samples[unlikely]
+        return images
 
-    def _get_samples(self, batch_inds: NDArray[np.intp], env: VecNormalize | None = None) -> RolloutBufferSamples:
-        samples = super()._get_samples(batch_inds, env)
-        mirrored = torch.from_numpy(np.random.rand(len(batch_inds)) < 0.5)  # noqa: NPY002 - SB3's own generator
-        row = mirrored[:, None]
-        observations = mirror_tensor(self.observation_mirror, samples.observations)
-        actions = mirror_tensor(self.action_mirror, samples.actions)
-        log_probs = self.mirrored_log_probs[torch.from_numpy(batch_inds)]
-        return samples._replace(
-            observations=torch.where(row, observations, samples.observations),
-            actions=torch.where(row, actions, samples.actions),
-            old_log_prob=torch.where(mirrored, log_probs, samples.old_log_prob),
-        )
+
+def half_mirrored(samples: Tensor, images: Tensor) -> Tensor:
+    """A random half of the samples replaced by their images."""
+    return torch.where(torch.rand(len(samples), 1) < 0.5, images, samples)

@@ -31,7 +31,7 @@ def run(job: Job) -> None:
     try:
         environments.set_curriculum(about["curriculum"])
         layout, mirrors = environments.layout, None
-        if recipe.teacher.symmetry == "augment":
+        if recipe.teacher.symmetry != "none":
             mirrors = layout.state.mirror, action_mirror(robot)
         places = layout.observation, layout.privileged
         training = StudentTraining(settings, environments, teacher, places, mirrors, recipe.seed)

@@ -8,8 +8,9 @@ PANELS = (
     "episode_seconds",
     "reward",
     "curriculum_level",
-    "train/approx_kl",
-    "learning_rate",
+    "train/kl",
+    "train/clip_share",
+    "train/learning_rate",
     "train/std",
     "train/explained_variance",
 )
@@ -21,6 +22,7 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_mirror
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
+    from iowbc.processes import available_cores
     from iowbc.robot.description import load_robot
     from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
@@ -34,10 +36,8 @@ def run(job: Job) -> None:
         divergences=job.work / "divergences",
     )
     try:
-        mirrors = None
-        if settings.symmetry == "augment":
-            mirrors = environments.layout.mirror, action_mirror(robot)
-        training = TeacherTraining(settings, environments, mirrors, recipe.seed)
+        mirrors = environments.layout.mirror, action_mirror(robot)
+        training = TeacherTraining(settings, environments, mirrors, recipe.seed, available_cores())
         curves = train(
             job, training, settings.checkpoint_every, lambda values: f"{values['episode_seconds']:.1f} s an episode"
         )
@@ -56,7 +56,7 @@ def run(job: Job) -> None:
 
 STAGE = Stage(
     name="teacher",
-    version=1,
+    version=2,
     slice=("seed", "rg.height", "simulation", "task", "teacher"),
     reads=generator_stage,
     run=run,

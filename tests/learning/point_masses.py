@@ -10,37 +10,49 @@ from stable_baselines3.common.vec_env import VecEnv
 from iowbc.robot.mirror import MirrorMap
 
 MIRRORS = (
-    MirrorMap(np.array([0, 1]), np.array([-1, -1], np.float32)),
+    MirrorMap(np.array([0, 1, 2]), np.array([-1, -1, 1], np.float32)),
     MirrorMap(np.array([0]), np.array([-1], np.float32)),
 )
 
 
 class PointMasses(VecEnv):  # type: ignore[misc]
-    """Eight masses; observations are position and velocity, actions are forces, episodes never end."""
+    """Eight masses; observations are position, velocity and distance, episodes are cut off after 20 steps."""
 
     def __init__(self) -> None:
-        super().__init__(8, spaces.Box(-np.inf, np.inf, (2,)), spaces.Box(-1, 1, (1,)))
-        self.masses = np.tile(np.linspace(-1, 1, 8)[:, None], (1, 2)).astype(np.float32)
+        super().__init__(8, spaces.Box(-np.inf, np.inf, (3,)), spaces.Box(-1, 1, (1,)))
+        self.start = np.tile(np.linspace(-1, 1, 8)[:, None], (1, 2)).astype(np.float32)
+        self.masses, self.age, self.total = self.start.copy(), np.arange(8), np.zeros(2)
+
+    def observed(self) -> Any:
+        return np.concatenate([self.masses, np.abs(self.masses[:, :1])], axis=1)
 
     def reset(self) -> Any:
-        return self.masses.copy()
+        return self.observed()
 
     def step_async(self, actions: Any) -> None:
-        self.masses[:, 1] = 0.9 * self.masses[:, 1] + 0.2 * actions[:, 0]
+        self.masses[:, 1] = 0.8 * self.masses[:, 1] + 0.4 * actions[:, 0]
         self.masses[:, 0] += 0.2 * self.masses[:, 1]
+        self.age += 1
 
     def step_wait(self) -> Any:
-        reward = -(self.masses**2).sum(1)
-        return self.masses.copy(), reward, np.zeros(8, np.bool_), [{} for _ in range(8)]
+        reward, infos = -(self.masses**2).sum(1), [dict[str, Any]() for _ in range(8)]
+        self.total += reward.sum(), reward.size
+        ended = self.age >= 20
+        for index in np.flatnonzero(ended):
+            infos[index] = {"terminal_observation": self.observed()[index], "TimeLimit.truncated": True}
+        self.masses[ended], self.age[ended] = self.start[ended], 0
+        return self.observed(), reward, ended, infos
 
     def statistics(self) -> dict[str, float]:
-        return {"distance": float(np.abs(self.masses[:, 0]).mean())}
+        mean = self.total[0] / max(self.total[1], 1)
+        self.total[:] = 0.0
+        return {"reward": float(mean)}
 
     def state(self) -> dict[str, Any]:
-        return {"masses": self.masses.copy()}
+        return {"masses": self.masses.copy(), "age": self.age.copy()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        self.masses[:] = state["masses"]
+        self.masses[:], self.age[:] = state["masses"], state["age"]
 
     def close(self) -> None: ...
     def get_attr(self, name: str, indices: Any = None) -> Any:

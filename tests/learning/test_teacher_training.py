@@ -1,10 +1,13 @@
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import torch
 from point_masses import MIRRORS, PointMasses
 
 from iowbc.learning import ppo
+from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 
@@ -14,7 +17,10 @@ SETTINGS = Teacher(
     rollout=16,
     minibatches=2,
     hidden=(16,),
-    learning_rate=1e-2,
+    learning_rate=1e-3,
+    gamma=0.9,
+    precision="float32",
+    std_learning_rate=1e-2,
 )
 
 
@@ -28,15 +34,16 @@ def finish(some: TeacherTraining) -> TeacherTraining:
     return some
 
 
-def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does() -> None:
-    unbroken = finish(training())
-    broken = training()
+@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry: str) -> None:
+    unbroken = finish(training(symmetry=symmetry))
+    broken = training(symmetry=symmetry)
     for _ in range(3):
         broken.update()
     kept = {name: value.copy() for name, value in broken.arrays().items()}
     np.random.seed(99)  # noqa: NPY002 - SB3 draws from the global generator
     torch.manual_seed(99)
-    resumed = training()
+    resumed = training(symmetry=symmetry)
     resumed.restore(kept)
     assert resumed.steps == 3 * 16 * 8
     finish(resumed)
@@ -46,21 +53,85 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does() -> Non
         np.testing.assert_array_equal(found[name], value, err_msg=name)
 
 
-def test_the_network_that_is_kept_acts_as_the_trained_policy() -> None:
+@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+def test_training_learns_to_bring_masses_to_rest(symmetry: str) -> None:
+    some = training(steps=16 * 8 * 60, symmetry=symmetry)
+    first = some.update()["reward"]
+    finish(some)
+    assert some.update()["reward"] > 0.4 * first, "rewards are negative: squared distances and speeds"
+
+
+def test_the_trained_policy_obeys_the_mirror_law() -> None:
     some = finish(training())
     network, _ = some.network()
-    raw = np.random.default_rng(0).normal(size=(9, 2)).astype(np.float32)
-    normal = torch.from_numpy(some.normalized.normalize_obs(raw))
-    expected = some.model.policy.get_distribution(normal).mode()
-    torch.testing.assert_close(network(torch.from_numpy(raw)), expected, rtol=1e-5, atol=1e-6)
+    x = 3.0 * torch.randn(50, 3)
+    with torch.no_grad():
+        found = network(mirror_tensor(MIRRORS[0], x))
+        torch.testing.assert_close(found, mirror_tensor(MIRRORS[1], network(x)), rtol=0, atol=1e-5)
+        values = some.model.policy.predict_values(x)
+        torch.testing.assert_close(
+            some.model.policy.predict_values(mirror_tensor(MIRRORS[0], x)), values, rtol=0, atol=1e-5
+        )
+
+
+def test_the_network_that_is_kept_acts_as_the_trained_policy_and_as_its_zip_for_others(tmp_path: Path) -> None:
+    some = finish(training())
+    network, _ = some.network()
+    raw = np.random.default_rng(0).normal(size=(9, 3)).astype(np.float32)
+    own = some.model.policy.get_distribution(torch.from_numpy(raw)).mode()
+    torch.testing.assert_close(network(torch.from_numpy(raw)), own, rtol=1e-5, atol=1e-6)
+    some.model.save(tmp_path / "teacher_sb3.zip")
+    loaded = ppo.Learner.load(tmp_path / "teacher_sb3.zip", device="cpu")
+    action, _ = loaded.predict(raw, deterministic=True)
+    np.testing.assert_allclose(action, own.detach().numpy().clip(-1, 1), rtol=1e-5, atol=1e-6)
+
+
+def test_learning_in_bfloat16_follows_that_in_float32_within_its_rounding() -> None:
+    states = []
+    for precision in ("float32", "bfloat16"):
+        some = training(precision=precision)
+        some.update()
+        states.append(some.model.policy.state_dict())
+    ours, theirs = states
+    changed = [name for name in ours if not torch.equal(ours[name], theirs[name])]
+    assert changed, "bfloat16 rounds"
+    for name in ours:
+        torch.testing.assert_close(ours[name], theirs[name], rtol=0.02, atol=2e-2)
 
 
 def test_the_step_size_follows_the_kl_divergence_within_its_bounds() -> None:
-    some = training(learning_rate=1e-3, learning_rate_range=(5e-4, 1.1e-3))
-    model, settings = some.model, some.settings
-    assert ppo.adapt_learning_rate(model, settings, kl=0.04) == 1e-3
-    assert ppo.adapt_learning_rate(model, settings, kl=0.01) == 1.1e-3
-    for _ in range(9):
-        rate = ppo.adapt_learning_rate(model, settings, kl=0.2)
-    assert rate == 5e-4
-    assert model.lr_schedule(0.5) == 5e-4
+    settings = SETTINGS.model_copy(update={"learning_rate_range": (5e-4, 1.1e-3)})
+    assert ppo.adapted(1e-3, 0.012, settings) == 1e-3
+    assert ppo.adapted(1e-3, 0.004, settings) == 1.1e-3
+    assert ppo.adapted(1e-3, 0.03, settings) == pytest.approx(8e-4)
+    assert ppo.adapted(5.1e-4, 0.03, settings) == 5e-4
+    assert ppo.adapted(1e-2, 9.0, settings.model_copy(update={"desired_kl": None})) == 1e-2
+
+
+def test_exploration_shrinks_with_its_ceiling_and_never_below_its_floor() -> None:
+    settings = Teacher(initial_std=0.4, std_half_life=100, std_end=0.15, std_floor=0.01)
+    assert ppo.deviation_bounds(settings, 0) == (0.01, 0.4)
+    assert ppo.deviation_bounds(settings, 100) == (0.01, 0.2)
+    assert ppo.deviation_bounds(settings, 10_000) == (0.01, 0.15)
+    some = training(std_half_life=16 * 8, std_end=0.2)
+    for _ in range(3):
+        some.update()
+    assert float(some.model.policy.log_std.exp().detach()) <= 0.2 * (1 + 1e-6)
+
+
+def test_the_statistics_of_observations_are_kept_once_they_are_frozen() -> None:
+    some = training(statistics_until=2 * 16 * 8)
+    for _ in range(2):
+        some.update()
+    before = some.model.normalization.arrays()
+    some.update()
+    after = some.model.normalization.arrays()
+    for name in ("observation_mean", "observation_variance", "return_variance"):
+        np.testing.assert_array_equal(before[name], after[name])
+
+
+def test_the_true_divergence_of_an_update_comes_near_the_desired_one() -> None:
+    some = training(steps=16 * 8 * 40)
+    finish(some)
+    kl = np.mean([some.update()["train/kl"] for _ in range(10)])
+    assert 0.004 < kl < 0.036

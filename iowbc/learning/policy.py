@@ -1,0 +1,96 @@
+"""Policy and value network in stable-baselines3's terms."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch import Tensor, nn
+
+from iowbc.learning.gaussian import log_density
+from iowbc.learning.networks import Normalizer, mirrors_from_json, perceptron
+from iowbc.robot.mirror import MirrorMap
+
+INVARIANT = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
+"""Mirror of the value: a state and its mirror image are worth the same."""
+HIDDEN_GAIN, POLICY_GAIN, VALUE_GAIN = float(np.sqrt(2.0)), 0.01, 1.0
+"""Gains of the orthogonal weights at the start, as stable-baselines3 has them: the policy starts as the reference."""
+
+
+class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
+    """A Gaussian policy and a value, each a network of its own, over observations that are normalised inside.
+
+    With mirrors both commute with them: the mean is mirrored with the observation, the standard deviation is the same
+    on both sides, and the value stays.
+    """
+
+    def __init__(
+        self,
+        observation_space: Any,
+        action_space: Any,
+        lr_schedule: Any,
+        *,
+        hidden: Sequence[int],
+        activation: str,
+        clip: float,
+        initial_std: float,
+        std_learning_rate: float,
+        mirrors: Any = None,
+        use_sde: bool = False,
+    ) -> None:
+        """`mirrors`: as `TeacherNetwork` takes them."""
+        super().__init__(observation_space, action_space, lr_schedule, net_arch=[], use_sde=use_sde)
+        (inputs,), (actions,) = observation_space.shape, action_space.shape
+        both = mirrors_from_json(mirrors)
+        self.normalizer = Normalizer(inputs, clip)
+        self.actor = perceptron(inputs, hidden, actions, activation, both)
+        self.critic = perceptron(inputs, hidden, 1, activation, None if both is None else (both[0], INVARIANT))
+        self.actor.initialize(HIDDEN_GAIN, POLICY_GAIN)
+        self.critic.initialize(HIDDEN_GAIN, VALUE_GAIN)
+        own = np.arange(actions) if both is None else np.minimum(np.arange(actions), both[1].permutation)
+        kinds, place = np.unique(own, return_inverse=True)
+        self.log_stds = nn.Parameter(torch.full((len(kinds),), float(np.log(initial_std))))
+        """One for each pair of actions that the mirror swaps, and one for each other."""
+        self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
+        rate = lr_schedule(1)
+        self.optimizer = torch.optim.Adam(
+            [
+                {"params": [*self.actor.parameters(), *self.critic.parameters()], "lr": rate},
+                {"params": [self.log_stds], "lr": std_learning_rate},
+            ],
+            eps=1e-5,
+            fused=True,
+        )
+
+    def _build(self, lr_schedule: Any) -> None:
+        """Nothing of stable-baselines3's own networks."""
+
+    @property
+    def log_std(self) -> Tensor:
+        """Logarithm of the standard deviation, (A,)."""
+        return self.log_stds[self.std_place]
+
+    def prepared(self, observations: Tensor) -> Tensor:
+        """Observations (n, S) as both networks take them in training: normalised, in their mirror basis."""
+        return self.actor.prepare(self.normalizer(observations))
+
+    def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:
+        mean, log_std = self._mean(obs), self.log_std
+        actions = mean if deterministic else mean + torch.randn_like(mean) * torch.exp(log_std)
+        return actions, self.predict_values(obs), log_density(actions, mean, log_std)
+
+    def evaluate_actions(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        distribution = self.get_distribution(obs)
+        return self.predict_values(obs), distribution.log_prob(actions), distribution.entropy()
+
+    def get_distribution(self, obs: Tensor) -> Any:
+        return self.action_dist.proba_distribution(self._mean(obs), self.log_std)
+
+    def predict_values(self, obs: Tensor) -> Tensor:
+        values: Tensor = self.critic(self.normalizer(obs))
+        return values
+
+    def _mean(self, obs: Tensor) -> Tensor:
+        mean: Tensor = self.actor(self.normalizer(obs))
+        return mean

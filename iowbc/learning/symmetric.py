@@ -1,0 +1,149 @@
+"""Networks that commute with the left-right mirror by construction.
+
+Hidden units come in pairs (a, b) that the mirror swaps. A linear layer that commutes with it is two products of half
+the size in the basis of sums a + b, which the mirror keeps, and differences a - b, which it negates; only the sums have
+a bias. An activation acts on a and b themselves, for of a difference it would make something that is not odd. The law
+holds to the last bits and everywhere, not only where training has been.
+"""
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from iowbc.learning.activations import PairedActivation
+from iowbc.learning.perceptron import Hidden, Perceptron
+from iowbc.robot.mirror import MirrorMap
+
+Parts = tuple[Tensor, Tensor]
+"""What the mirror keeps, and what it negates."""
+
+
+class MirrorBasis(nn.Module):
+    """The orthonormal basis of a vector's even part, which its mirror keeps, and its odd part, which it negates."""
+
+    matrix: Tensor
+
+    def __init__(self, mirror: MirrorMap) -> None:
+        """Raises ValueError where the map is not its own inverse."""
+        super().__init__()
+        even, odd = _eigenvectors(mirror)
+        self.even, self.odd = len(even), len(odd)
+        matrix = torch.from_numpy(np.stack([*even, *odd], axis=1).astype(np.float32))
+        self.register_buffer("matrix", matrix, persistent=False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(..., n) to its even part, then its odd part, (..., n)."""
+        return x @ self.matrix
+
+    def split(self, x: Tensor) -> Parts:
+        """The parts of what `forward` returned."""
+        return x[..., : self.even], x[..., self.even :]
+
+    def inverse(self, even: Tensor, odd: Tensor) -> Tensor:
+        """From even and odd part back to (..., n)."""
+        return torch.cat([even, odd], dim=-1) @ self.matrix.T
+
+
+def _eigenvectors(mirror: MirrorMap) -> tuple[list[Any], list[Any]]:
+    """Orthonormal vectors that the mirror keeps, and those that it negates."""
+    permutation, sign = mirror.permutation, np.asarray(mirror.sign, np.float64)
+    if np.any(permutation[permutation] != np.arange(len(sign))) or np.any(sign != sign[permutation]):
+        raise ValueError(f"a mirror is its own inverse; this map is not: {permutation.tolist()}, {sign.tolist()}")
+    unit = np.eye(len(sign))
+    even: list[Any] = []
+    odd: list[Any] = []
+    for place, other in enumerate(permutation.tolist()):
+        if other == place:
+            (even if sign[place] > 0 else odd).append(unit[place])
+        elif other > place:
+            even.append((unit[place] + sign[place] * unit[other]) / np.sqrt(2.0))
+            odd.append((unit[place] - sign[place] * unit[other]) / np.sqrt(2.0))
+    return even, odd
+
+
+class SymmetricLayers(nn.Module):
+    """Hidden layers: even and odd part of an input to sums and differences of the last layer's pairs."""
+
+    def __init__(self, even: int, odd: int, hidden: Sequence[int], activation: str) -> None:
+        """`even`, `odd`: sizes of the two parts; `hidden`: units of the layers. Raises ValueError for an odd number."""
+        super().__init__()
+        halves = [paired(size) for size in hidden]
+        self.even = nn.ModuleList(itertools.starmap(nn.Linear, itertools.pairwise([even, *halves])))
+        self.odd = nn.ModuleList(nn.Linear(*sizes, bias=False) for sizes in itertools.pairwise([odd, *halves]))
+        self.activation = PairedActivation(activation)
+
+    def forward(self, even: Tensor, odd: Tensor) -> Parts:
+        for keep, negate in zip(self.even, self.odd, strict=True):
+            even, odd = self.activation(keep(even), negate(odd))
+        return even, odd
+
+    def initialize(self, gain: float) -> None:
+        """Orthogonal weights in the orthonormal basis of the pairs, as a dense layer would have; no bias."""
+        for layers in (self.even, self.odd):
+            for place, layer in enumerate(layers):
+                assert isinstance(layer, nn.Linear)
+                nn.init.orthogonal_(layer.weight, gain / (2.0 if place else np.sqrt(2.0)))
+                if layer.bias is not None:
+                    nn.init.zeros_(layer.bias)
+
+
+class SymmetricHead(nn.Module):
+    """A linear layer from sums and differences to an output with a mirror of its own."""
+
+    def __init__(self, units: int, mirror: MirrorMap) -> None:
+        """`units`: of the layer before, an even number."""
+        super().__init__()
+        self.basis = MirrorBasis(mirror)
+        self.even = nn.Linear(paired(units), self.basis.even) if self.basis.even else None
+        self.odd = nn.Linear(paired(units), self.basis.odd, bias=False) if self.basis.odd else None
+
+    def forward(self, sums: Tensor, differences: Tensor) -> Tensor:
+        even = sums[..., :0] if self.even is None else self.even(sums)
+        odd = differences[..., :0] if self.odd is None else self.odd(differences)
+        return self.basis.inverse(even, odd)
+
+    def initialize(self, gain: float) -> None:
+        """As `SymmetricLayers.initialize`."""
+        if self.even is not None:
+            nn.init.orthogonal_(self.even.weight, gain / np.sqrt(2.0))
+            nn.init.zeros_(self.even.bias)
+        if self.odd is not None:
+            nn.init.orthogonal_(self.odd.weight, gain / np.sqrt(2.0))
+
+
+class SymmetricMlp(Perceptron):
+    """A multilayer perceptron whose output is mirrored when its input is. It is prepared in its mirror basis."""
+
+    def __init__(self, inputs: MirrorMap, hidden: Sequence[int], outputs: MirrorMap, activation: str) -> None:
+        super().__init__()
+        self.basis = MirrorBasis(inputs)
+        self.layers = SymmetricLayers(self.basis.even, self.basis.odd, hidden, activation)
+        self.last = SymmetricHead(hidden[-1], outputs)
+
+    def prepare(self, x: Tensor) -> Tensor:
+        prepared: Tensor = self.basis(x)
+        return prepared
+
+    def hidden(self, prepared: Tensor) -> Hidden:
+        parts: Hidden = self.layers(*self.basis.split(prepared))
+        return parts
+
+    def head(self, hidden: Hidden) -> Tensor:
+        sums, differences = hidden
+        output: Tensor = self.last(sums.float(), differences.float())
+        return output
+
+    def initialize(self, gain: float, last: float) -> None:
+        self.layers.initialize(gain)
+        self.last.initialize(last)
+
+
+def paired(units: int) -> int:
+    """Pairs in a layer. Raises ValueError where a unit is left over."""
+    if units % 2:
+        raise ValueError(f"the mirror swaps hidden units in pairs, so that a layer has an even number, not {units}")
+    return units // 2
