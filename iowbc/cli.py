@@ -215,6 +215,22 @@ def bench_simulation(
     simulation(_runs(runs), recipe, scene=scene, environments=environments, workers=workers or (), others=others)
 
 
+@bench.command("train")
+def bench_training(
+    recipe: BenchRecipe = None,
+    scene: SceneName = "lift",
+    turns: Annotated[int, typer.Option(help="Updates to measure.", min=1)] = 6,
+    others: Annotated[
+        int | None, typer.Option(help="Processes of stable-baselines3; one a core, 0 leaves it out.", min=0)
+    ] = None,
+    runs: RunsFolder = None,
+) -> None:
+    """Measure how fast the teacher trains, against plain stable-baselines3; the figures go to MLflow."""
+    from iowbc.commands.bench import training
+
+    training(_runs(runs), recipe, scene=scene, turns=turns, others=others)
+
+
 @bench.command("rg")
 def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: RunsFolder = None) -> None:
     """Measure how fast the reference generator's samples are labelled, by each method; the figures go to MLflow."""

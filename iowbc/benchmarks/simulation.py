@@ -1,9 +1,7 @@
 """`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against usual vector environments."""
 
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,11 +13,11 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 from iowbc.benchmarks.bare_loop import BareLoops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.other_physics import compare
-from iowbc.benchmarks.standing_generator import write_standing_generator
+from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.task import SceneShares
-from iowbc.robot.description import load_robot, robot_folder
+from iowbc.robot.description import robot_folder
 from iowbc.task.gym.environment import Environment
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
@@ -58,7 +56,7 @@ def main(
     only = SceneShares.only(scene)
     recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
     say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
-    with _generator(rg, folder, recipe) as generator:
+    with generator_of(rg, folder, recipe) as generator:
         specification = Specification(recipe, folder, generator)
         parts = step_breakdown(Setup(specification, environments, recipe.seed), PERIODS, turns // 2 + 1)
         say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
@@ -77,17 +75,6 @@ def main(
         compared = compare(Setup(specification, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
         figures |= {f"variant_{name}": value for name, value in compared.items()}
         return figures | {f"step_{name}_ms": value for name, value in parts.items()}
-
-
-@contextmanager
-def _generator(rg: Path | None, robot: Path, recipe: Recipe) -> Iterator[Path]:
-    """The folder of a fitted reference generator, or while needed that of a stand-in."""
-    if rg is not None:
-        yield rg
-        return
-    with tempfile.TemporaryDirectory() as place:
-        write_standing_generator(Path(place), load_robot(robot), recipe.rg)
-        yield Path(place)
 
 
 def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Callable[[str], None]) -> dict[str, float]:

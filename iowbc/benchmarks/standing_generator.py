@@ -1,6 +1,9 @@
 """A reference generator that answers every command with the default posture, at the cost of a fitted one."""
 
 import itertools
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +11,9 @@ import numpy as np
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.recipe.recipe import Recipe
 from iowbc.reference.fit.network_inputs import input_names
-from iowbc.robot.description import Robot
+from iowbc.robot.description import Robot, load_robot
 
 
 def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenerator) -> None:
@@ -35,3 +39,14 @@ def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenera
     ).save(folder)
     upright, height = np.array([-1e-6, 1e-6]), np.full(2, robot.default_height)
     FeasibleMap(upright, height, height).save(folder / "feasible.npz")
+
+
+@contextmanager
+def generator_of(rg: Path | None, robot: Path, recipe: Recipe) -> Iterator[Path]:
+    """The folder of a fitted reference generator, or while needed that of a stand-in."""
+    if rg is not None:
+        yield rg
+        return
+    with tempfile.TemporaryDirectory() as place:
+        write_standing_generator(Path(place), load_robot(robot), recipe.rg)
+        yield Path(place)

@@ -27,6 +27,17 @@ def simulation(
     record_figures(runs, "bench-sim", figures)
 
 
+def training(runs: Runs, file: Path | None, *, scene: str, turns: int, others: int | None) -> None:
+    """Measure the teacher's training, of the default recipe or of one in a file. Raises `UsageError`."""
+    require_known(scene, "scene", SCENES)
+    recipe = _recipe(file)
+    require_training("bench")
+    require_writable_runs(runs)
+    from iowbc.benchmarks import training
+
+    record_figures(runs, "bench-train", training.main(recipe, scene=scene, turns=turns, others=others))
+
+
 def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
     """Measure the labelling of samples, of the default recipe or of one in a file. Raises `UsageError`."""
     recipe = _recipe(file)

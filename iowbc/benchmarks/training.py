@@ -1,0 +1,117 @@
+"""`iowbc bench train`: the teacher's training against stable-baselines3's PPO over SubprocVecEnv, turn by turn."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
+
+from iowbc.benchmarks.standing_generator import generator_of
+from iowbc.control.action import action_mirror
+from iowbc.learning.activations import ACTIVATIONS
+from iowbc.learning.teacher import TeacherTraining
+from iowbc.processes import available_cores
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.task.task import SceneShares
+from iowbc.robot.description import load_robot, robot_folder
+from iowbc.task.gym.environment import Environment
+from iowbc.task.specification import Specification
+from iowbc.task.vector.vector_env import VectorEnv
+
+PARTS = ("simulation", "inference", "learning", "rest")
+"""Of an update: waiting for the environments, acting, gradient steps with what they need, and everything else."""
+
+
+def main(
+    recipe: Recipe | None = None,
+    robot: Path | None = None,
+    *,
+    scene: str = "lift",
+    turns: int = 6,
+    others: int | None = None,
+    say: Callable[[str], None] = print,
+) -> dict[str, float]:
+    """Measures, prints a table, returns every figure by name (rates in environment steps a second, times in s).
+
+    Both trainings make updates of equally many samples, epochs and minibatches with networks of the same size, in turn.
+    Rates are those of the best turn, which other programs disturbed least; the ratio is the median over turns.
+    `others`: processes of stable-baselines3, each with one environment; by default one a core. 0 leaves it out.
+    """
+    recipe = recipe or Recipe(name="bench")
+    folder, cores = robot or robot_folder(recipe.robot), available_cores()
+    only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
+    recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
+    settings = recipe.teacher
+    samples, count = settings.environments * settings.rollout, cores if others is None else others
+    say(f"{recipe.name}: scene {scene}, networks {list(settings.hidden)}, {settings.environments} environments")
+    with generator_of(None, folder, recipe) as rg:
+        specification = Specification(recipe, folder, rg)
+        environments = VectorEnv(specification, num_envs=settings.environments, workers=cores, seed=recipe.seed)
+        mirrors = environments.layout.mirror, action_mirror(load_robot(folder))
+        other = _plain(specification, scene, count, samples) if count else None
+        try:
+            training = TeacherTraining(settings, environments, mirrors, recipe.seed, cores)
+            rows, rates, other_rates = [], [], []
+            for turn in range(turns + 1):  # the first warms up
+                begin = time.perf_counter()
+                figures = training.update()
+                rate = samples / (time.perf_counter() - begin)
+                other_rate = _other_rate(other) if other is not None else np.nan
+                if turn:
+                    rates.append(rate)
+                    other_rates.append(other_rate)
+                    rows.append([figures[f"seconds/{part}"] for part in PARTS])
+        finally:
+            environments.close()
+            if other is not None:
+                other.env.close()
+    best = int(np.argmax(rates))
+    found = {"train": rates[best]} | {f"seconds_{part}": rows[best][place] for place, part in enumerate(PARTS)}
+    say(f"{'this training':34}{rates[best]:10.0f} steps/s")
+    for part, seconds in zip(PARTS, rows[best], strict=True):
+        say(f"  {part:32}{1e3 * seconds:10.0f} ms an update {100 * seconds / sum(rows[best]):6.1f} %")
+    if other is not None:
+        found |= {"sb3": max(other_rates), "ratio": float(np.median(np.divide(rates, other_rates)))}
+        say(f"{f'SB3 PPO, SubprocVecEnv of {count}':34}{found['sb3']:10.0f} steps/s")
+        say(f"this training is {found['ratio']:.1f} times as fast")
+    return found
+
+
+def _plain(given: Specification, scene: str, count: int, samples: int) -> Any:
+    """stable-baselines3's PPO as it comes, with the recipe's numbers."""
+    settings, make = given.recipe.teacher, partial(Environment, scene, given.recipe, given.robot, given.rg)
+    hidden = list(settings.hidden)
+    torch.set_num_threads(available_cores())
+    steps = max(samples // count, 2)
+    model = PPO(
+        "MlpPolicy",
+        VecNormalize(SubprocVecEnv([make] * count, start_method="forkserver"), gamma=settings.gamma),
+        learning_rate=settings.learning_rate,
+        n_steps=steps,
+        batch_size=steps * count // settings.minibatches,
+        n_epochs=settings.epochs,
+        device="cpu",
+        policy_kwargs={
+            "net_arch": {"pi": hidden, "vf": hidden},
+            "activation_fn": ACTIVATIONS[settings.activation].module,
+        },
+    )
+    model.set_logger(Logger(folder=None, output_formats=[]))
+    return model
+
+
+def _other_rate(model: Any) -> float:
+    """Environment steps a second over one update, on all cores."""
+    samples = model.n_steps * model.n_envs
+    torch.set_num_threads(available_cores())
+    begin = time.perf_counter()
+    model.learn(samples, log_interval=None, reset_num_timesteps=False)
+    spent = time.perf_counter() - begin
+    torch.set_num_threads(1)
+    return float(samples / spent)

@@ -1,0 +1,19 @@
+"""The benchmark of training measures both trainings and says where the time goes."""
+
+import math
+
+from iowbc.benchmarks import training
+from iowbc.recipe.recipe import Recipe
+
+
+def test_the_benchmark_compares_both_trainings_and_splits_an_update() -> None:
+    teacher = {"environments": 4, "rollout": 8, "minibatches": 2, "epochs": 1, "hidden": [16, 8]}
+    lines: list[str] = []
+    figures = training.main(
+        Recipe.model_validate({"name": "small", "teacher": teacher}), turns=1, others=1, say=lines.append
+    )
+    split = [figures[f"seconds_{part}"] for part in training.PARTS]
+    assert all(seconds > 0.0 for seconds in split)
+    assert math.isclose(sum(split), 32 / figures["train"], rel_tol=0.2)
+    assert math.isclose(figures["ratio"], figures["train"] / figures["sb3"], rel_tol=1e-6)
+    assert lines[-1].endswith("times as fast")
