@@ -1,10 +1,11 @@
-"""The gait clock φ_t: when it runs, which foot should be on the ground, and the swing it adds to the reference."""
+"""The gait clock φ_t: when it runs, and which foot should be on the ground."""
+
+from typing import Any
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.joint_references import GaitPrior
-from iowbc.robot.description import Robot
 from iowbc.robot.mirror import in_place
 
 phase_mirror = in_place(-1.0, -1.0)
@@ -18,11 +19,13 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     return moving
 
 
-def foot_phase(phase: Array) -> Array:
-    """Phase of the left and the right foot, half a stride apart; (n,) to (n, 2), each in [0, 1)."""
-    both = np.empty((len(phase), 2))
-    both[:, 0] = phase
-    both[:, 1] = np.mod(phase + 0.5, 1.0)
+def foot_phase(xp: Any, phase: Array) -> Array:
+    """Phase of the left and the right foot, half a stride apart; (n,) to (n, 2), each in [0, 1).
+
+    In NumPy or in torch, whichever `xp` is.
+    """
+    other = phase + 0.5
+    both: Array = xp.stack([phase, other - xp.floor(other)], -1)
     return both
 
 
@@ -48,26 +51,16 @@ def swing_progress(foot_phase: Array, stance: float) -> Array:
     return progress
 
 
+def swing_height(xp: Any, foot_phase: Array, gait: GaitPrior) -> Array:
+    """Height of the soles above the ground, clearance·sin(π·progress), (n, 2) [m]; in NumPy or in torch."""
+    height: Array = gait.swing_clearance * xp.sin(np.pi * swing_progress(foot_phase, gait.stance))
+    return height
+
+
 def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
     """Which feet should be on the ground, (n, 2); both while the clock rests."""
     down: Mask = (foot_phase < stance) | ~stepping[:, None]
     return down
-
-
-def swing_amplitude(robot: Robot, gait: GaitPrior) -> Array:
-    """What the swing of each foot adds at most to each support joint, (2, support joints) [rad]; zero when off."""
-    amplitude = np.zeros((2, len(robot.support)))
-    if gait.enabled:
-        for foot, joints in enumerate(robot.leg_pitch):
-            amplitude[foot, joints] = gait.hip_pitch, gait.knee, gait.ankle_pitch
-    return amplitude
-
-
-def swing_prior(phase: Array, stepping: Mask, stance: float, amplitude: Array) -> Array:
-    """What the gait prior adds to θ_S_ref, (n, support joints) [rad]: amplitude · sin(π·progress); zero at rest."""
-    bump = np.sin(np.pi * swing_progress(foot_phase(phase), stance)) * stepping[:, None]
-    added: Array = bump @ amplitude
-    return added
 
 
 def phase_signal(phase: Array, stepping: Mask) -> Array:

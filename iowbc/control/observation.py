@@ -14,7 +14,7 @@ from iowbc.control.gait import phase_mirror
 from iowbc.control.layout import Layout, Part
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
-from iowbc.robot.mirror import axial_vector, joint_mirror, polar_vector, support_mirror
+from iowbc.robot.mirror import axial_vector, interaction_mirror, joint_mirror, polar_vector, support_mirror
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,8 @@ class Sensed:
     """a_{t−1}, (n, support joints)."""
     support_reference: Array
     """θ_S_ref with the gait prior, (n, support joints) [rad]."""
+    arm_reference: Array
+    """θ_I_ref, (n, arm joints) [rad]."""
 
 
 def _measured(name: str) -> Callable[[Sensed], Any]:
@@ -60,6 +62,7 @@ PROPRIOCEPTION: tuple[Part[Sensed], ...] = (
     Part("phase", phase_mirror, "1", "-", lambda s: s.phase),
     Part("last_action", support_mirror, "action", "joint", lambda s: s.last_action),
     Part("support_reference", support_mirror, "rad", "joint", lambda s: s.support_reference),
+    Part("arm_reference", interaction_mirror, "rad", "joint", lambda s: s.arm_reference),
 )
 """Parts of s_t without the object, in order. Units are SI; scaling is the business of the learner's normalisation."""
 OBJECT: tuple[Part[Sensed], ...] = (

@@ -6,12 +6,11 @@ Pure arrays over n environments; the deployed controller uses it too.
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.arrays import Array
-from iowbc.control import gait
+from iowbc.arrays import Array, Mask
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import VECTOR_SIGN
@@ -41,7 +40,7 @@ class ReferenceLayer:
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
         self.waist, self._waist_pitch = robot.waist, robot.waist_pitch
-        self._stance, self._amplitude = references.gait.stance, gait.swing_amplitude(robot, references.gait)
+        self._stride = Stride.of(robot, references.gait)
 
     def clamp(self, command: Array) -> Array:
         """The command with height and torso pitch brought into the feasible map; (n, 11)."""
@@ -87,10 +86,11 @@ class ReferenceLayer:
         base[:, :2] = command[:, HEIGHT : PITCH + 1]
         return self.network(arms, base)
 
-    def with_swing(self, support: Array, phase: Array, stepping: NDArray[np.bool_]) -> Array:
-        """θ_S_ref with what the gait prior adds to it, (n, support joints) [rad]."""
-        swung: Array = support + gait.swing_prior(phase, stepping, self._stance, self._amplitude)
-        return swung
+    def with_stride(self, support: Array, command: Array, phase: Array, stepping: Mask) -> Array:
+        """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]."""
+        if self._stride is None:
+            return support
+        return self._stride(np, support, self.start_pitch(support, command), command, phase, stepping.astype(float))
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""
@@ -98,7 +98,7 @@ class ReferenceLayer:
         return pitch
 
     def start_pitch(self, support: Array, command: Array) -> Array:
-        """Pelvis pitch in which an episode begins, (n,) [rad]: the default posture has its feet flat at zero."""
+        """Pelvis pitch at which the feet of a posture are flat, (n,) [rad]: zero for the default posture."""
         return np.zeros(len(command)) if self.network is None else self.pelvis_pitch(support, command)
 
     def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:

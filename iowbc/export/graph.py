@@ -11,16 +11,14 @@ import torch
 from torch import Tensor, nn
 
 from iowbc.control.command import COMMAND, HEIGHT, PITCH
-from iowbc.control.gait import swing_amplitude
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.observation import OBJECT, PROPRIOCEPTION, ObservationLayout, Sensed
 from iowbc.control.sensors import Measured, quantities
+from iowbc.control.stride import Stride
 from iowbc.learning.activations import ACTIVATIONS
 from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.description import Robot
-
-HALF_STRIDE = 0.5
 
 
 @dataclass(frozen=True)
@@ -70,24 +68,23 @@ class ReferenceModule(nn.Module):
 
 
 class GaitModule(nn.Module):
-    """The swing that the gait prior adds to θ_S_ref, and the phase signal of the observation."""
-
-    amplitude: Tensor
+    """The stride that the gait prior adds to θ_S_ref, and the phase signal of the observation."""
 
     def __init__(self, gait: GaitPrior, robot: Robot) -> None:
         super().__init__()
-        self.stance = gait.stance
-        self.register_buffer("amplitude", _tensor(swing_amplitude(robot, gait)))
+        stride = Stride.of(robot, gait)
+        self.stride = None if stride is None else stride.converted(_tensor)
 
-    def forward(self, gait: Tensor) -> tuple[Tensor, Tensor]:
-        """gait: φ in [0, 1), and 1 while the clock runs, (n, 2). Returns swing (n, 15) [rad] and signal (n, 2)."""
-        phase, stepping = gait[:, :1], gait[:, 1:]
-        shifted = phase + HALF_STRIDE
-        feet = torch.cat([phase, shifted - torch.floor(shifted)], dim=1)
-        progress = torch.clamp((feet - self.stance) / (1.0 - self.stance), 0.0, 1.0)
-        swing = (torch.sin(torch.pi * progress) * stepping) @ self.amplitude
+    def forward(self, posture: Tensor, pelvis_pitch: Tensor, command: Tensor, gait: Tensor) -> tuple[Tensor, Tensor]:
+        """θ_S_ref (n, support joints) [rad] and phase signal (n, 2); gait: φ in [0, 1), and 1 while the clock runs."""
+        phase, stepping = gait[:, 0], gait[:, 1]
         angle = 2.0 * torch.pi * phase
-        return swing, torch.cat([torch.sin(angle), torch.cos(angle)], dim=1) * stepping
+        signal = torch.stack([torch.sin(angle), torch.cos(angle)], dim=1) * gait[:, 1:]
+        if self.stride is None:
+            return posture, signal
+        given: tuple[Any, ...] = (posture, pelvis_pitch, command, phase, stepping)
+        with_stride: Any = self.stride(torch, *given)
+        return with_stride, signal
 
 
 class ControllerGraph(nn.Module):
@@ -141,6 +138,12 @@ class ControllerGraph(nn.Module):
             for name, what in quantities(of_object).items()
         )
 
+    def _pelvis_pitch(self, posture: Tensor, command: Tensor) -> Tensor:
+        """Pitch of the pelvis in a posture of the generator; zero in the default one, whose feet are flat so."""
+        if self.reference.constant:
+            return torch.zeros_like(command[:, PITCH])
+        return command[:, PITCH] - posture[:, self.robot.waist_pitch.tolist()].sum(dim=1)
+
     def output_ports(self) -> tuple[Port, ...]:
         """Outputs, in order."""
         support = len(self.robot.support)
@@ -155,8 +158,8 @@ class ControllerGraph(nn.Module):
         """Values of the output ports for those of the input ports, in their order."""
         given = dict(zip((port.name for port in self.input_ports()), inputs, strict=True))
         command, arm_reference, history = given["command"], given["arm_reference"], given["history"]
-        swing, signal = self.gait(given["gait"])
-        support_reference = self.reference(arm_reference, command[:, HEIGHT : PITCH + 1]) + swing
+        posture = self.reference(arm_reference, command[:, HEIGHT : PITCH + 1])
+        support_reference, signal = self.gait(posture, self._pelvis_pitch(posture, command), command, given["gait"])
         measured: dict[str, Any] = {name: given[name] for name in self._measured}
         known: dict[str, Any] = {  # tensors in place of arrays: the observation's parts use operators alone
             "command": command,
@@ -164,6 +167,7 @@ class ControllerGraph(nn.Module):
             "phase": signal,
             "last_action": given["last_action"],
             "support_reference": support_reference,
+            "arm_reference": arm_reference,
         }
         sensed = Sensed(measured=Measured(**measured), **known)
         frame = torch.cat([part.value(sensed) for part in self.layout.parts], dim=1)[:, None]

@@ -36,8 +36,6 @@ class Robot:
     """Places of the joints from base to torso, in that order, among the support joints."""
     waist_pitch: Indices
     """Those of them that turn about y."""
-    leg_pitch: Indices
-    """Places of hip pitch, knee and ankle pitch among the support joints, left and right leg, shape (2, 3)."""
     kp: Array
     """Position gains [N·m/rad]."""
     kd: Array
@@ -138,9 +136,6 @@ def load_robot(folder: Path) -> Robot:
         interaction=np.array([index for index in range(len(joints)) if index not in set(support.tolist())]),
         waist=_places(waist, support, joints, source),
         waist_pitch=_places([hinge for hinge in waist if _is_pitch(hinge)], support, joints, source),
-        leg_pitch=np.stack(
-            [_leg_pitch(tree, body.name, entries["base"], support, joints, source) for body in sole_bodies]
-        ),
         kp=np.array([float(row["kp"]) for row in rows]),
         kd=np.array([float(row["kd"]) for row in rows]),
         effort=np.array([hinge.effort for hinge in hinges]),
@@ -207,17 +202,6 @@ def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...], 
     if missing:
         raise ValueError(f"{source}: support: joints of legs and waist belong to it, missing {', '.join(missing)}")
     return np.array([names.index(hinge.name) for hinge in hinges], dtype=np.int64)
-
-
-def _leg_pitch(tree: Tree, sole: str, base: str, support: Indices, joints: tuple[str, ...], source: Path) -> Indices:
-    """Places of a leg's joints about y among the support joints: hip, knee, ankle."""
-    found = [hinge for hinge in tree.hinges_between(sole, base) if _is_pitch(hinge)]
-    if len(found) != 3:
-        raise ValueError(
-            f"{source}: soles: the leg of {sole} has the joints {', '.join(hinge.name for hinge in found) or 'none'} "
-            "about y; a hip, a knee and an ankle are needed"
-        )
-    return _places(found, support, joints, source)
 
 
 def _pair(entries: Mapping[str, Any], key: str, source: Path) -> tuple[str, str]:

@@ -64,7 +64,7 @@ class Guidance:
         memory.phase[:], memory.stepping[:] = phase, stepping
         arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self._grasp, period)
         memory.arms[:], memory.posture[:] = arms, posture
-        memory.support[:] = self.references.with_swing(posture, phase, stepping)
+        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping)
 
     def turn(self, memory: Memory) -> None:
         """Turns the heading reference by the yaw rate that was commanded in the step just made."""

@@ -45,7 +45,7 @@ class Judge:
         moved = self.motion(state)
         self._filter(memory, moved)
         ending = self._ending(state, memory, moved, place)
-        foot_phase, stance = gait.foot_phase(memory.phase), self._task.references.gait.stance
+        foot_phase, stance = gait.foot_phase(np, memory.phase), self._task.references.gait.stance
         step = Step(
             state=state,
             motion=moved,
@@ -57,7 +57,7 @@ class Judge:
             filtered_velocity=memory.filtered_velocity,
             action=action,
             previous_action=memory.action,
-            swing_progress=gait.swing_progress(foot_phase, stance),
+            swing_profile=gait.swing_height(np, foot_phase, self._task.references.gait),
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),
             object_place=place,

@@ -46,6 +46,7 @@ class Observer:
             phase=gait.phase_signal(memory.phase, memory.stepping),
             last_action=memory.action,
             support_reference=memory.support,
+            arm_reference=memory.arms,
         )
         layout = self._layout
         seen = np.empty((len(moved.heading[which]), layout.size), np.float32)

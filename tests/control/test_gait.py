@@ -1,13 +1,10 @@
-"""The gait clock and the swing it adds."""
-
-from typing import Any
+"""The gait clock."""
 
 import numpy as np
 import pytest
 
 from iowbc.control import gait
 from iowbc.recipe.task.joint_references import GaitPrior
-from iowbc.robot.description import Robot
 
 PRIOR = GaitPrior(frequency=1.0, stance=0.6)
 DT = 0.02
@@ -43,33 +40,16 @@ def test_it_rests_until_it_is_told_to_move() -> None:
 
 def test_the_feet_swing_in_turn_and_both_stand_in_between() -> None:
     phases = np.linspace(0.0, 1.0, 200, endpoint=False)
-    stance = gait.expected_stance(gait.foot_phase(phases), np.ones(200, bool), 0.6)
+    stance = gait.expected_stance(gait.foot_phase(np, phases), np.ones(200, bool), 0.6)
     assert stance.mean(axis=0) == pytest.approx([0.6, 0.6], abs=0.01)
     assert stance.any(axis=1).all()
     assert stance.all(axis=1).mean() == pytest.approx(0.2, abs=0.02)
-    assert gait.expected_stance(gait.foot_phase(phases), np.zeros(200, bool), 0.6).all()
+    assert gait.expected_stance(gait.foot_phase(np, phases), np.zeros(200, bool), 0.6).all()
 
 
-def swing(robot: Robot, phase: Any, stepping: Any, prior: GaitPrior) -> Any:
-    return gait.swing_prior(phase, stepping, prior.stance, gait.swing_amplitude(robot, prior))
-
-
-def test_the_prior_bends_the_swinging_leg_alone_and_most_at_mid_swing(robot: Robot) -> None:
-    middle = 0.6 + 0.4 / 2
-    added = swing(robot, np.array([middle, middle - 0.5]), np.array([True, True]), PRIOR)
-    left, right = robot.leg_pitch
-    bend = [PRIOR.hip_pitch, PRIOR.knee, PRIOR.ankle_pitch]
-    assert added[0, left] == pytest.approx(bend)
-    assert added[1, right] == pytest.approx(bend)
-    assert not np.delete(added[0], left).any()
-    assert not np.delete(added[1], right).any()
-
-
-def test_the_prior_is_nothing_at_rest_and_when_switched_off(robot: Robot) -> None:
-    phase = np.array([0.8])
-    assert not swing(robot, phase, np.array([False]), PRIOR).any()
-    off = PRIOR.model_copy(update={"enabled": False})
-    assert not swing(robot, phase, np.array([True]), off).any()
+def test_soles_swing_along_a_half_wave() -> None:
+    height = gait.swing_height(np, np.array([[0.3, 0.6], [0.8, 0.7]]), PRIOR)
+    assert height == pytest.approx(np.array([[0.0, 0.0], [0.08, 0.08 * np.sin(np.pi / 4)]]), abs=1e-12)
 
 
 def test_the_phase_signal_is_on_the_circle_or_zero_at_rest() -> None:

@@ -29,6 +29,7 @@ def sensed(robot: Robot) -> Sensed:
         phase=random.normal(size=(ROWS, 2)),
         last_action=random.normal(size=(ROWS, support)),
         support_reference=random.normal(size=(ROWS, support)),
+        arm_reference=random.normal(size=(ROWS, len(robot.interaction))),
     )
 
 
@@ -44,6 +45,7 @@ def test_a_row_holds_the_parts_in_order(robot: Robot) -> None:
         ("phase", 2),
         ("last_action", 15),
         ("support_reference", 15),
+        ("arm_reference", 14),
         ("object_position", 3),
         ("object_orientation", 3),
         ("object_linear_velocity", 3),

@@ -10,11 +10,12 @@ import pytest
 import torch
 
 from iowbc.control import observation
-from iowbc.control.gait import phase_signal, swing_amplitude, swing_prior
+from iowbc.control.gait import phase_signal
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.layout import Part
 from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured, quantities
+from iowbc.control.stride import Stride
 from iowbc.deploy.contract import GRAPH
 from iowbc.deploy.controller import open_session
 from iowbc.export.folder import write_folder
@@ -33,6 +34,7 @@ TOLERANCE = 1e-5
 def random_inputs(graph: ControllerGraph, rows: int, seed: int = 0) -> Values:
     random = np.random.default_rng(seed)
     inputs = {port.name: random.normal(size=(rows, *port.shape)).astype(np.float32) for port in graph.input_ports()}
+    inputs["command"] *= np.float32(0.3)
     inputs["gait"] = np.stack([random.uniform(size=rows), random.integers(0, 2, rows)], axis=1).astype(np.float32)
     inputs["restart"] = random.integers(0, 2, (rows, 1)).astype(np.float32)
     if "object_quaternion" in inputs:
@@ -47,7 +49,10 @@ def expected_frame(graph: ControllerGraph, rg: Path | None, robot: Robot, inputs
     support = np.tile(robot.default_position[robot.support], (rows, 1))
     if rg is not None:
         support = ReferenceNetwork.load(rg)(inputs["arm_reference"].astype(float), inputs["command"][:, 3:5])
-    support = support + swing_prior(phase, stepping, GaitPrior().stance, swing_amplitude(robot, GaitPrior()))
+    pitch = np.zeros(rows) if rg is None else inputs["command"][:, 4] - support[:, 14]
+    stride = Stride.of(robot, GaitPrior())
+    assert stride is not None
+    support = stride(np, support, pitch, inputs["command"], phase, stepping)
     reference = np.empty((rows, 29))
     reference[:, robot.support], reference[:, robot.interaction] = support, inputs["arm_reference"]
     seen = (*quantities(of_object=False), *(quantities(of_object=True) if graph.observes_object else ()))
@@ -58,6 +63,7 @@ def expected_frame(graph: ControllerGraph, rg: Path | None, robot: Robot, inputs
         phase=phase_signal(phase, stepping),
         last_action=inputs["last_action"],
         support_reference=support,
+        arm_reference=inputs["arm_reference"],
     )
     return graph.layout.gather(sensed, np.empty((rows, graph.layout.size), np.float32))
 

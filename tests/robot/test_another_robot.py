@@ -8,12 +8,14 @@ import pytest
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.gravity import ArmGravity
+from iowbc.control.legs import leg_joints
 from iowbc.control.observation import observation_layout
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import joint_mirror
 
+KINDS = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -23,10 +25,8 @@ def test_its_branches_are_those_of_its_folder(robot_of_23: Robot) -> None:
     assert [robot.joints[robot.support[place]] for place in robot.waist] == ["waist_yaw_joint"]
     assert len(robot.waist_pitch) == 0
     assert robot.wrist_bodies == ("left_wrist_roll_link", "right_wrist_roll_link")
-    names = [[robot.joints[robot.support[place]] for place in leg] for leg in robot.leg_pitch]
-    assert names == [
-        [f"{side}_{kind}_joint" for kind in ("hip_pitch", "knee", "ankle_pitch")] for side in ("left", "right")
-    ]
+    names = [[robot.joints[robot.support[place]] for place in leg] for leg in leg_joints(robot)]
+    assert names == [[f"{side}_{kind}_joint" for kind in KINDS] for side in ("left", "right")]
     mirror = joint_mirror(robot)
     values = np.random.default_rng(0).normal(size=23)
     assert np.array_equal(mirror(mirror(values)), values)
@@ -52,7 +52,7 @@ def test_its_arms_and_their_weight_are_those_of_the_simulator(robot_of_23: Robot
 
 def test_its_observation_is_shorter(robot: Robot, robot_of_23: Robot) -> None:
     longer, layout = observation_layout(robot, True), observation_layout(robot_of_23, True)
-    assert longer.size - layout.size == 2 * 6 + 2 * 2
+    assert longer.size - layout.size == 2 * 6 + 2 * 2 + 4
     assert layout.slices["last_action"].stop - layout.slices["last_action"].start == 13
 
 

@@ -69,10 +69,10 @@ def test_contact_timing_counts_from_minus_one_to_one() -> None:
 
 
 def test_a_foot_on_its_swing_profile_scores_one_and_a_standing_foot_nothing() -> None:
-    height, progress = np.array([[0.08, 0.0]]), np.array([[0.5, 0.0]])
+    height, profile = np.array([[0.08, 0.0]]), np.array([[0.08, 0.0]])
     one, none = np.array([[True, False]]), np.array([[False, False]])
-    assert kernel(gait.swing_height(height, progress, one, 0.08), 0.04)[0] == pytest.approx([1.0, 0.0])
-    assert kernel(gait.swing_height(height, progress, none, 0.08), 0.04)[0].tolist() == [0.0, 0.0]
+    assert kernel(gait.swing_height(height, profile, one), 0.04)[0] == pytest.approx([1.0, 0.0])
+    assert kernel(gait.swing_height(height, profile, none), 0.04)[0].tolist() == [0.0, 0.0]
 
 
 def test_slipping_counts_on_the_ground_alone_and_feet_too_close_cost() -> None:

@@ -51,7 +51,7 @@ class ArmReference(Section):
 
 
 class GaitPrior(Section):
-    """The gait clock, and the swing that it adds to the support reference while a velocity is commanded."""
+    """The gait clock, and the stride that it adds to the support reference while a velocity is commanded."""
 
     enabled: bool = True
     """Off gives the paper's literal reference; the clock still runs."""
@@ -59,12 +59,17 @@ class GaitPrior(Section):
     """Strides a second [Hz]."""
     stance: float = Field(default=0.58, gt=0.5, lt=1.0)
     """Part of the stride in which a foot is on the ground; above one half both are, twice a stride."""
-    hip_pitch: float = -0.35
-    """Amplitude of the swing at the hip pitch joint [rad]; negative lifts the knee forward."""
-    knee: float = 0.7
-    """Amplitude of the swing at the knee [rad]."""
-    ankle_pitch: float = -0.35
-    """Amplitude of the swing at the ankle pitch joint [rad]; keeps the sole level."""
+    stride: float = Field(default=1.0, ge=0.0)
+    """Part of the commanded velocity and yaw rate at which standing feet travel under the pelvis: at 1 the reference
+    walks as commanded and the policy only corrects it, at 0 it steps in place."""
+    swing_clearance: float = Field(default=0.08, gt=0.0)
+    """Height of the sole at mid-swing [m]; the reward's profile is this one, too."""
+    sway: float = Field(default=0.02, ge=0.0)
+    """Amplitude of the pelvis' motion over the standing foot [m]. A pendulum of 0.7 m that steps every 0.37 s from side
+    to side between feet 0.24 m apart sways by 0.022 m."""
+    straightest_knee: float = Field(default=0.1, gt=0.0)
+    """Bend of the knee from the straight leg at which a stride ends that reaches further [rad]; nearer to the straight
+    leg, millimetres of reach are tenths of a radian."""
     moving_speed: float = Field(default=0.05, gt=0.0)
     """Commanded planar speed above which the clock runs [m/s]."""
     moving_yaw_rate: float = Field(default=0.1, gt=0.0)

@@ -67,9 +67,7 @@ class GaitConstraint(Section):
     contact_timing: float = 1.0
     """Weight of the fraction of feet whose contact is what the phase asks for, counted from −1 to 1."""
     swing_height: Kernel = Kernel(weight=1.0, width=0.04)
-    """Height of the swinging foot against the profile [m]; only while a foot swings."""
-    swing_clearance: float = Field(default=0.08, gt=0.0)
-    """Height of the sole at mid-swing [m]."""
+    """Height of the swinging foot against the gait prior's profile [m]; only while a foot swings."""
     foot_slip: float = -0.25
     """Weight of Σ |horizontal velocity|² of feet in contact [m²/s²]."""
     foot_distance: float = -5.0

@@ -12,9 +12,8 @@ def contact_timing(contact: Mask, expected: Mask) -> Array:
     return score
 
 
-def swing_height(sole_height: Array, progress: Array, swinging: Mask, clearance: float) -> Array:
-    """(z − clearance·sin(π s))² of swinging feet, infinite for others, (n, 2) [m²]; sole height z [m], progress s."""
-    profile = clearance * np.sin(np.pi * progress)
+def swing_height(sole_height: Array, profile: Array, swinging: Mask) -> Array:
+    """(z − profile)² of swinging feet, infinite for others, (n, 2) [m²]; sole height z and its profile [m]."""
     return np.where(swinging, np.square(sole_height - profile), np.inf)
 
 

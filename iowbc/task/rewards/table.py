@@ -40,8 +40,8 @@ class Step:
     """a_t, (n, 15)."""
     previous_action: Array
     """a_{t−1}, (n, 15)."""
-    swing_progress: Array
-    """(n, 2), see `gait.swing_progress`."""
+    swing_profile: Array
+    """Height at which the gait prior has the soles, (n, 2) [m]."""
     stance: Mask
     """Feet that should be on the ground, (n, 2)."""
     held: Mask
@@ -75,9 +75,7 @@ TERMS: dict[str, Term] = {
     "smooth.vertical_velocity": lambda s: smooth.vertical_velocity(s.motion.base_velocity, s.height_rate),
     "smooth.saturation": lambda s: smooth.saturation(s.state.saturation[:, s.support]),
     "gait.contact_timing": lambda s: gait.contact_timing(s.state.foot_contact, s.stance),
-    "gait.swing_height": lambda s: gait.swing_height(
-        s.state.foot_position[:, :, 2], s.swing_progress, ~s.stance, s.recipe.gait.swing_clearance
-    ),
+    "gait.swing_height": lambda s: gait.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
     "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_contact),
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
     "alive": lambda s: np.ones(len(s.command)),

@@ -1,0 +1,103 @@
+"""Where the joints of the legs are, with all of them at zero."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.robot import rotations
+from iowbc.robot.description import Robot
+from iowbc.robot.mjcf import Hinge
+
+AXES = ("y", "x", "z", "y", "y", "x")
+"""Axes of a leg's joints from the hip outward: hip pitch, roll, yaw, knee, ankle pitch, roll."""
+
+
+@dataclass(frozen=True)
+class Legs:
+    """Geometry of both legs, left and right, with all joints at zero: x forward, z up, [m]; arrays of shape (2,)."""
+
+    side: Array
+    """The sole's distance to the left of the base."""
+    hip_x: Array
+    hip_z: Array
+    """The hip pitch axis ahead of and above the base."""
+    thigh_x: Array
+    thigh_z: Array
+    """The knee from the hip pitch axis."""
+    shank_x: Array
+    shank_z: Array
+    """The ankle pitch axis from the knee."""
+    sole_x: Array
+    sole_z: Array
+    """The sole's centre from the ankle pitch axis."""
+    roll_x: Array
+    roll_z: Array
+    """The hip roll axis from the hip pitch axis."""
+    yaw_x: Array
+    yaw_z: Array
+    """The hip yaw axis from the hip pitch axis."""
+    tilt_x: Array
+    tilt_z: Array
+    """Direction of the hip yaw axis."""
+    ankle_roll_z: Array
+    """The ankle roll axis above the sole's centre."""
+
+
+def leg_joints(robot: Robot) -> list[list[int]]:
+    """Places of each leg's joints, as in `AXES`, among the support joints. Raises ValueError for other legs."""
+    names = [robot.joints[index] for index in robot.support]
+    legs = []
+    for sole in robot.sole_bodies:
+        hinges = robot.tree.hinges_between(sole, robot.base)
+        found = tuple(map(_axis, hinges))
+        if found != AXES:
+            raise ValueError(
+                f"{robot.folder}: the leg of {sole} turns about {', '.join(found)}; the gait prior is made for "
+                f"{', '.join(AXES)}: set task.references.gait.enabled to false"
+            )
+        legs.append([names.index(hinge.name) for hinge in hinges])
+    return legs
+
+
+def leg_geometry(robot: Robot) -> Legs:
+    """The legs' geometry, from the robot's description."""
+    rows = []
+    for sole_body, sole in zip(robot.sole_bodies, robot.soles, strict=True):
+        place, direction = [], []
+        position, rotation = np.zeros(3), np.eye(3)
+        for body in robot.tree.chain(sole_body, robot.base):
+            position = position + rotation @ body.position
+            rotation = rotation @ rotations.matrix(body.quaternion)
+            if body.hinge is not None:
+                place.append(position)
+                direction.append(rotation @ body.hinge.axis)
+        end = robot.tree.forward(dict.fromkeys(robot.joints, 0.0), robot.base, sole)[0]
+        hip, roll, yaw, knee, ankle, ankle_roll = place
+        rows.append(
+            Legs(
+                side=end[1],
+                hip_x=hip[0],
+                hip_z=hip[2],
+                thigh_x=(knee - hip)[0],
+                thigh_z=(knee - hip)[2],
+                shank_x=(ankle - knee)[0],
+                shank_z=(ankle - knee)[2],
+                sole_x=(end - ankle)[0],
+                sole_z=(end - ankle)[2],
+                roll_x=(roll - hip)[0],
+                roll_z=(roll - hip)[2],
+                yaw_x=(yaw - hip)[0],
+                yaw_z=(yaw - hip)[2],
+                tilt_x=direction[2][0],
+                tilt_z=direction[2][2],
+                ankle_roll_z=(ankle_roll - end)[2],
+            )
+        )
+    return Legs(**{field.name: np.array([getattr(row, field.name) for row in rows]) for field in fields(Legs)})
+
+
+def _axis(hinge: Hinge) -> str:
+    """The coordinate axis about which a hinge turns, or its direction where it is none."""
+    found = [name for name, unit in zip("xyz", np.eye(3), strict=True) if np.array_equal(hinge.axis, unit)]
+    return found[0] if found else f"({', '.join(f'{value:g}' for value in hinge.axis)})"
