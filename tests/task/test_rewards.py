@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from task_worlds import QUIET, changed, rollout
+from changes import changed
+from task_worlds import QUIET, rollout
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.reward import Kernel, Reward, Smoothness
