@@ -68,6 +68,8 @@ class Simulation:
         self.state.has_object[:] = [model.object is not None for model in models]
         self.target = np.tile(robot.default_position, (n, 1))
         self.feed = np.zeros((n, 3))
+        self.planned_push = np.zeros((n, 3))
+        """Force on the base in the period to come beside the drawn pushes, world frame, (n, 3) [N]."""
         self._partner = partner.Partner(recipe.partner, models, self.period)
         self._sensing = Sensing(
             recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency
@@ -175,6 +177,7 @@ class Simulation:
         self._hand_over(wrench)
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
+        np.add(state.push_force, self.planned_push, out=state.push_force)
         self._targets.push(self.target)
         target = self._targets.read()
         self.clock += 1

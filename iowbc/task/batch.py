@@ -19,8 +19,9 @@ from iowbc.task.layout import full_layout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.observer import EVERY, Observer
+from iowbc.task.planned_pushes import PlannedPushes
 from iowbc.task.record.divergences import keep_divergences
-from iowbc.task.record.recorder import count_endings, count_step, write_signals
+from iowbc.task.record.recorder import count_endings, count_step, write_signals, write_trial_signals
 from iowbc.task.schedule import Schedule
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers
@@ -75,6 +76,7 @@ class Batch:
             period=period,
         )
         self.judge = Judge(recipe, as_slice(self.robot.support), self._holding, period)
+        self._pushes = PlannedPushes(schedule.pushes, period)
         self.observer = Observer(self.robot, self.layout, n)
         self._bound, self._divergences = task.action.bound, divergences
 
@@ -114,11 +116,15 @@ class Batch:
         action = self.buffers["action"].astype(np.float64).clip(-self._bound, self._bound)
         simulation.target[:] = self.targets(action)
         simulation.feed[:] = memory.command[:, VELOCITY]
+        if self._pushes.any:
+            simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)
         simulation.step()
         memory.steps += 1
         self.guidance.turn(memory)
         judgement = self.judge.judge(simulation.state, memory, action, self.guidance.object_place(memory))
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
+        if self._schedule.repeats:
+            write_trial_signals(self.buffers, simulation.state)
         memory.action[:] = action
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)

@@ -1,10 +1,22 @@
 """One planned episode: scene, seed, what is held fixed, and the commands it plays."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from iowbc.task.commands.script import CommandScript
+
+
+@dataclass(frozen=True)
+class PlannedPush:
+    """A push on the base at a set time."""
+
+    time: float
+    """When it begins [s]."""
+    duration: float
+    """Time over which it acts, as a constant force [s]."""
+    impulse: tuple[float, float]
+    """Forward and to the left of the commanded heading [N·s]."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +33,8 @@ class Episode:
     """Randomised quantities held at a value, by name."""
     script: CommandScript | None = None
     """The commands; without, they are drawn as in training."""
+    push: PlannedPush | None = None
+    """A push on the base beside those that are drawn."""
 
     def __post_init__(self) -> None:
         if self.duration <= 0.0:
@@ -36,11 +50,13 @@ class Episode:
             "duration": self.duration,
             "fixed": dict(self.fixed),
             "script": None if self.script is None else self.script.as_json(),
+            "push": None if self.push is None else asdict(self.push),
         }
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "Episode":
         """Inverse of `as_json`."""
+        push = values["push"]
         script = None if values["script"] is None else CommandScript.from_json(values["script"])
         return cls(
             scene=str(values["scene"]),
@@ -48,4 +64,5 @@ class Episode:
             duration=float(values["duration"]),
             fixed={str(name): float(value) for name, value in values["fixed"].items()},
             script=script,
+            push=None if push is None else PlannedPush(push["time"], push["duration"], tuple(push["impulse"])),
         )

@@ -11,7 +11,7 @@ from iowbc.recipe.task.task import Task
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty, initial_level, next_level
 from iowbc.task.endings import Ending
-from iowbc.task.episodes import Episode
+from iowbc.task.episodes import Episode, PlannedPush
 from iowbc.task.memory import Memory
 
 
@@ -53,6 +53,11 @@ class Schedule:
     def scripts(self) -> list[CommandScript | None]:
         """Script of each environment, if it has one."""
         return [None] * len(self.key) if self._trials is None else [episode.script for episode in self._trials]
+
+    @property
+    def pushes(self) -> list[PlannedPush | None]:
+        """The push planned for each environment, if there is one."""
+        return [None] * len(self.key) if self._trials is None else [episode.push for episode in self._trials]
 
     @property
     def repeats(self) -> bool:

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from changes import changed
-from task_worlds import QUIET, rollout
+from task_worlds import QUIET, changed, rollout
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.reward import Kernel, Reward, Smoothness

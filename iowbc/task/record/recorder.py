@@ -13,6 +13,8 @@ from iowbc.task.rewards import smooth
 from iowbc.task.rewards.reward import Scored
 from iowbc.task.vector.shared import Buffers
 
+TORSO_CENTRE = 0.25
+"""Height of the point whose motion is recorded as the torso's, above the pelvis along the torso [m]."""
 COLUMN = {name: index for index, name in enumerate(COUNTERS)}
 
 
@@ -46,6 +48,22 @@ def write_signals(
     buffers["signal/partner_force"][:] = state.partner_force
     buffers["signal/base_position"][:] = state.base_position
     buffers["signal/foot_contact"][:] = state.foot_contact
+
+
+def write_trial_signals(buffers: Buffers, state: SimulationState) -> None:
+    """The signals that only planned episodes have; see `iowbc.task.record.signals.TRIAL_SIGNALS`."""
+    n = len(state.base_position)
+    values = {
+        "torso_position": state.base_position + TORSO_CENTRE * state.torso_rotation[:, :, 2],
+        "object_position": state.object_position,
+        "foot_position": state.foot_position.reshape(n, -1),
+        "foot_velocity": state.foot_velocity.reshape(n, -1),
+        "foot_load": state.foot_force[:, :, 2],
+        "joint_torque": state.joint_torque,
+        "joint_saturation": state.saturation,
+    }
+    for name, columns in values.items():
+        buffers[f"signal/{name}"][:] = columns
 
 
 def count_step(buffers: Buffers, scored: Scored) -> None:

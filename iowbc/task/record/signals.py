@@ -1,8 +1,12 @@
 """The signals and counters that an environment batch leaves for its parent each step."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from iowbc.task.rewards.table import TERMS
 from iowbc.task.vector.shared import Fields
 
+NO_SIGNALS: Mapping[str, int] = MappingProxyType({})
 SIGNALS = {
     "system_velocity": 3,
     "commanded_velocity": 3,
@@ -32,14 +36,31 @@ speaks of [m], saturated fraction of all joints, forces of left and right grip a
 [N], flags, base position in the world frame [m], power [W], gait phase in [0, 1), feet in contact, curriculum level,
 time in the episode [s]."""
 
+TRIAL_SIGNALS = {
+    "torso_position": 3,
+    "object_position": 3,
+    "foot_position": 6,
+    "foot_velocity": 6,
+    "foot_load": 2,
+}
+"""Further signals of planned episodes, world frame: a point in the torso, the object (zero without one), left and right
+sole centre [m], their velocities [m/s], the ground's vertical force on each foot [N]."""
+JOINT_SIGNALS = ("joint_torque", "joint_saturation")
+"""Signals of planned episodes with a value a joint: torque [N·m], whether it is at its limit."""
+
 REASONS = ("fallen", "dropped", "time_limit", "diverged")
 """Why an episode ended."""
 COUNTERS = ("steps", "tracking", "episodes", "length", "return", *REASONS)
 """Columns of the statistics: sums since they were last read. Length in steps."""
 
 
-def buffer_fields(observation: int, action: int) -> Fields:
-    """Everything that passes between a batch and its parent."""
+def trial_signals(joints: int) -> dict[str, int]:
+    """The signals that only planned episodes have, with their sizes."""
+    return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints)
+
+
+def buffer_fields(observation: int, action: int, extra: Mapping[str, int] = NO_SIGNALS) -> Fields:
+    """Everything that passes between a batch and its parent; `extra`: signals beside the usual ones, with sizes."""
     return {
         "action": ((action,), "float32"),
         "observation": ((observation,), "float32"),
@@ -51,5 +72,5 @@ def buffer_fields(observation: int, action: int) -> Fields:
         "episode_length": ((), "int64"),
         "counters": ((len(COUNTERS),), "float64"),
         "terms": ((len(TERMS),), "float64"),
-        **{f"signal/{name}": ((size,), "float64") for name, size in SIGNALS.items()},
+        **{f"signal/{name}": ((size,), "float64") for name, size in (SIGNALS | dict(extra)).items()},
     }

@@ -12,7 +12,7 @@ from iowbc.robot.description import load_robot
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
-from iowbc.task.record.signals import buffer_fields
+from iowbc.task.record.signals import buffer_fields, trial_signals
 from iowbc.task.scenes import scene_of
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
@@ -47,7 +47,8 @@ class Setup:
     def buffer_fields(self) -> Fields:
         """What passes between the environments and the learner."""
         robot = load_robot(self.specification.robot)
-        return buffer_fields(full_layout(self.specification.recipe, robot).size, len(robot.support))
+        extra = {} if self.episodes is None else trial_signals(len(robot.joints))
+        return buffer_fields(full_layout(self.specification.recipe, robot).size, len(robot.support), extra)
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""

@@ -56,9 +56,15 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         self._scenes = self.setup.scenes
         self.workers: Workers = WorkerProcesses(self.setup, workers, patience) if workers else InProcess(self.setup)
         self._buffers = self.workers.buffers
-        self.signals: dict[str, Array] = {name: self._buffers[f"signal/{name}"] for name in SIGNALS}
+        self.signals: dict[str, Array] = {
+            name.removeprefix("signal/"): values
+            for name, values in self._buffers.arrays.items()
+            if name.startswith("signal/")
+        }
         """Values of the last step, before an automatic reset, (num_envs, k); see `iowbc.task.record.signals`."""
-        self._statistics = Statistics(1.0 / recipe.task.control_frequency)
+        self.period = 1.0 / recipe.task.control_frequency
+        """Time of a control step [s]."""
+        self._statistics = Statistics(self.period)
         self._began = time.monotonic()
         bound, actions = recipe.task.action.bound, self._buffers["action"].shape[1]
         super().__init__(
