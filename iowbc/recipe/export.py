@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.evaluation import Segment
+from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.section import COSMETIC, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 from pydantic import Field, field_validator
 
 from iowbc.recipe.distillation import Distillation
-from iowbc.recipe.evaluation import Evaluation
+from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator

@@ -148,10 +148,10 @@ def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -
 
 
 def test_an_override_reaches_into_a_list_that_is_a_default(tmp_path: Path) -> None:
-    before = loaded(tmp_path, "seed: 1\n").recipe.eval.sequence
-    after = loaded(tmp_path, "seed: 1\n", "eval.sequence.1.duration=1.25").recipe.eval.sequence
-    assert after[1].duration == 1.25
-    assert after[:1] + after[2:] == before[:1] + before[2:]
+    acceptance = loaded(tmp_path, "seed: 1\n", "export.acceptance.sequence.0.duration=1.25").recipe.export.acceptance
+    assert acceptance is not None
+    (segment,) = acceptance.sequence
+    assert (segment.duration, segment.ramp) == (1.25, 0.0)
 
 
 def test_a_wrong_override_is_told_like_a_wrong_line(tmp_path: Path) -> None:

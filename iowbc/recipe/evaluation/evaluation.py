@@ -1,0 +1,75 @@
+"""What is evaluated: the suites of trials, their world, and what counts as success."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.success import Success
+from iowbc.recipe.evaluation.suites import HeavyCase, Robustness, Stagnation, Sweep
+from iowbc.recipe.evaluation.video import Video
+from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.simulation.simulation import Simulation
+
+
+class Evaluation(Section):
+    """Trials of the trained policy."""
+
+    policy: Literal["student", "teacher"] = "student"
+    """Which network acts: the deployable student, or the teacher with its privileged observation."""
+    label: str = Field(default="IO-WBC", min_length=1, json_schema_extra=COSMETIC)
+    """Name of the variant in tables and figures; the paper's are IO-WBC, WBC, w/o RG, w/o Distill."""
+    trials: int = Field(default=5, ge=1)
+    """Trials per mass; trial k of every mass and variant has the same seed."""
+    seed: int = Field(default=1000, ge=0)
+    """Seed of the first trial; apart from the seed of training, so that no trial was met there."""
+    sequence: tuple[Segment, ...] = ()
+    """Commands of every sweep and case that has none of its own, in order; their durations add up to the trial's.
+    Empty takes that of lifting or pushing."""
+    simulation: Simulation | None = None
+    """The world of all trials; empty is the training's. Pinned (`{}` to the default), variants that were trained
+    in other worlds meet the same trials."""
+    batch: int = Field(default=64, ge=1)
+    """Trials played at once, over all workers. A policy computes in the shape of a whole batch, so that a trial is the
+    same bit for bit when it is played again alone; another size rounds differently."""
+    foot_load: float = Field(default=50.0, gt=0)
+    """Vertical force from which a foot counts as loaded when its sliding is measured [N]; 15 % of the weight."""
+    lifting: Sweep | None = Sweep()
+    """Masses lifted (paper's Table II); empty leaves the sweep out."""
+    pushing: Sweep | None = None
+    """Masses pushed (paper's Table III), with a rolling resistance; empty leaves the sweep out."""
+    heavy: tuple[HeavyCase, ...] = ()
+    """The paper's heavy tasks: 7 kg box, 18 kg tyre, 65 kg crate with a partner."""
+    stagnation: Stagnation | None = None
+    """Pushes that cannot succeed; empty leaves the suite out."""
+    robustness: Robustness | None = None
+    """Conditions harder than the paper's; empty leaves the suite out."""
+    disturbances: bool = False
+    """Keep the impulses on the object and the pushes on the base during trials."""
+    success: Success = Success()
+    """When a trial counts as survived."""
+    video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
+    """Short films of trials."""
+
+    @model_validator(mode="after")
+    def _cases_told_apart(self) -> Self:
+        suites = {
+            "heavy": self.heavy,
+            "stagnation": () if self.stagnation is None else self.stagnation.cases,
+            "robustness": () if self.robustness is None else self.robustness.cases,
+        }
+        for suite, cases in suites.items():
+            names = [case.name for case in cases]
+            repeated = sorted({name for name in names if names.count(name) > 1})
+            if repeated:
+                raise ValueError(f"{suite}: {', '.join(repeated)} is the name of more than one case; give each its own")
+        return self
+
+    @model_validator(mode="after")
+    def _something_to_do(self) -> Self:
+        if not (self.lifting or self.pushing or self.heavy or self.stagnation or self.robustness):
+            raise ValueError(
+                "nothing to evaluate: give lifting, pushing, heavy, stagnation or robustness, "
+                "or leave eval out of the stages"
+            )
+        return self
