@@ -93,15 +93,6 @@ def plan(
     print_plan(_request(recipe, overrides, until, force, None, on_code_change, runs), STAGES, _console())
 
 
-@app.command()
-def publish(recipe: RecipeFile, overrides: Overrides = None, until: Until = None, runs: RunsFolder = None) -> None:
-    """Put a recipe's finished artifacts into the repository (runs/published): a fresh clone starts from them."""
-    from iowbc.commands.publish import publish_recipe
-    from iowbc.stages.registry import STAGES
-
-    publish_recipe(_request(recipe, overrides, until, None, None, "report", runs), STAGES, _console())
-
-
 def _request(
     recipe: Path,
     overrides: list[str] | None,
@@ -200,8 +191,7 @@ def play(
     runs: RunsFolder = None,
 ) -> None:
     """Watch a trained policy in the viewer, or make a film of it."""
-    from iowbc.commands.play import play_word
-    from iowbc.evaluation.play_request import PlayRequest
+    from iowbc.commands.play import PlayRequest, play_word
 
     request = PlayRequest(
         scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video

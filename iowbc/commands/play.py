@@ -8,10 +8,9 @@ from rich.console import Console
 from iowbc.commands.named import named
 from iowbc.commands.training import require_training
 from iowbc.errors import Damaged, Interrupted, UsageError
-from iowbc.evaluation.play_request import PlayRequest
-from iowbc.pipeline.store.artifact import Artifact
+from iowbc.evaluation.play_request import PlayRequest as PlayRequest
 from iowbc.pipeline.store.last_used import remaking
-from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.store import Artifact, Store
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
@@ -64,7 +63,7 @@ def playable(store: Store, word: str, stage: str | None) -> Artifact:
 def _check_whole(store: Store, artifact: Artifact) -> None:
     """Raises `UsageError` where a file of an artifact is not what was published."""
     try:
-        artifact.verify()
+        store.verify(artifact)
     except Damaged as error:
         raise UsageError(
             f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact)}"
@@ -90,7 +89,9 @@ def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     from iowbc.evaluation.play import Source
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
+    from iowbc.task.specification import Specification
 
     recipe = Recipe.model_validate(artifact.recipe)
     folder = robot_folder(recipe.robot)
-    return Source(recipe, folder, generator.folder if generator is not None else None, artifact.folder)
+    world = Specification(recipe, folder, generator.folder if generator is not None else None)
+    return Source(world, artifact.folder)

@@ -15,8 +15,7 @@ from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import replayed
-from iowbc.recipe.evaluation import Video
-from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.evaluation.video import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -27,6 +26,8 @@ QUALITY = 7
 """Of imageio-ffmpeg, 0 to 10; 20 s of 640 x 480 take about 2 MB."""
 LINES_PER_FRAME = 26
 """Height of the text: this many lines would fill the frame."""
+UNSEEN = ("robustness", "pushes")
+"""Kinds of trials that look like others, and are not filmed."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
 
@@ -74,9 +75,9 @@ class Film:
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
     """The trials to film, with names: the first trial of up to `count` masses, spread over those with an object.
 
-    Without any object, over what there is. A single film is of the middle mass.
+    Without any object, over what there is. A single film is of the middle mass. Of the robustness suite nothing.
     """
-    first = trials[trials["trial"] == 0]
+    first = trials[(trials["trial"] == 0) & ~trials["kind"].isin(UNSEEN)]
     first = first[first["mass"] > 0] if (first["mass"] > 0).any() else first
     ends = (0, len(first) - 1) if count > 1 else ((len(first) - 1) // 2,) * 2
     places = np.linspace(*ends, min(count, len(first))).round().astype(int)
@@ -90,6 +91,11 @@ def command_line(signals: dict[str, Any], seconds: float) -> str:
     height, pitch = float(signals["height_command"][0, 0]), float(signals["torso_pitch_command"][0, 0])
     walk = f"v {forward:+.2f} {left:+.2f} m/s, turn {turn:+.2f} rad/s"
     return f"{seconds:4.1f} s   {walk}   H {height:.2f} m, pitch {pitch:+.2f} rad"
+
+
+def film_title(row: "pd.Series[Any]") -> str:
+    """Variant, case, mass and number of a trial."""
+    return f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
 
 
 class EpisodeFilm:
@@ -128,19 +134,16 @@ class EpisodeFilm:
 
 
 def film_trial(
-    recipe: Recipe,
-    robot: Path,
-    rg: Path | None,
+    world: Specification,
     policy: Acting,
     row: "pd.Series[Any]",
     path: Path,
     interrupted: Callable[[], bool] = lambda: False,
 ) -> Outcome:
     """Play the trial in a row of `trials.parquet` again and film it. Raises Interrupted when interrupted."""
-    environment = VectorEnv(Specification(recipe, robot, rg), num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
-    title = [f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"]
+    environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     try:
-        with EpisodeFilm(environment, path, recipe.eval.video, title) as film:
-            return play_in(environment, recipe, in_batch(policy, row), interrupted, look=film.look)[0]
+        with EpisodeFilm(environment, path, world.recipe.eval.video, [film_title(row)]) as film:
+            return play_in(environment, in_batch(policy, row), interrupted, look=film.look)[0]
     finally:
         environment.close()

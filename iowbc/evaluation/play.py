@@ -13,7 +13,7 @@ from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.films import EpisodeFilm
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.outcome import Outcome
-from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, trials_at
+from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.viewer import play_in_viewer, require_display
 from iowbc.learning.acting import load_policy
@@ -27,19 +27,13 @@ from iowbc.task.vector.vector_env import VectorEnv
 class Source:
     """What is played: a policy, and the world that its recipe describes."""
 
-    recipe: Recipe
-    robot: Path
-    """The robot's folder."""
-    rg: Path | None
-    """Artifact of `rg-fit`, or the generator in an exported folder; None without a reference generator."""
+    world: Specification
     policy: Path
     """Artifact of `teacher` or `distill`, or an exported folder."""
 
     def environment(self, episode: Episode) -> VectorEnv:
         """One environment, in this process, that plays an episode."""
-        return VectorEnv(
-            Specification(self.recipe, self.robot, self.rg), num_envs=1, workers=0, seed=0, episodes=(episode,)
-        )
+        return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
 
 
 def exported_source(folder: Path) -> Source:
@@ -51,7 +45,8 @@ def exported_source(folder: Path) -> Source:
     except (FileNotFoundError, ValidationError) as error:
         raise ContractBroken(f"{path}: missing or not a recipe of this version: {error}; export again") from error
     generator = folder / contract.GENERATOR
-    return Source(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None, folder)
+    world = Specification(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None)
+    return Source(world, folder)
 
 
 @dataclass(frozen=True)
@@ -70,18 +65,19 @@ def play(source: Source, request: PlayRequest, interrupted: Callable[[], bool] =
 
     Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
     """
-    recipe, episode = source.recipe, requested_episode(source.recipe, request)
+    recipe = source.world.recipe
+    episode = requested_episode(recipe, request)
     if request.video is None:
         require_display()
     environment = source.environment(episode)
     try:
         policy = open_policy(source.policy, environment)
         if request.video is None:
-            return Shown(play_in_viewer(environment, recipe, policy, interrupted), episode.duration, 0)
+            return Shown(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
         with EpisodeFilm(environment, request.video, settings, title) as film:
-            outcome = play_in(environment, recipe, policy, interrupted, look=film.look)[0]
+            outcome = play_in(environment, policy, interrupted, look=film.look)[0]
         return Shown(outcome, episode.duration, film.frames)
     finally:
         environment.close()
@@ -89,13 +85,11 @@ def play(source: Source, request: PlayRequest, interrupted: Callable[[], bool] =
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
     """The episode that a request describes."""
-    script = command_script(request.sequence or recipe.eval.sequence, recipe.task.commands)
+    script = command_script(sequence_for(recipe, request.scene, request.sequence), recipe.task.commands)
     fixed = {} if request.disturbances else dict(UNDISTURBED)
     if request.partner_share is not None:
         fixed["partner_share"] = request.partner_share
-    return trials_at("play", request.scene, request.object_mass, script, count=1, seed=request.seed, fixed=fixed)[
-        0
-    ].episode
+    return Condition(request.scene, script, fixed).episode(request.object_mass, request.seed)
 
 
 def open_policy(folder: Path, environment: VectorEnv) -> Acting:

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import UsageError, require_known
-from iowbc.recipe.evaluation import Segment, Video
+from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.simulation.holding import FREE, SCENES
 
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from iowbc.errors import Interrupted, NoDisplay
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.recipe.recipe import Recipe
 from iowbc.sim.rendering.appearance import Appearance
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -21,7 +20,7 @@ def require_display() -> None:
         )
 
 
-def play_in_viewer(environment: VectorEnv, recipe: Recipe, policy: Acting, interrupted: Callable[[], bool]) -> Outcome:
+def play_in_viewer(environment: VectorEnv, policy: Acting, interrupted: Callable[[], bool]) -> Outcome:
     """One episode in real time in a window. Raises Interrupted when the window is closed."""
     import mujoco.viewer  # needs a window system as soon as it is imported
 
@@ -39,4 +38,4 @@ def play_in_viewer(environment: VectorEnv, recipe: Recipe, policy: Acting, inter
             viewer.sync()
             time.sleep(max(0.0, start + seconds - time.monotonic()))
 
-        return play_in(environment, recipe, policy, interrupted, look=look)[0]
+        return play_in(environment, policy, interrupted, look=look)[0]

@@ -9,7 +9,7 @@ from iowbc.control.command import COMMAND
 from iowbc.deploy import contract
 from iowbc.export.graph import ControllerGraph, Port
 from iowbc.export.onnx_graph import write_onnx
-from iowbc.recipe.evaluation import Evaluation
+from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import DESCRIPTION

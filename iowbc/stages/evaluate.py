@@ -1,6 +1,7 @@
 """Stage `eval`: mass sweeps and heavy cases with the trained policy, their tables, figures and films."""
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Stage
@@ -23,21 +24,21 @@ def run(job: Job) -> None:
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import film_trial, filmed
     from iowbc.evaluation.report.report import write_report
-    from iowbc.evaluation.trials.protocol import Protocol
+    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
     from iowbc.learning.acting import TeacherPolicy, load_policy
+    from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
-    recipe, rg = job.recipe, job.inputs.get("rg-fit")
+    recipe = job.recipe
     policy = load_policy(job.inputs[acting_stage(recipe)])
     if recipe.eval.policy == "student" and isinstance(policy, TeacherPolicy):
         raise StageFailed(
             "eval.policy asks for the student, and the recipe trains none: add `distill` to its stages, "
             "or evaluate the teacher with --set eval.policy=teacher"
         )
+    world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
     protocol = Protocol(
-        recipe,
-        job.robot,
-        rg,
+        world,
         policy,
         work=job.work,
         workers=job.workers,
@@ -51,7 +52,7 @@ def run(job: Job) -> None:
         (job.out / "videos").mkdir()
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
-            film_trial(recipe, job.robot, rg, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
+            film_trial(world, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
     except Interrupted as stopped:
@@ -59,33 +60,40 @@ def run(job: Job) -> None:
     metrics = headline(summary)
     job.report.metrics(metrics, 0)
     job.summarize(metrics)
-    for suite, rows in summary.groupby("suite", sort=False):
-        counts = ", ".join(f"{row['mass']:g} kg {row['survived']}/{row['trials']}" for _, row in rows.iterrows())
-        job.report.say(f"{suite}: survived {counts}")
+    for suite, rows in summary[summary["kind"] != "pushes"].groupby("suite", sort=False):
+        counts = ", ".join(f"{_load(row)} {row['succeeded']}/{row['trials']}" for _, row in rows.iterrows())
+        job.report.say(f"{suite}: succeeded {counts}")
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
-    """The figures to show at the end of a run: survival and errors at the lightest and heaviest mass of each suite."""
-    from iowbc.evaluation.trials.metrics import ERRORS
+    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite."""
+    from iowbc.evaluation.trials.errors import ERRORS
 
-    metrics = {"trials": float(summary["trials"].sum()), "survived": float(summary["survived"].sum())}
-    for _, row in summary.iterrows():
+    metrics = {name: float(summary[name].sum()) for name in ("trials", "survived", "succeeded")}
+    for _, row in summary[summary["kind"] != "pushes"].iterrows():
         rows = summary[summary["suite"] == row["suite"]]
-        if row["suite"] != "heavy" and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
+        if row["case"] == row["suite"] and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
             continue
-        name = f"{row['case']}/{row['mass']:g}kg".replace(" ", "_")
+        name = f"{row['case']}/{row['mass']:g}kg".replace(" ", "_").replace("%", "percent")
         metrics[f"{name}/success"] = float(row["rate"])
+        if not math.isnan(row["transport_robot"]):
+            metrics[f"{name}/transport"] = float(row["transport_robot"])
         if row["survived"]:
             metrics |= {f"{name}/{error}": float(row[error]) for error in ERRORS}
     return metrics
 
 
+def _load(row: "pd.Series[Any]") -> str:
+    """The case, where it has a name of its own, and the mass."""
+    mass = f"{row['mass']:g} kg"
+    return mass if row["case"] == row["suite"] else f"{row['case']} ({mass})"
+
+
 STAGE = Stage(
     name="eval",
-    version=1,
+    version=2,
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
-    results=("trials.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
 )

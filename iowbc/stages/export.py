@@ -22,6 +22,7 @@ def run(job: Job) -> None:
     from iowbc.export.onnx_graph import run_torch
     from iowbc.learning.storage import load_student
     from iowbc.robot.description import load_robot
+    from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as on the robot, where the controller has one thread
     recipe, task, settings = job.recipe, job.recipe.task, job.recipe.export
@@ -46,7 +47,7 @@ def run(job: Job) -> None:
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, recipe, rg, sources)
     try:
-        policy, played = try_out(recipe, job.robot, rg, job.out, job.interrupted)
+        policy, played = try_out(Specification(recipe, job.robot, rg), job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
 
@@ -107,6 +108,5 @@ STAGE = Stage(
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
-    results=("policy.onnx", "contract.json", "golden.npz"),
     packages=("stages.export", "export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
 )

@@ -121,6 +121,5 @@ STAGE = Stage(
     ),
     reads=lambda recipe: (),
     run=run,
-    results=("dataset.npz", "feasible.npz"),
     packages=("reference", "control", "robot"),
 )

@@ -60,6 +60,5 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher"),
     reads=generator_stage,
     run=run,
-    results=("teacher.safetensors", "teacher.json"),
     packages=("stages.teacher", "stages.training", "learning", *ENVIRONMENTS),
 )

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
-from iowbc.evaluation.trials.plan import command_script, trials_at
+from iowbc.evaluation.trials.plan import Condition, command_script
 from iowbc.evaluation.trials.rollout import play_in
 from iowbc.export.golden import largest_difference, stacked
 from iowbc.export.graph import ControllerGraph
 from iowbc.export.onnx_graph import run_torch
 from iowbc.learning.acting import StudentPolicy
-from iowbc.recipe.evaluation import Segment
+from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
@@ -49,14 +49,13 @@ class Both:
 def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, exported: Path) -> Both:
     script = command_script(SEQUENCE, recipe.task.commands)
     episodes = tuple(
-        trials_at("test", scene, mass, script, count=1, seed=3, fixed={})[0].episode
-        for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
+        Condition(scene, script).episode(mass, seed=3) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
     )
     environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
     controller = Controller.load(exported, robots=3)
     both = Both(ExportedPolicy(controller, environment, golden_steps=30), StudentPolicy(graph.student, graph.history))
     try:
-        play_in(environment, recipe, both)
+        play_in(environment, both)
     finally:
         environment.close()
     return both

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from iowbc.recipe.evaluation import Evaluation, HeavyCase, Segment, Sweep
+from iowbc.recipe.evaluation.evaluation import Evaluation
+from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.suites import HeavyCase, PushLadder, Sweep
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.simulation.holding import HOLDABLE, SCENES
 from iowbc.recipe.simulation.simulation import Simulation as SimulationRecipe
@@ -16,7 +18,7 @@ from iowbc.sim.simulation import Simulation
 def test_the_quickstart_question_can_be_asked() -> None:
     question = Evaluation(
         sequence=(Segment(duration=10.0, ramp=0.0),),
-        lifting=Sweep(scene="lift", masses=(4.0,), partner_share=0.0),
+        lifting=Sweep(scene="lift", masses=(4.0,), partner_shares=(0.0,)),
         trials=5,
     )
     assert sum(segment.duration for segment in question.sequence) == 10.0
@@ -47,9 +49,14 @@ def test_an_evaluation_of_nothing_is_refused() -> None:
     Evaluation(lifting=None, heavy=(HeavyCase(name="tyre", scene="tyre", mass=18.0),))
 
 
-def test_an_empty_sequence_is_refused() -> None:
-    with pytest.raises(ValidationError, match="give at least one segment"):
-        Evaluation(sequence=())
+def test_a_partners_share_is_asked_for_once() -> None:
+    with pytest.raises(ValidationError, match="partner_shares must differ"):
+        Sweep(partner_shares=(0.5, 0.5))
+
+
+def test_pushes_grow() -> None:
+    with pytest.raises(ValidationError, match="ascend"):
+        PushLadder(impulses=(20.0, 10.0))
 
 
 def test_a_ramp_longer_than_its_segment_is_refused() -> None:

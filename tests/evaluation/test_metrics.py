@@ -4,38 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up_trials import DT, GAIT_STEPS, MEASURE, script, trace
 
-from iowbc.evaluation.trials.metrics import Trace, error_norm, moving_average, trial_metrics, wrapped
+from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average, wrapped
+from iowbc.evaluation.trials.metrics import jerk, trial_metrics
+from iowbc.evaluation.trials.trace import Trace
+from iowbc.task.commands.script import CommandScript
 
-DT = 0.02
-GAIT_STEPS = 40
 
-
-def trace(steps: int = 400) -> Trace:
-    """A robot that stands as commanded, heading along x, with nothing in its hands."""
-    zeros = np.zeros(steps)
-    return Trace(
-        dt=DT,
-        system_velocity=np.zeros((steps, 3)),
-        commanded_velocity=np.zeros((steps, 3)),
-        heading=zeros,
-        heading_reference=zeros,
-        torso_pitch=zeros,
-        torso_pitch_command=zeros,
-        pelvis_height=np.full(steps, 0.75),
-        height_command=np.full(steps, 0.75),
-        saturation=zeros,
-        slipped=zeros,
-        partner_force=np.zeros((steps, 3)),
-        grip_force=np.zeros((steps, 6)),
-        power=np.full(steps, 100.0),
-        base_position=np.zeros((steps, 3)),
-    )
+def metrics_of(signals: Trace, commands: CommandScript | None = None, weight: float = 0.0) -> dict[str, float]:
+    return trial_metrics(signals, commands or script(), MEASURE, weight)
 
 
 def test_a_perfect_trial_has_no_error() -> None:
-    metrics = trial_metrics(trace(), GAIT_STEPS)
-    assert [metrics[name] for name in ("E_alpha", "E_h", "E_v", "E_psi", "E_v_raw")] == [0.0] * 5
+    metrics = metrics_of(trace())
+    assert [metrics[name] for name in (*ERRORS, "E_v_raw")] == [0.0] * 5
 
 
 def test_constant_offsets_come_back_as_errors() -> None:
@@ -47,7 +30,7 @@ def test_constant_offsets_come_back_as_errors() -> None:
         system_velocity=exact.system_velocity + np.array([0.03, -0.04, 5.0]),
         heading=exact.heading + 0.2,
     )
-    metrics = trial_metrics(off, GAIT_STEPS)
+    metrics = metrics_of(off)
     assert metrics["E_alpha"] == pytest.approx(0.1)
     assert metrics["E_h"] == pytest.approx(0.02)
     assert metrics["E_v"] == pytest.approx(0.05), "planar: the vertical 5 m/s does not count"
@@ -58,24 +41,49 @@ def test_sway_within_a_gait_period_counts_raw_but_not_averaged() -> None:
     exact = trace()
     sway = exact.system_velocity.copy()
     sway[:, 1] = 0.2 * np.sin(2 * np.pi * np.arange(len(sway)) / GAIT_STEPS)
-    metrics = trial_metrics(replace(exact, system_velocity=sway), GAIT_STEPS)
+    metrics = metrics_of(replace(exact, system_velocity=sway))
     assert metrics["E_v_raw"] == pytest.approx(0.2 * 2 / np.pi, rel=0.01)
     assert metrics["E_v"] < 0.1 * metrics["E_v_raw"]
 
 
-def test_a_lasting_velocity_error_survives_the_averaging() -> None:
+def test_errors_are_told_against_the_command_as_given_and_as_clamped() -> None:
     exact = trace()
-    metrics = trial_metrics(
-        replace(exact, commanded_velocity=exact.commanded_velocity + np.array([0.4, 0.0, 0.0])), GAIT_STEPS
-    )
+    clamped = replace(exact, commanded_velocity=exact.commanded_velocity + np.array([0.3, 0.0, 0.0]))
+    metrics = metrics_of(clamped, script(velocity=(0.4, 0.0, 0.0)))
     assert metrics["E_v"] == pytest.approx(0.4)
+    assert metrics["E_v_clamped"] == pytest.approx(0.3)
+
+
+def test_the_heading_of_a_given_turn_is_integrated_from_the_start() -> None:
+    turning = script(velocity=(0.0, 0.0, 0.5))
+    heading = 1.0 + 0.5 * DT * np.arange(1, 401)
+    start = trace()
+    turned = replace(start, heading=heading, heading_reference=start.heading_reference + 1.0)
+    metrics = metrics_of(turned, turning)
+    assert metrics["E_psi"] == pytest.approx(0.0, abs=1e-9)
+    assert metrics["E_psi_clamped"] == pytest.approx(np.mean(np.abs(wrapped(heading - 1.0))))
+
+
+def test_errors_over_the_moving_part_leave_standing_out() -> None:
+    walk = script(4.0).segments + script(4.0, (0.4, 0.0, 0.0)).segments
+    metrics = metrics_of(trace(), CommandScript(walk))
+    assert metrics["E_v"] == pytest.approx(0.2, abs=0.002)
+    assert metrics["E_v_moving"] == pytest.approx(0.4, abs=0.002)
+    assert np.isnan(metrics_of(trace())["E_v_moving"]), "no steps were asked for"
+
+
+def test_what_standing_still_scores_is_computed_from_the_script_alone() -> None:
+    turning = script(velocity=(0.3, 0.0, 0.25))
+    fallen = replace(trace(10), torso_pitch=np.full(10, 1.0))
+    metrics = metrics_of(fallen, turning)
+    assert metrics["still_E_v"] == pytest.approx(0.3)
+    assert metrics["still_E_psi"] == pytest.approx(1.0, abs=0.01), "half of the 2 rad turned in 8 s"
+    assert (metrics["still_E_alpha"], metrics["still_E_h"]) == (0.0, 0.0)
 
 
 def test_heading_error_takes_the_short_way_round() -> None:
     exact = trace()
-    metrics = trial_metrics(
-        replace(exact, heading=exact.heading + 3.1, heading_reference=exact.heading - 3.1), GAIT_STEPS
-    )
+    metrics = metrics_of(replace(exact, heading=exact.heading + 3.1, heading_reference=exact.heading - 3.1))
     assert metrics["E_psi"] == pytest.approx(2 * np.pi - 6.2)
     assert wrapped(np.array([np.pi, -np.pi, 3 * np.pi])) == pytest.approx([-np.pi] * 3)
 
@@ -84,9 +92,26 @@ def test_energy_is_power_times_time_and_distance_the_path_walked() -> None:
     exact = trace()
     path = exact.base_position.copy()
     path[:, 0] = 0.5 * DT * np.arange(len(path))
-    metrics = trial_metrics(replace(exact, base_position=path), GAIT_STEPS)
+    metrics = metrics_of(replace(exact, base_position=path))
     assert metrics["energy"] == pytest.approx(100.0 * 400 * DT)
     assert metrics["distance"] == pytest.approx(0.5 * DT * 399)
+
+
+def test_peak_torque_and_saturation_are_told_by_joint() -> None:
+    torque = np.zeros((400, 2))
+    torque[100] = (3.0, -30.0)
+    saturated = np.zeros((400, 2))
+    saturated[:40, 1] = 1.0
+    metrics = metrics_of(replace(trace(), joint_torque=torque, joint_saturation=saturated))
+    assert (metrics["peak_torque/hip"], metrics["peak_torque/knee"]) == (3.0, 30.0)
+    assert (metrics["saturated/hip"], metrics["saturated/knee"]) == (0.0, 0.1)
+
+
+def test_jerk_is_the_third_derivative_of_the_path() -> None:
+    time = DT * np.arange(50)
+    cubic = np.stack([0.5 * time**3, np.zeros(50), np.zeros(50)], axis=1)
+    assert jerk(cubic, DT) == pytest.approx(3.0)
+    assert np.isnan(jerk(cubic[:3], DT))
 
 
 def test_moving_average_is_centred_and_shortened_at_the_ends() -> None:
@@ -102,7 +127,7 @@ def test_a_window_longer_than_the_trial_gives_its_mean() -> None:
 
 def test_a_trial_without_a_step_is_refused() -> None:
     with pytest.raises(ValueError, match="without a single step"):
-        trial_metrics(trace(0), GAIT_STEPS)
+        metrics_of(trace(0))
 
 
 def test_error_norm_is_euclidean() -> None:

@@ -2,34 +2,20 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
+from made_up_trials import trials_of
 
-from iowbc.evaluation.report.aggregate import COSTS, aggregate, load_capacity, variants_of
-from iowbc.evaluation.report.figures import comparison, errors_against_mass, style_of
-from iowbc.evaluation.report.paper import LIFTING, PUSHING, VARIANTS, reported
+from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
+from iowbc.evaluation.report.aggregate import aggregate, variants_of
+from iowbc.evaluation.report.capacity import load_capacity, push_capacity
+from iowbc.evaluation.report.differences import difference_table, mean_difference, paired, success_p
+from iowbc.evaluation.report.error_tables import error_table, moving_table
+from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, style_of
+from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
 from iowbc.evaluation.report.report import write_report
-from iowbc.evaluation.report.tables import capacity_table, latex, markdown, success_table, sweep_table
-from iowbc.evaluation.trials.metrics import ERRORS
-
-
-def trials_of(variant: str, suite: str, survivors: dict[float, int], case: str = "") -> pd.DataFrame:
-    """Five trials a mass, of which the given number survived, with errors 0.1, 0.2, ... that grow by trial."""
-    rows = [
-        {
-            "variant": variant,
-            "suite": suite,
-            "case": case or suite,
-            "mass": mass,
-            "trial": trial,
-            "survived": trial < count,
-            **dict.fromkeys(ERRORS, 0.1 + 0.1 * trial),
-            **dict.fromkeys(COSTS, 1.0),
-        }
-        for mass, count in survivors.items()
-        for trial in range(5)
-    ]
-    return pd.DataFrame(rows)
+from iowbc.evaluation.report.tables import latex, markdown
 
 
 def test_errors_are_means_over_the_survivors_alone() -> None:
@@ -43,7 +29,7 @@ def test_errors_are_means_over_the_survivors_alone() -> None:
 
 def test_fails_is_printed_only_where_none_survived() -> None:
     summary = aggregate(trials_of("WBC", "lifting", {0.0: 5, 7.0: 1, 8.0: 0}))
-    text = markdown(sweep_table(summary, "lifting"))
+    text = markdown(error_table(summary, "lifting"))
     lines = {line.split("|")[1].strip(): line for line in text.splitlines() if " kg " in line}
     assert "Fails" not in lines["0 kg"]
     assert "0.100" in lines["7 kg"]
@@ -54,13 +40,13 @@ def test_fails_is_printed_only_where_none_survived() -> None:
 
 def test_the_papers_numbers_stand_beside_ours() -> None:
     summary = aggregate(trials_of("IO-WBC", "pushing", {30.0: 5}))
-    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(sweep_table(summary, "pushing"))
+    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(error_table(summary, "pushing"))
 
 
 def test_the_papers_numbers_are_found_by_label_and_left_out_where_it_knows_none() -> None:
     summary = aggregate(trials_of("full", "pushing", {30.0: 5}))
-    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(sweep_table(summary, "pushing", {"full": "IO-WBC"}))
-    without = sweep_table(summary, "pushing", {"full": "mine"})
+    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(error_table(summary, "pushing", {"full": "IO-WBC"}))
+    without = error_table(summary, "pushing", {"full": "mine"})
     assert "paper E_" not in markdown(without)
     assert {len(row) for row in without.rows} == {len(without.head)} == {len(without.latex_head)}
 
@@ -91,29 +77,31 @@ def test_what_was_not_evaluated_is_told_from_what_failed() -> None:
         pd.concat([trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("w/o RG", "pushing", {30.0: 0})])
     )
     text = markdown(capacity_table(summary, 0.8))
-    assert "| IO-WBC | 4 kg | – |" in text
-    assert "| w/o RG | – | Fails |" in text
+    assert "| IO-WBC | ≥ 4 kg | – |" in text
+    assert "| w/o RG | – | < 30 kg |" in text
 
 
 def test_load_capacity_stops_at_the_first_mass_that_breaks() -> None:
     summary = aggregate(trials_of("IO-WBC", "lifting", {0.0: 5, 1.0: 4, 2.0: 3, 3.0: 5}))
-    assert load_capacity(summary, "lifting", "IO-WBC", 0.8) == 1.0
-    assert load_capacity(summary, "lifting", "IO-WBC", 0.6) == 3.0
+    found = {rate: load_capacity(summary, "lifting", "IO-WBC", rate) for rate in (0.8, 0.6)}
+    assert [(one.value, one.open_ended) for one in found.values() if one] == [(1.0, False), (3.0, True)]
     assert load_capacity(summary, "pushing", "IO-WBC", 0.6) is None
     assert "| IO-WBC | 1 kg |" in markdown(capacity_table(summary, 0.8))
+    assert "| IO-WBC | ≥ 3 kg |" in markdown(capacity_table(summary, 0.6))
 
 
 def test_heavy_cases_show_rate_interval_and_the_papers_rate() -> None:
     summary = aggregate(trials_of("IO-WBC", "heavy", {18.0: 4}, "tyre"))
     text = markdown(success_table(summary))
-    assert "| tyre (18 kg) | IO-WBC | 4/5 | 80 % | 38 to 96 % | 80 % |" in text
+    assert "| tyre (18 kg) | IO-WBC | 4/5 | 4/5 | 80 % | 38 to 96 % | 80 % |" in text
+    assert "stands still | – | none | 0 %" in text
 
 
 def test_latex_groups_rows_and_escapes() -> None:
     trials = pd.concat([trials_of(name, "lifting", {0.0: 5, 4.0: 5}) for name in VARIANTS])
-    text = latex(sweep_table(aggregate(trials), "lifting"))
+    text = latex(error_table(aggregate(trials), "lifting"))
     assert text.count(r"\multirow[c]{4}{*}") == 2
-    assert text.count(r"\cline{1-11}") == 2
+    assert text.count(r"\cline{1-14}") == 3
     assert "±" not in text
     assert "95 \\% interval" in text
     assert "$E_{\\alpha}$ & $E_{h}$" in text
@@ -123,7 +111,7 @@ def test_latex_groups_rows_and_escapes() -> None:
 def test_latex_of_a_table_without_groups_has_one_line_a_variant() -> None:
     text = latex(capacity_table(aggregate(trials_of("w/o Distill.", "lifting", {4.0: 5})), 0.8))
     assert "80 \\% success" in text
-    assert "w/o Distill. & 4 kg \\\\" in text
+    assert "w/o Distill. & $\\geq$ 4 kg \\\\" in text
     assert "multirow" not in text
 
 
@@ -132,20 +120,99 @@ def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_pat
     parts = [trials_of(name, "lifting", {0.0: 5, 4.0: 2, 8.0: 0}) for name in variants]
     parts += [trials_of(name, "pushing", {0.0: 5, 30.0: 5}) for name in variants]
     parts += [trials_of(name, "heavy", {18.0: 1}, "tyre") for name in variants]
+    parts += [trials_of(name, "stagnation", {65.0: 5}, "blocked crate") for name in variants]
+    parts += [trials_of(name, "pushes", {4.0: 4}, "left", impulse=10.0) for name in variants]
     summary = write_report(pd.concat(parts), tmp_path, 0.8)
-    assert len(summary) == 6 * len(variants)
+    assert len(summary) == 8 * len(variants)
     names = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*")}
+    tables = ["lifting", "lifting_moving", "pushing", "pushing_moving", "heavy", "heavy_errors", "stagnation"]
+    tables += ["capacity", "pushes", "joints", *(["differences"] if len(variants) > 1 else [])]
     assert names == {
-        *(
-            f"tables/{name}.{kind}"
-            for name in ("lifting", "pushing", "heavy", "capacity")
-            for kind in ("md", "tex", "csv")
-        ),
+        *(f"tables/{name}.{kind}" for name in tables for kind in ("md", "tex", "csv")),
         "tables/summary.csv",
-        "figures/lifting_errors.png",
-        "figures/pushing_errors.png",
-        "figures/comparison.png",
+        *(f"figures/{name}.png" for name in ("lifting_errors", "pushing_errors", "comparison", "robustness")),
     }
+
+
+def test_every_error_table_says_what_standing_still_scores() -> None:
+    trials = pd.concat(
+        [
+            trials_of("IO-WBC", "lifting", {4.0: 5}),
+            trials_of("IO-WBC", "stagnation", {65.0: 5}, "blocked crate"),
+            trials_of("IO-WBC", "robustness", {4.0: 5}, "nominal"),
+        ]
+    )
+    summary = aggregate(trials)
+    for table in (
+        *(error_table(summary, suite) for suite in ("lifting", "stagnation", "robustness")),
+        moving_table(summary, "lifting"),
+    ):
+        (row,) = [row for row in table.rows if row[1] == "stands still"]
+        assert row[2:6] == ("0.250",) * 4, table.name
+    assert "| any | stands still | 0.250 | 0.250 | 0.250 | 0.250 | – | none | 0.00 |" in markdown(
+        error_table(summary, "lifting")
+    )
+
+
+def test_captions_say_partner_friction_height_averaging_and_that_it_is_simulation() -> None:
+    trials = pd.concat(
+        [trials_of("IO-WBC", "lifting with partner 0.5", {4.0: 5}), trials_of("IO-WBC", "pushing", {30.0: 5})]
+    )
+    summary = aggregate(trials)
+    carried, pushed = (error_table(summary, suite) for suite in ("lifting with partner 0.5", "pushing"))
+    assert "In simulation, with a partner (share 0.5)." in carried.caption
+    assert "without a partner (share 0), rolling resistance μ 0.06." in pushed.caption
+    for table in (carried, pushed):
+        assert "the pelvis above the ground" in table.caption
+        assert "one gait period of 0.80 s" in table.caption
+    assert "Table II" in carried.caption
+    assert "| 0.132 | 0.016 | 0.048 | 0.139 |" in markdown(carried), "cooperative lifting, too, has the paper's numbers"
+
+
+def test_transport_and_weight_in_the_hands_stand_in_the_table() -> None:
+    text = markdown(error_table(aggregate(trials_of("IO-WBC", "lifting", {4.0: 5})), "lifting"))
+    assert "| 5/5 | 5/5 | 0.90 / 0.80 | 100 % |" in text
+
+
+def test_errors_differ_in_pairs_of_the_same_trial() -> None:
+    trials = pd.concat([trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("WBC", "lifting", {4.0: 4}, error=0.3)])
+    pairs = paired(trials, "WBC", "IO-WBC")
+    assert len(pairs) == 5
+    assert (pairs["E_v_variant"] - pairs["E_v_reference"]).tolist() == pytest.approx([0.2] * 5)
+    table = difference_table(trials)
+    assert table is not None
+    assert table.rows[0][:4] == ("lifting", "WBC", "4", "+0.200")
+    assert table.rows[0][-1] == "-20 % (p 1)"
+    assert difference_table(trials_of("IO-WBC", "lifting", {4.0: 5})) is None
+
+
+def test_significance_is_that_of_the_textbooks() -> None:
+    mean, half, p = mean_difference(pd.Series([0.1, 0.2, 0.3, 0.4, 0.5]))
+    assert (mean, half) == pytest.approx((0.3, 0.1963), abs=1e-4)
+    assert p == pytest.approx(0.01324, abs=1e-4)
+    assert all(map(np.isnan, mean_difference(pd.Series([], dtype=float))))
+    better = pd.DataFrame({"succeeded_variant": [True] * 6, "succeeded_reference": [False] * 6})
+    assert success_p(better) == pytest.approx(2 * 0.5**6)
+
+
+def test_the_largest_push_survived_is_told_by_direction() -> None:
+    levels = {10.0: 5, 20.0: 4, 30.0: 1}
+    parts = [trials_of("IO-WBC", "pushes", {4.0: n}, "left", impulse=size) for size, n in levels.items()]
+    parts += [trials_of("IO-WBC", "pushes", {4.0: 5}, "right", impulse=size) for size in levels]
+    parts += [trials_of("WBC", "pushes", {4.0: 0}, "left", impulse=10.0)]
+    summary = aggregate(pd.concat(parts))
+    found = push_capacity(summary, "left", "IO-WBC", 0.8)
+    assert found is not None
+    assert (found.value, found.open_ended) == (20.0, False)
+    text = markdown(push_table(summary, 0.8))
+    assert "| IO-WBC | 20 N·s | ≥ 30 N·s |" in text
+    assert "| WBC | < 10 N·s | – |" in text
+
+
+def test_the_joints_most_at_their_limit_come_first() -> None:
+    table = joint_table(aggregate(trials_of("IO-WBC", "lifting", {4.0: 5, 8.0: 1, 9.0: 0})))
+    assert table.rows[0] == ("lifting, 8 kg", "IO-WBC", "knee", "40.0", "10.0 %")
+    assert len(table.numbers) == 2
 
 
 def test_the_comparison_has_a_panel_for_each_thing_that_was_evaluated() -> None:
@@ -161,7 +228,9 @@ def test_the_comparison_has_a_panel_for_each_thing_that_was_evaluated() -> None:
 def test_every_point_and_bar_is_below_the_upper_edge_and_axes_begin_at_zero() -> None:
     summary = aggregate(trials_of("IO-WBC", "lifting", {4.0: 5, 8.0: 0}))
     nothing_carried = aggregate(trials_of("IO-WBC", "lifting", {4.0: 0}))
+    pushes = aggregate(trials_of("IO-WBC", "pushes", {4.0: 5}, "left", impulse=10.0))
     figures = [errors_against_mass(summary, "lifting"), comparison(summary, 0.8), comparison(nothing_carried, 0.8)]
+    figures.append(robustness(pushes, 0.8))
     for axes in (axes for figure in figures for axes in figure.axes):
         low, high = axes.get_ylim()
         assert low == 0

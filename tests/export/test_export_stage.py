@@ -18,7 +18,8 @@ from iowbc.export import golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.evaluation import Segment, Video
+from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.stages import export

@@ -1,52 +1,95 @@
-"""From the long table of trials to one row for each variant, suite and mass."""
+"""From the long table of trials to one row for each variant, suite, case and mass."""
 
 from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.report.paper import VARIANTS
+from iowbc.evaluation.paper import VARIANTS
 from iowbc.evaluation.report.statistics import mean_half_width, wilson_interval
-from iowbc.evaluation.trials.metrics import ERRORS, error_norm
+from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
-COSTS = ("E_v_raw", "saturation", "saturation_peak", "slip_share", "partner_force_peak", "grip_force_peak", "energy")
+PARTS = ("", "_moving", "_clamped")
+"""Suffixes of the errors: over the whole trial, where steps are asked for, against clamped commands."""
+ALL_ERRORS = tuple(f"{name}{part}" for part in PARTS for name in ERRORS)
+STILL = tuple(f"still_{name}{part}" for part in ("", "_moving") for name in ERRORS)
+"""The errors of a robot that stands still, from the script alone."""
+COSTS = (
+    "E_v_raw",
+    "distance",
+    "saturation",
+    "saturation_peak",
+    "slip_share",
+    "partner_force_peak",
+    "grip_force_peak",
+    "energy",
+    "foot_slip",
+    "foot_slip_peak",
+    "foot_slip_per_metre",
+    "swing_clearance_left",
+    "swing_clearance_right",
+    "hand_weight_share",
+    "partner_weight_share",
+    "weight_in_hands",
+    "torso_jerk",
+    "object_jerk",
+)
 """Other columns averaged over the surviving trials."""
-GROUP = ["variant", "suite", "case", "mass"]
+WAYS = ("transport_robot", "transport_object")
+"""Columns averaged over all trials."""
+SETTINGS = ("commanded_distance", "partner_share", "rolling_resistance", "height", "gait_period")
+"""Columns that are the same for all trials of a row."""
+JOINT_COSTS = ("peak_torque/", "saturated/")
+"""Beginnings of columns with a value a joint, averaged over the surviving trials."""
+GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
 def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
-    """One row for each (variant, suite, case, mass), in order of suite, mass, and the paper's order of variants.
+    """One row for each of `GROUP`, by suite and case in order of appearance, mass, and the paper's order of variants.
 
-    Columns: `trials`, `survived`, `rate` with its Wilson interval `rate_low`, `rate_high`; each error's mean over the
-    surviving trials and `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. NaN where no trial
-    survived (or one alone, for the half widths): "Fails" in the tables.
+    Columns: `trials`, `survived`, `succeeded`, `carried` (trials with an object in the hands whose weight they carried)
+    of `held`; `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving
+    trials and `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. NaN where no trial survived
+    (or one alone, for the half widths): "Fails" in the tables.
     """
     rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
     table = pd.DataFrame(rows)
-    rank = {variant: place for place, variant in enumerate(variants_of(trials))}
-    order = table.assign(_rank=table["variant"].map(rank)).sort_values(["suite", "case", "mass", "_rank"])
-    return order.drop(columns="_rank").reset_index(drop=True)
+    ranks = {
+        "variant": variants_of(trials),
+        "suite": list(dict.fromkeys(trials["suite"])),
+        "case": list(dict.fromkeys(trials["case"])),
+    }
+    places = {f"_{name}": table[name].map({value: place for place, value in enumerate(ranks[name])}) for name in ranks}
+    order = table.assign(**places).sort_values(["_suite", "_case", "mass", "impulse", "_variant"])
+    return order.drop(columns=list(places)).reset_index(drop=True)
 
 
 def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
     survivors = group[group["survived"]]
-    low, high = wilson_interval(len(survivors), len(group))
+    succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
+    low, high = wilson_interval(succeeded, len(group))
     row: dict[str, object] = {
         **key,
         "trials": len(group),
         "survived": len(survivors),
-        "rate": len(survivors) / len(group),
+        "succeeded": succeeded,
+        "held": int(held.sum()),
+        "carried": int(group["carried"].sum()),
+        "rate": succeeded / len(group),
         "rate_low": low,
         "rate_high": high,
     }
-    for name in ERRORS:
-        values = survivors[name].to_numpy(np.float64)
+    for name in ALL_ERRORS:
+        values = survivors[name].dropna().to_numpy(np.float64)
         row[name] = float(values.mean()) if len(values) else np.nan
         row[f"{name}_half"] = mean_half_width(values)
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
-    for name in COSTS:
+    joints = [name for name in group.columns if name.startswith(JOINT_COSTS)]
+    for name in (*COSTS, *joints):
         row[name] = float(survivors[name].mean()) if len(survivors) else np.nan
-    return row
+    for name in (*WAYS, *STILL):
+        row[name] = float(group[name].mean())
+    return row | {name: group[name].iloc[0] for name in SETTINGS}
 
 
 def variants_of(trials: pd.DataFrame) -> list[str]:
@@ -55,12 +98,6 @@ def variants_of(trials: pd.DataFrame) -> list[str]:
     return sorted(present, key=lambda name: VARIANTS.index(name) if name in VARIANTS else len(VARIANTS))
 
 
-def load_capacity(summary: pd.DataFrame, suite: str, variant: str, rate: float) -> float | None:
-    """The largest mass of a sweep [kg] up to which every mass reached the success rate, or None."""
-    rows = summary[(summary["suite"] == suite) & (summary["variant"] == variant)].sort_values("mass")
-    capacity = None
-    for _, row in rows.iterrows():
-        if row["rate"] < rate:
-            break
-        capacity = float(row["mass"])
-    return capacity
+def suites_of(summary: pd.DataFrame, *kinds: str) -> list[str]:
+    """The suites of some kinds, in order of appearance."""
+    return [str(suite) for suite in dict.fromkeys(summary.loc[summary["kind"].isin(kinds), "suite"])]

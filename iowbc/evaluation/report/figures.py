@@ -1,5 +1,9 @@
-"""The paper's figures: errors against lifting mass, against pushing mass, and the comparison of variants."""
+"""The paper's figures: errors against lifting mass, against pushing mass, and the comparison of variants.
 
+Beside them what the paper does not show: success under harder conditions, and pushes survived.
+"""
+
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from iowbc.evaluation.report.aggregate import load_capacity, variants_of
-from iowbc.evaluation.report.paper import TABLES, VARIANTS
-from iowbc.evaluation.trials.metrics import ERRORS, error_norm
+from iowbc.evaluation.paper import TABLES, VARIANTS
+from iowbc.evaluation.report.aggregate import suites_of, variants_of
+from iowbc.evaluation.report.capacity import load_capacity, push_capacity
+from iowbc.evaluation.report.captions import conditions
+from iowbc.evaluation.report.error_tables import NUMBERS, STANDS_STILL
+from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 """Okabe and Ito's palette: told apart with any colour vision; markers repeat the distinction."""
@@ -21,10 +28,15 @@ LABELS = {
     "E_v": "$E_v$, velocity [m/s]",
     "E_psi": "$E_\\psi$, heading [rad]",
 }
-PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; × none survived"
+PAPER_NOTE = (
+    "hollow, dotted: the paper's numbers, for its own commands; grey: a robot that stands still; × none survived"
+)
+STILL_COLOUR = "0.55"
 DPI = 150
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
+LABEL_WIDTH = 11
+"""Characters in a line under a bar."""
 HEADROOM = 0.15
 """Room above the highest point, in parts of its height."""
 FAILURE_SPACING = 0.035
@@ -40,6 +52,7 @@ def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
 
 def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
     """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
+    kind = str(summary.loc[summary["suite"] == suite, "kind"].iloc[0])
     figure = Figure(figsize=(9.5, 6.6), layout="constrained")
     for axes, name in zip(figure.subplots(2, 2, sharex=True).flat, ERRORS, strict=True):
         for variant in variants_of(summary):
@@ -49,14 +62,16 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
             axes.errorbar(
                 rows["mass"], rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
             )
-            _paper_curve(axes, suite, variant, ERRORS.index(name), colour, marker)
+            _paper_curve(axes, kind, variant, ERRORS.index(name), colour, marker)
             _mark_failures(axes, rows, variant, variants_of(summary))
+        _still_line(axes, float(summary.loc[summary["suite"] == suite, f"still_{name}"].mean()))
         axes.set_ylabel(LABELS[name])
         _tidy(axes)
     for axes in figure.axes[2:]:
-        axes.set_xlabel(f"{suite} mass [kg]")
+        axes.set_xlabel(f"{kind} mass [kg]")
     _legend(figure, figure.axes[0])
-    figure.suptitle(f"Tracking errors against {suite} mass ({PAPER_NOTE})", fontsize=10)
+    chosen = summary[summary["suite"] == suite]
+    figure.suptitle(f"Tracking errors against {kind} mass. {conditions(chosen)}\n{PAPER_NOTE}", fontsize=9)
     return figure
 
 
@@ -65,7 +80,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
 
     A panel for each that was evaluated.
     """
-    sweeps = [suite for suite in ("lifting", "pushing") if (summary["suite"] == suite).any()]
+    sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
     count = len(sweeps) + bool(sweeps) + 1
     figure = Figure(
         figsize=(max(PANEL_WIDTH * count, SMALLEST_WIDTH), 4.2), layout=ConstrainedLayoutEngine(wspace=0.06)
@@ -75,11 +90,28 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
         _norm_panel(axes, summary, suite)
     if sweeps:
         _capacity_panel(panels[-2], summary, sweeps, capacity_rate)
-    _success_panel(panels[-1], summary)
-    for axes, letter in zip(panels, "abcd", strict=False):
-        axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
+    _success_panel(panels[-1], _heaviest(summary))
+    _letter(panels)
     if sweeps:
-        figure.suptitle(PAPER_NOTE, fontsize=10)
+        figure.suptitle(PAPER_NOTE, fontsize=9)
+    _legend(figure, panels[0])
+    return figure
+
+
+def robustness(summary: pd.DataFrame, rate: float) -> Figure:
+    """Success under harder conditions and in stagnation, and the impulse on the base survived by direction."""
+    suites = suites_of(summary, "robustness", "stagnation")
+    pushes = suites_of(summary, "pushes")
+    panels_needed = [*suites, *pushes]
+    widths = [max(2, len(summary.loc[summary["suite"] == suite, "case"].unique())) for suite in panels_needed]
+    figure = Figure(figsize=(max(1.2 * sum(widths), SMALLEST_WIDTH), 4.2), layout="constrained")
+    panels = list(figure.subplots(1, len(panels_needed), squeeze=False, width_ratios=widths).flat)
+    for axes, suite in zip(panels, suites, strict=False):
+        _success_panel(axes, summary[summary["suite"] == suite])
+        axes.set_title(f"success, {suite}")
+    if pushes:
+        _push_panel(panels[-1], summary[summary["kind"] == "pushes"], rate)
+    _letter(panels)
     _legend(figure, panels[0])
     return figure
 
@@ -91,11 +123,14 @@ def write_figure(figure: Figure, path: Path) -> None:
 
 def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
     axes.set_title(f"error norm, {suite}")
+    kind = str(summary.loc[summary["suite"] == suite, "kind"].iloc[0])
+    still = summary.loc[summary["suite"] == suite, [f"still_{name}" for name in ERRORS]].mean().to_numpy()
+    _still_line(axes, float(error_norm(still)))
     for variant in variants_of(summary):
         rows = _rows(summary, suite, variant)
         colour, marker = style_of(variant, variants_of(summary))
         axes.plot(rows["mass"], rows["norm"], color=colour, marker=marker, markersize=5, label=variant)
-        _paper_curve(axes, suite, variant, None, colour, marker)
+        _paper_curve(axes, kind, variant, None, colour, marker)
         _mark_failures(axes, rows, variant, variants_of(summary))
     axes.set_xlabel("mass [kg]")
     axes.set_ylabel("norm of the four errors [SI units]")
@@ -104,30 +139,39 @@ def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
 
 def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: float) -> None:
     axes.set_title(f"load capacity at {100 * rate:.0f} % success")
-    groups = {
-        variant: [
-            np.nan if _rows(summary, suite, variant).empty else load_capacity(summary, suite, variant, rate) or 0.0
-            for suite in suites
-        ]
-        for variant in variants_of(summary)
-    }
+    found = {v: [load_capacity(summary, suite, v, rate) for suite in suites] for v in variants_of(summary)}
+    groups = {v: [np.nan if one is None else one.value or 0.0 for one in row] for v, row in found.items()}
     _bars(axes, groups, suites, "{:g}")
     axes.set_ylabel("mass [kg]")
 
 
-def _success_panel(axes: Axes, summary: pd.DataFrame) -> None:
+def _push_panel(axes: Axes, pushes: pd.DataFrame, rate: float) -> None:
+    axes.set_title(f"impulse survived standing, {float(pushes['mass'].iloc[0]):g} kg")
+    directions = list(dict.fromkeys(pushes["case"]))
+    found = {v: [push_capacity(pushes, one, v, rate) for one in directions] for v in variants_of(pushes)}
+    groups = {v: [np.nan if one is None else one.value or 0.0 for one in row] for v, row in found.items()}
+    _bars(axes, groups, directions, "{:g}")
+    axes.set_ylabel("impulse [N·s]")
+
+
+def _heaviest(summary: pd.DataFrame) -> pd.DataFrame:
+    """The heavy tasks, or without any the heaviest mass of each suite."""
+    heavy = summary[summary["kind"] == "heavy"]
+    if not heavy.empty:
+        return heavy
+    swept = summary[summary["kind"].isin(NUMBERS)]
+    return swept[swept["mass"] == swept.groupby("suite")["mass"].transform("max")]
+
+
+def _success_panel(axes: Axes, chosen: pd.DataFrame) -> None:
     axes.set_title("success rate")
-    chosen = summary[summary["suite"] == "heavy"]
-    if chosen.empty:
-        heaviest = summary.groupby("suite")["mass"].transform("max")
-        chosen = summary[summary["mass"] == heaviest]
     names = list(dict.fromkeys(zip(chosen["case"], chosen["mass"], strict=True)))
     groups = {}
-    for variant in variants_of(summary):
+    for variant in variants_of(chosen):
         rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"])["rate"]
         groups[variant] = [100 * float(rows.get(name, np.nan)) for name in names]
-    _bars(axes, groups, [f"{case}\n{mass:g} kg" for case, mass in names], "{:.0f}")
-    axes.set_ylabel("surviving trials [%]")
+    _bars(axes, groups, [f"{_broken(case)}\n{mass:g} kg" for case, mass in names], "{:.0f}")
+    axes.set_ylabel("successful trials [%]")
     axes.set_ylim(0, 110)
 
 
@@ -174,6 +218,22 @@ def _mark_failures(axes: Axes, rows: pd.DataFrame, variant: str, variants: list[
     )
     for cross in crosses:
         cross.set_in_layout(False)
+
+
+def _still_line(axes: Axes, value: float) -> None:
+    """What a robot that stands still scores."""
+    axes.axhline(value, label=STANDS_STILL, zorder=0, color=STILL_COLOUR, linestyle="--", linewidth=1.2)
+    axes.update_datalim([(0.0, value)], updatex=False)
+
+
+def _letter(panels: list[Axes]) -> None:
+    for axes, letter in zip(panels, "abcdef", strict=False):
+        axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
+
+
+def _broken(text: str) -> str:
+    """A long name on several lines."""
+    return textwrap.fill(text, LABEL_WIDTH)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:

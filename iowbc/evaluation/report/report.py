@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import aggregate
-from iowbc.evaluation.report.figures import comparison, errors_against_mass, write_figure
-from iowbc.evaluation.report.tables import NO_LABELS, capacity_table, success_table, sweep_table, write_table
+from iowbc.evaluation.report.aggregate import aggregate, suites_of
+from iowbc.evaluation.report.differences import difference_table
+from iowbc.evaluation.report.error_tables import NO_LABELS, error_table, moving_table, slug
+from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, write_figure
+from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
+from iowbc.evaluation.report.tables import Table, write_table
 
 
 def write_report(
@@ -23,14 +26,31 @@ def write_report(
     tables.mkdir(parents=True, exist_ok=True)
     figures.mkdir(parents=True, exist_ok=True)
     summary = aggregate(trials)
-    swept = [suite for suite in ("lifting", "pushing") if (summary["suite"] == suite).any()]
-    for suite in swept:
-        write_table(sweep_table(summary, suite, labels), tables)
-        write_figure(errors_against_mass(summary, suite), figures / f"{suite}_errors.png")
-    if (summary["suite"] == "heavy").any():
-        write_table(success_table(summary, labels), tables)
-    if swept:
-        write_table(capacity_table(summary, capacity_rate), tables)
-    write_figure(comparison(summary, capacity_rate), figures / "comparison.png")
+    for table in report_tables(trials, summary, capacity_rate, labels):
+        write_table(table, tables)
+    for suite in suites_of(summary, "lifting", "pushing"):
+        write_figure(errors_against_mass(summary, suite), figures / f"{slug(suite)}_errors.png")
+    if suites_of(summary, "lifting", "pushing", "heavy"):
+        write_figure(comparison(summary, capacity_rate), figures / "comparison.png")
+    if suites_of(summary, "robustness", "stagnation", "pushes"):
+        write_figure(robustness(summary, capacity_rate), figures / "robustness.png")
     summary.to_csv(tables / "summary.csv", index=False)
     return summary
+
+
+def report_tables(
+    trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str]
+) -> list[Table]:
+    """All tables that the trials give."""
+    swept, kinds = suites_of(summary, "lifting", "pushing"), set(summary["kind"])
+    tables = [make for suite in swept for make in (error_table(summary, suite, labels), moving_table(summary, suite))]
+    tables += [error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")]
+    if "heavy" in kinds:
+        tables += [success_table(summary, labels), error_table(summary, "heavy", name="heavy_errors")]
+    if swept:
+        tables.append(capacity_table(summary, capacity_rate))
+    if "pushes" in kinds:
+        tables.append(push_table(summary, capacity_rate))
+    tables.append(joint_table(summary))
+    differences = difference_table(trials)
+    return tables if differences is None else [*tables, differences]

@@ -1,101 +1,108 @@
-"""From the signals of trials to one row of figures a trial (paper eq. 9)."""
+"""From the signals of a trial to its row of figures."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
-ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
-"""The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""
+from iowbc.arrays import Array
+from iowbc.evaluation.trials.errors import (
+    deviations_from_clamped,
+    deviations_from_given,
+    deviations_standing_still,
+    given_commands,
+    moving,
+    velocity_deviation,
+)
+from iowbc.evaluation.trials.feet import foot_metrics
+from iowbc.evaluation.trials.load import load_metrics
+from iowbc.evaluation.trials.trace import Trace
+from iowbc.evaluation.trials.transport import commanded_path, covered
+from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.task.commands.script import CommandScript
 
 
 @dataclass(frozen=True)
-class Trace:
-    """The signals of one trial, one row a control step, up to its end or its fall."""
+class Measure:
+    """What is the same for all trials of an evaluation."""
 
-    dt: float
-    """Control period [s]."""
-    system_velocity: Array
-    """Common centre of mass of robot and object, heading frame, shape (T, 3) [m/s]."""
-    commanded_velocity: Array
-    """v_x, v_y [m/s], yaw rate [rad/s], heading frame, shape (T, 3)."""
-    heading: Array
-    """Yaw of the base, shape (T,) [rad]."""
-    heading_reference: Array
-    """Integrated commanded yaw rate, shape (T,) [rad]."""
-    torso_pitch: Array
-    """Shape (T,) [rad]."""
-    torso_pitch_command: Array
-    """Shape (T,) [rad]."""
-    pelvis_height: Array
-    """Shape (T,) [m]."""
-    height_command: Array
-    """Shape (T,) [m]."""
-    saturation: Array
-    """Share of the joints at their torque limit, shape (T,)."""
-    slipped: Array
-    """1 while a hand does not hold the object, or in a push does not touch it, shape (T,)."""
-    partner_force: Array
-    """Partner's force on the object, shape (T, 3) [N]."""
-    grip_force: Array
-    """Force of the object on each hand, left then right, world, shape (T, 6) [N]."""
-    power: Array
-    """Sum over the joints of |torque x speed|, shape (T,) [W]."""
-    base_position: Array
-    """Shape (T, 3), world [m]."""
+    control_frequency: float
+    """[Hz]."""
+    gait: GaitPrior
+    commands: Commands
+    foot_load: float
+    """Vertical force from which a foot counts as loaded [N]."""
+    joints: tuple[str, ...]
+    """Names of the joints, in the order of the signals."""
+
+    @property
+    def window(self) -> int:
+        """Control steps of one gait period, over which v_sys is averaged."""
+        return round(self.control_frequency / self.gait.frequency)
 
 
-def moving_average(values: Array, window: int) -> Array:
-    """Mean over a centred window (>= 1 step) along the first axis, shortened at both ends, shape as `values`."""
-    before, after = (window - 1) // 2, window // 2
-    summed = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
-    steps = np.arange(len(values))
-    first, last = np.maximum(steps - before, 0), np.minimum(steps + after + 1, len(values))
-    counts = (last - first).reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray((summed[last] - summed[first]) / counts, np.float64)
+def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_weight: float) -> dict[str, float]:
+    """Everything that is measured in a trial; `held_weight`: of the object in the hands [N], 0 without.
 
-
-def wrapped(angle: Array) -> Array:
-    """The same angle in [-pi, pi) [rad]."""
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi, np.float64)
-
-
-def velocity_error(system_velocity: Array, commanded_velocity: Array, window: int) -> float:
-    """E_v: mean planar |v_sys - v_coll| with v_sys averaged over `window` steps, one gait period [m/s]."""
-    averaged = moving_average(system_velocity[:, :2], window)
-    return float(np.mean(np.linalg.norm(averaged - commanded_velocity[:, :2], axis=1)))
-
-
-def trial_metrics(trace: Trace, gait_steps: int) -> dict[str, float]:
-    """The paper's errors, means over the trial, and what the trial cost.
-
-    gait_steps: control steps of one gait period, over which v_sys is averaged; `E_v_raw` is without averaging.
+    The paper's errors are told against the command as given: over the whole trial (`E_v`), over the part in which
+    steps are asked for (`E_v_moving`), against the command as clamped to what is feasible (`E_v_clamped`), and, from
+    the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`). `E_v_raw` is without averaging.
     """
-    steps = len(trace.heading)
-    if steps == 0:
+    if len(trace) == 0:
         raise ValueError("a trial without a single step has no metrics")
-    travelled = np.diff(trace.base_position[:, :2], axis=0, prepend=trace.base_position[:1, :2])
+    whole = given_commands(script, round(script.duration / trace.dt), trace.dt)
+    given = given_commands(script, len(trace), trace.dt)
+    steps_asked = moving(given, measure.gait)
+    deviations = deviations_from_given(trace, given, measure.window)
+    still = deviations_standing_still(whole, measure.commands, trace.dt)
+    walked = float(np.sum(np.linalg.norm(np.diff(trace.base_position[:, :2], axis=0), axis=1)))
+    still_errors = still.means() | still.means("_moving", moving(whole, measure.gait))
     return {
-        "E_alpha": float(np.mean(np.abs(trace.torso_pitch - trace.torso_pitch_command))),
-        "E_h": float(np.mean(np.abs(trace.pelvis_height - trace.height_command))),
-        "E_v": velocity_error(trace.system_velocity, trace.commanded_velocity, gait_steps),
-        "E_psi": float(np.mean(np.abs(wrapped(trace.heading - trace.heading_reference)))),
-        "E_v_raw": velocity_error(trace.system_velocity, trace.commanded_velocity, 1),
+        **deviations.means(),
+        **deviations.means("_moving", steps_asked),
+        **deviations_from_clamped(trace, measure.window).means("_clamped"),
+        **{f"still_{name}": value for name, value in still_errors.items()},
+        "E_v_raw": float(np.mean(velocity_deviation(trace.system_velocity, given, 1))),
+        **transport_metrics(trace, whole),
+        "distance": walked,
+        **foot_metrics(trace, measure.foot_load, walked),
+        **load_metrics(trace, held_weight),
+        **effort_metrics(trace, measure.joints),
+    }
+
+
+def transport_metrics(trace: Trace, whole: Array) -> dict[str, float]:
+    """The parts of the commanded way that robot and object cover; `whole`: commands of the whole trial (T, 11)."""
+    start = trace.heading_reference[0] - trace.commanded_velocity[0, 2] * trace.dt
+    directions, length = commanded_path(whole, float(start), trace.dt)
+    has_object = bool(np.any(trace.object_position))
+    return {
+        "commanded_distance": length,
+        "transport_robot": covered(trace.base_position, directions, length),
+        "transport_object": covered(trace.object_position, directions, length) if has_object else np.nan,
+    }
+
+
+def effort_metrics(trace: Trace, joints: tuple[str, ...]) -> dict[str, float]:
+    """What the trial cost: torques, energy, forces at hands and partner, jerk of torso and object."""
+    grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
+    peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
+    return {
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
         "slip_share": float(np.mean(trace.slipped > 0)),
         "partner_force_peak": float(np.max(np.linalg.norm(trace.partner_force, axis=1))),
-        "grip_force_peak": float(np.max(np.linalg.norm(trace.grip_force.reshape(steps, 2, 3), axis=2))),
+        "grip_force_peak": float(np.max(grips)),
         "energy": float(np.sum(trace.power) * trace.dt),
-        "distance": float(np.sum(np.linalg.norm(travelled, axis=1))),
+        "torso_jerk": jerk(trace.torso_position, trace.dt),
+        "object_jerk": jerk(trace.object_position, trace.dt) if np.any(trace.object_position) else np.nan,
+        **{f"peak_torque/{joint}": float(value) for joint, value in zip(joints, peak, strict=True)},
+        **{f"saturated/{joint}": float(value) for joint, value in zip(joints, saturated, strict=True)},
     }
 
 
-def error_norm(errors: Array) -> Array:
-    """Euclidean norm of the paper's four errors in SI units, shape (..., 4) to (...).
-
-    The paper's "norm error" is not defined there; this is the plainest reading.
-    """
-    return np.asarray(np.linalg.norm(errors, axis=-1), np.float64)
+def jerk(position: Array, dt: float) -> float:
+    """Root mean square of the third difference of a path (T, 3), over a control period each [m/s³], or NaN."""
+    if len(position) < 4:
+        return np.nan
+    return float(np.sqrt(np.mean(np.sum(np.square(np.diff(position, 3, axis=0) / dt**3), axis=1))))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.evaluation.trials.metrics import Trace
+from iowbc.evaluation.trials.trace import Trace
 
 Array = NDArray[np.float64]
 

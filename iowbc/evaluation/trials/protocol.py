@@ -1,28 +1,38 @@
-"""The whole evaluation: every sweep and heavy case, one row a trial, resumable batch by batch."""
+"""The whole evaluation: trials of many masses and suites at once over all workers, resumable batch by batch."""
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.trials.batch_policy import PolicyInBatch
-from iowbc.evaluation.trials.plan import Trial, heavier_mass, heavy_trials, sweep_trials
+from iowbc.evaluation.trials.plan import PlannedSweep, Trial, case_trials, planned_sweeps, push_trials
 from iowbc.evaluation.trials.rollout import Acting, play_episodes
-from iowbc.evaluation.trials.table import trial_row
+from iowbc.evaluation.trials.table import measure_of, trial_row
 from iowbc.files import replacing
-from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import load_robot
+from iowbc.task.specification import Specification
+
+
+def evaluated_world(specification: Specification) -> Specification:
+    """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's."""
+    recipe = specification.recipe
+    if recipe.eval.simulation is None:
+        return specification
+    pinned = recipe.model_copy(update={"simulation": recipe.eval.simulation})
+    return Specification(pinned, specification.robot, specification.rg)
 
 
 class Protocol:
-    """Plays the trials of a recipe's `eval` section; finished batches are kept in `work` and not played again."""
+    """Plays the trials of a recipe's `eval` section; finished batches are kept in `work` and not played again.
+
+    First all trials that the recipe names, then, round by round, those past the end of the sweeps that still succeed.
+    """
 
     def __init__(
         self,
-        recipe: Recipe,
-        robot: Path,
-        rg: Path | None,
+        world: Specification,
         policy: Acting,
         *,
         work: Path,
@@ -30,70 +40,82 @@ class Protocol:
         interrupted: Callable[[], bool] = lambda: False,
         progress: Callable[[float, float, str], None] = lambda done, total, note: None,
     ) -> None:
-        """`progress` is told trials done, trials known of, and the batch that is played."""
-        self.recipe, self.robot, self.rg, self.policy = recipe, robot, rg, policy
+        """`progress` is told trials done, trials known of, and what is played."""
+        self.world, self.policy = world, policy
         self.work, self.workers = work, workers
         self.interrupted, self.progress = interrupted, progress
+        self.measure = measure_of(world.recipe, load_robot(world.robot).joints)
         self.done, self.total = 0, 0
 
     def run(self) -> pd.DataFrame:
         """All trials, one row each: the table of `trials.parquet`. Raises Interrupted when interrupted."""
-        evaluation, commands = self.recipe.eval, self.recipe.task.commands
-        sweeps = {"lifting": evaluation.lifting, "pushing": evaluation.pushing}
-        heavy = heavy_trials(evaluation, commands)
-        self.total = len(heavy) + sum(len(s.masses) * evaluation.trials for s in sweeps.values() if s is not None)
-        tables: list[pd.DataFrame] = []
-        for suite, sweep in sweeps.items():
-            if sweep is None:
-                continue
-            tables.extend(self._batches(sweep_trials(evaluation, commands, suite, sweep, sweep.masses)))
-            heaviest = sweep.masses[-1]
-            while _any_survivor(tables[-1], heaviest) and (following := heavier_mass(sweep, heaviest)) is not None:
-                heaviest = following
-                trials = sweep_trials(evaluation, commands, suite, sweep, [heaviest])
-                self.total += len(trials)
-                tables.extend(self._batches(trials))
-        tables.extend(self._batches(heavy))
+        recipe = self.world.recipe
+        sweeps = planned_sweeps(recipe)
+        named = [trial for sweep in sweeps for trial in sweep.trials(sweep.sweep.masses)]
+        named += [*case_trials(recipe), *push_trials(recipe)]
+        tables = [self._round(0, named)]
+        heaviest = {sweep.suite: sweep.sweep.masses[-1] for sweep in sweeps}
+        going: Sequence[PlannedSweep] = sweeps
+        while going := [sweep for sweep in going if _succeeds(tables[-1], sweep.suite, heaviest[sweep.suite])]:
+            further = {sweep.suite: sweep.heavier(heaviest[sweep.suite]) for sweep in going}
+            going = [sweep for sweep in going if further[sweep.suite] is not None]
+            if not going:
+                break
+            heaviest |= {suite: mass for suite, mass in further.items() if mass is not None}
+            trials = [trial for sweep in going for trial in sweep.trials([heaviest[sweep.suite]])]
+            tables.append(self._round(len(tables), trials))
+        return _in_order(pd.concat(tables, ignore_index=True), list(dict.fromkeys(trial.suite for trial in named)))
+
+    def _round(self, number: int, trials: Sequence[Trial]) -> pd.DataFrame:
+        """The table of some trials, played batch by batch."""
+        self.total += len(trials)
+        batches = list(batched_by_duration(trials, self.world.recipe.eval.batch))
+        tables = [self._batch(f"trials-{number}-{place}", batch) for place, batch in enumerate(batches)]
         return pd.concat(tables, ignore_index=True)
 
-    def _batches(self, trials: Sequence[Trial]) -> Iterator[pd.DataFrame]:
-        """The tables of some trials, a batch for each case and mass; the policy computes in the shape of them all."""
-        begin = 0
-        for (case, mass), group in groupby(trials, lambda trial: (trial.case, trial.mass)):
-            batch = list(group)
-            name = case if batch[0].suite == "heavy" else f"{case}-{mass:g}"
-            yield self._batch(name, batch, begin, len(trials))
-            begin += len(batch)
-
-    def _batch(self, name: str, trials: Sequence[Trial], begin: int, size: int) -> pd.DataFrame:
-        """Rows `begin` and on of `size`."""
-        path = self.work / f"trials-{name}.parquet"
-        places = np.arange(begin, begin + len(trials))
+    def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
+        path = self.work / f"{name}.parquet"
+        suites = ", ".join(dict.fromkeys(trial.suite for trial in trials))
         if not path.is_file():
             longest = max(trial.episode.duration for trial in trials)
+            size, places = self.world.recipe.eval.batch, np.arange(len(trials))
 
             def progress(seconds: float) -> None:
                 reached = self.done + len(trials) * min(seconds / longest, 1.0)
-                self.progress(reached, self.total, f"{name}, {seconds:.0f} s")
+                self.progress(reached, self.total, f"{suites}, {seconds:.0f} s")
 
             outcomes = play_episodes(
-                self.recipe,
-                self.robot,
-                self.rg,
+                self.world,
                 [trial.episode for trial in trials],
                 PolicyInBatch(self.policy, size, places),
                 workers=self.workers,
                 interrupted=self.interrupted,
                 progress=progress,
             )
-            rows = [trial_row(self.recipe, trial, outcome) for trial, outcome in zip(trials, outcomes, strict=True)]
-            table = pd.DataFrame(rows).assign(batch_size=size, batch_row=places)
+            rows = [
+                trial_row(self.world.recipe, self.measure, trial, outcome)
+                for trial, outcome in zip(trials, outcomes, strict=True)
+            ]
             with replacing(path) as fresh:
-                table.to_parquet(fresh, index=False)
+                pd.DataFrame(rows).assign(batch_size=size, batch_row=places).to_parquet(fresh, index=False)
         self.done += len(trials)
-        self.progress(self.done, self.total, name)
+        self.progress(self.done, self.total, suites)
         return pd.read_parquet(path)
 
 
-def _any_survivor(table: pd.DataFrame, mass: float) -> bool:
-    return bool(table.loc[table["mass"] == mass, "survived"].any())
+def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Trial]]:
+    """Trials of one duration in batches of at most `size`, so that none waits long for another to end."""
+    for duration in sorted({trial.episode.duration for trial in trials}):
+        alike = [trial for trial in trials if trial.episode.duration == duration]
+        for first in range(0, len(alike), size):
+            yield alike[first : first + size]
+
+
+def _succeeds(table: pd.DataFrame, suite: str, mass: float) -> bool:
+    return bool(table.loc[(table["suite"] == suite) & (table["mass"] == mass), "succeeded"].any())
+
+
+def _in_order(table: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
+    """By suite, then as they were played, lighter masses first."""
+    order = table.assign(_rank=table["suite"].map(suites.index))
+    return order.sort_values(["_rank", "mass"], kind="stable").drop(columns="_rank").reset_index(drop=True)

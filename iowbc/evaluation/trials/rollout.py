@@ -2,16 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.errors import Interrupted
-from iowbc.evaluation.trials.metrics import Trace
 from iowbc.evaluation.trials.outcome import Outcome
-from iowbc.recipe.recipe import Recipe
+from iowbc.evaluation.trials.trace import Trace
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -20,8 +18,6 @@ Array = NDArray[np.float64]
 
 RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
 """Signals that a trace keeps."""
-VECTORS = ("system_velocity", "commanded_velocity", "partner_force", "grip_force", "base_position")
-"""Those of them with more than one column."""
 ASK_EVERY = 25
 """Control steps between two questions whether to stop."""
 
@@ -37,9 +33,7 @@ class Acting(Protocol):
 
 
 def play_episodes(
-    recipe: Recipe,
-    robot: Path,
-    rg: Path | None,
+    world: Specification,
     episodes: Sequence[Episode],
     policy: Acting,
     *,
@@ -51,18 +45,15 @@ def play_episodes(
 
     progress: told the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
     """
-    environment = VectorEnv(
-        Specification(recipe, robot, rg), num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes)
-    )
+    environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes))
     try:
-        return play_in(environment, recipe, policy, interrupted, progress)
+        return play_in(environment, policy, interrupted, progress)
     finally:
         environment.close()
 
 
 def play_in(
     environment: VectorEnv,
-    recipe: Recipe,
     policy: Acting,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
@@ -72,7 +63,7 @@ def play_in(
 
     look: called with the time [s] after the reset and after each step, while the first episode lasts.
     """
-    count, dt = environment.num_envs, 1.0 / recipe.task.control_frequency
+    count, dt = environment.num_envs, environment.period
     layout = environment.layout
     observation = environment.reset()
     drawn = {name: np.array(values, np.float64).reshape(count, -1) for name, values in environment.drawn().items()}
@@ -117,4 +108,4 @@ def play_in(
 
 def _trace(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
     rows = {name: values[:steps, index] for name, values in recorded.items()}
-    return Trace(dt=dt, **{name: row if name in VECTORS else row[:, 0] for name, row in rows.items()})
+    return Trace(dt=dt, **{name: row if row.shape[1] > 1 else row[:, 0] for name, row in rows.items()})

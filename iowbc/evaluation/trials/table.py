@@ -5,35 +5,58 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.arrays import Array
+from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.recipe.evaluation import Success
+from iowbc.recipe.evaluation.success import Success
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import GRAVITY
 from iowbc.task.episodes import Episode
 
+STAGNATION = "stagnation"
 
-def trial_row(recipe: Recipe, trial: Trial, outcome: Outcome) -> dict[str, Any]:
+
+def measure_of(recipe: Recipe, joints: tuple[str, ...]) -> Measure:
+    """How the trials of a recipe are measured; `joints`: their names."""
+    task = recipe.task
+    return Measure(task.control_frequency, task.references.gait, task.commands, recipe.eval.foot_load, joints)
+
+
+def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) -> dict[str, Any]:
     """One row of the long table: what was tried, how it ended, the metrics, everything drawn, and how to replay it."""
-    gait_steps = round(recipe.task.control_frequency / recipe.task.references.gait.frequency)
+    episode, fixed = trial.episode, trial.episode.fixed
+    if episode.script is None:
+        raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
+    held = getattr(recipe.simulation.scenes, episode.scene).kind == "lift"
+    weight = GRAVITY * float(outcome.drawn["object_mass"][0]) if held else 0.0
+    metrics = trial_metrics(outcome.trace, episode.script, measure, weight)
+    alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
         "policy": recipe.eval.policy,
+        "kind": trial.kind,
         "suite": trial.suite,
         "case": trial.case,
-        "scene": trial.episode.scene,
+        "scene": episode.scene,
         "mass": trial.mass,
+        "impulse": trial.impulse,
         "trial": trial.number,
-        "seed": trial.episode.seed,
-        "duration": trial.episode.duration,
-        "survived": survived(recipe.eval.success, outcome),
+        "seed": episode.seed,
+        "duration": episode.duration,
+        "height": recipe.rg.height,
+        "gait_period": 1.0 / measure.gait.frequency,
+        "partner_share": fixed.get("partner_share", np.nan),
+        "rolling_resistance": fixed.get("object_ground_friction", np.nan),
+        "survived": alive,
+        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics),
+        "carried": metrics["weight_in_hands"] >= recipe.eval.success.weight_in_hands,
         "end": outcome.ending,
         "seconds": outcome.seconds,
-        **trial_metrics(outcome.trace, gait_steps),
+        **metrics,
         **{f"drawn_{name}": _plain(values) for name, values in outcome.drawn.items()},
-        "episode": json.dumps(trial.episode.as_json()),
+        "episode": json.dumps(episode.as_json()),
     }
 
 
@@ -43,10 +66,18 @@ def survived(success: Success, outcome: Outcome) -> bool:
     return outcome.survived and not slipped
 
 
+def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
+    """Whether a trial that was survived is a success: transport, or in a push that is infeasible posture."""
+    if kind == STAGNATION:
+        return metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
+    ways = (metrics["transport_robot"], metrics["transport_object"])
+    return all(np.isnan(way) or way >= success.transport for way in ways)
+
+
 def replayed(row: "pd.Series[Any]") -> Episode:
     """The episode of a row of the long table, to be played again."""
     return Episode.from_json(json.loads(row["episode"]))
 
 
-def _plain(values: NDArray[np.float64]) -> float | list[float]:
+def _plain(values: Array) -> float | list[float]:
     return float(values[0]) if len(values) == 1 else [float(value) for value in values]

@@ -1,0 +1,40 @@
+"""What has to be said beside a table: load, partner, friction, what the height is, how E_v was averaged, and where."""
+
+import numpy as np
+import pandas as pd
+
+HEIGHTS = {"pelvis": "the pelvis above the ground", "com": "the robot's centre of mass above the ground"}
+
+
+def conditions(rows: pd.DataFrame) -> str:
+    """The conditions of the trials in rows of a summary, in a sentence or two."""
+    said = ["In simulation", partner(rows)]
+    if (rows["kind"] == "pushing").any():
+        said.append(rolling_resistance(rows))
+    return ", ".join(said) + "."
+
+
+def measures(rows: pd.DataFrame) -> str:
+    """How the errors were measured."""
+    first = rows.iloc[0]
+    return (
+        f"Errors against the command as given; height is that of {HEIGHTS[str(first['height'])]}; "
+        f"E_v with v_sys averaged over one gait period of {float(first['gait_period']):.2f} s."
+    )
+
+
+def partner(rows: pd.DataFrame) -> str:
+    """Who helps."""
+    shares = rows["partner_share"].unique()
+    if len(shares) > 1:
+        return "the partner's share by case"
+    share = float(shares[0])
+    if np.isnan(share):
+        return "the partner's share drawn as in training"
+    return "without a partner (share 0)" if share == 0 else f"with a partner (share {share:g})"
+
+
+def rolling_resistance(rows: pd.DataFrame) -> str:
+    """The crate's μ."""
+    value = float(rows["rolling_resistance"].iloc[0])
+    return "rolling resistance drawn as in training" if np.isnan(value) else f"rolling resistance μ {value:g}"

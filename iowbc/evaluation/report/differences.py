@@ -1,0 +1,91 @@
+"""Whether variants differ: trials of one seed are compared in pairs."""
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from iowbc.evaluation.report.aggregate import variants_of
+from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS
+from iowbc.evaluation.report.statistics import mean_half_width
+from iowbc.evaluation.report.tables import ABSENT, Table
+from iowbc.evaluation.trials.errors import ERRORS
+
+PAIR = ["suite", "case", "mass", "impulse", "trial"]
+"""What two trials have in common that meet the same world and commands."""
+
+
+def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
+    """The trials of two variants side by side, with the suffixes `_variant` and `_reference`."""
+    columns = [*PAIR, "survived", "succeeded", *ERRORS]
+    own, other = (trials.loc[trials["variant"] == name, columns] for name in (variant, reference))
+    return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"), validate="one_to_one")
+
+
+def mean_difference(values: pd.Series) -> tuple[float, float, float]:
+    """Mean of paired differences, half its 95 % interval, Student's p of no difference; NaN of too few or equal."""
+    differences = values.to_numpy(np.float64)
+    if len(differences) < 2 or np.allclose(differences, differences[0]):
+        return float(np.mean(differences)) if len(differences) else np.nan, np.nan, np.nan
+    return (
+        float(differences.mean()),
+        mean_half_width(differences),
+        float(stats.ttest_1samp(differences, 0.0).pvalue),
+    )
+
+
+def success_p(pairs: pd.DataFrame) -> float:
+    """McNemar's exact p of equal success; 1 where no pair differs."""
+    better = int((pairs["succeeded_variant"] & ~pairs["succeeded_reference"]).sum())
+    worse = int((~pairs["succeeded_variant"] & pairs["succeeded_reference"]).sum())
+    return float(stats.binomtest(better, better + worse).pvalue) if better + worse else 1.0
+
+
+def difference_table(trials: pd.DataFrame) -> Table | None:
+    """How each variant differs from the first, over all masses of each suite; None for a single variant."""
+    reference, *others = variants_of(trials)
+    rows, numbers = [], []
+    for suite in dict.fromkeys(trials["suite"]):
+        within = trials[trials["suite"] == suite]
+        for variant in others:
+            pairs = paired(within, variant, reference)
+            if pairs.empty:
+                continue
+            both = pairs[pairs["survived_variant"] & pairs["survived_reference"]]
+            found = {name: mean_difference(both[f"{name}_variant"] - both[f"{name}_reference"]) for name in ERRORS}
+            success = float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean())
+            p = success_p(pairs)
+            cells = [_cell(*found[name]) for name in ERRORS]
+            rows.append((suite, variant, str(len(both)), *cells, f"{100 * success:+.0f} % (p {p:.2g})"))
+            numbers.append(
+                {"suite": suite, "variant": variant, "reference": reference, "pairs": len(pairs), "both": len(both)}
+                | {
+                    f"{name}{part}": value
+                    for name in ERRORS
+                    for part, value in zip(("", "_half", "_p"), found[name], strict=True)
+                }
+                | {"success": success, "success_p": p}
+            )
+    if not rows:
+        return None
+    return Table(
+        "differences",
+        f"Differences to {reference} in pairs of trials that met the same world and commands, over all masses of a "
+        "suite: errors where both survived, with their 95 % interval and Student's p; success with McNemar's exact p. "
+        "Negative errors are better.",
+        ("Suite", "Algorithm", "Pairs", *(f"Δ{head}" for head in HEADS.values()), "Δ success"),
+        (
+            "Suite",
+            "Algorithm",
+            "Pairs",
+            *(rf"$\Delta {head[1:]}" for head in LATEX_HEADS.values()),
+            r"$\Delta$ success",
+        ),
+        tuple(rows),
+        pd.DataFrame(numbers),
+    )
+
+
+def _cell(mean: float, half: float, p: float) -> str:
+    if np.isnan(mean):
+        return ABSENT
+    return f"{mean:+.3f}" if np.isnan(half) else f"{mean:+.3f} ± {half:.3f} (p {p:.2g})"

@@ -1,0 +1,142 @@
+"""Tables of tracking errors in the paper's own form (II and III), beside its numbers and a robot that stands still."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+
+from iowbc.evaluation.paper import VARIANTS, reported
+from iowbc.evaluation.report.captions import conditions, measures
+from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
+from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.evaluation.trials.transport import SHORTEST_WAY
+
+HEADS = {"E_alpha": "E_α [rad]", "E_h": "E_h [m]", "E_v": "E_v [m/s]", "E_psi": "E_ψ [rad]"}
+LATEX_HEADS = {"E_alpha": r"$E_{\alpha}$", "E_h": "$E_{h}$", "E_v": "$E_{v}$", "E_psi": r"$E_{\psi}$"}
+NUMBERS = {"lifting": "II", "pushing": "III"}
+STANDS_STILL = "stands still"
+"""The row of a robot that does nothing, computed from the script: who scores no better has done nothing."""
+ANY_MASS = "any"
+NO_LABELS: Mapping[str, str] = MappingProxyType({})
+
+
+def error_table(
+    summary: pd.DataFrame, suite: str, labels: Mapping[str, str] = NO_LABELS, name: str | None = None
+) -> Table:
+    """Errors over the whole trial by mass or case and variant, with survival, success, transport, weight in the hands.
+
+    labels: the paper's name of variants that go by another one here; where it knows none, its columns are left out.
+    name: of the table; that of the suite by default.
+    """
+    chosen = summary[summary["suite"] == suite]
+    kind = str(chosen["kind"].iloc[0])
+    swept = kind in NUMBERS
+    with_paper = swept and any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
+    rows = []
+    for first, group in _groups(chosen, swept):
+        for _, row in group.iterrows():
+            variant = str(row["variant"])
+            theirs = _theirs(kind, float(row["mass"]), labels.get(variant, variant)) if with_paper else []
+            rows.append((first, variant, *_errors(row), *_outcome(row), *theirs))
+        if not swept:
+            rows.append((first, STANDS_STILL, *_still(group), *_still_outcome(group)))
+    if swept:
+        nothing = [ABSENT] * len(ERRORS) if with_paper else []
+        rows.append((ANY_MASS, STANDS_STILL, *_still(chosen), *_still_outcome(chosen), *nothing))
+    columns = ("Mass" if swept else "Case", "Algorithm")
+    outcome = ("Survived", "Success", "Transport", "In hands")
+    paper = [f"paper {head.split()[0]}" for head in HEADS.values() if with_paper]
+    latex_paper = [f"paper {head}" for head in LATEX_HEADS.values() if with_paper]
+    return Table(
+        name=name or slug(suite),
+        caption=_caption(chosen, kind, with_paper),
+        head=(*columns, *HEADS.values(), *outcome, *paper),
+        latex_head=(*columns, *LATEX_HEADS.values(), *outcome, *latex_paper),
+        rows=tuple(rows),
+        numbers=chosen,
+    )
+
+
+def moving_table(summary: pd.DataFrame, suite: str) -> Table:
+    """The errors over the part of the trials in which steps are asked for."""
+    chosen = summary[summary["suite"] == suite]
+    swept = str(chosen["kind"].iloc[0]) in NUMBERS
+    rows = []
+    for first, group in _groups(chosen, swept):
+        rows += [(first, str(row["variant"]), *_errors(row, "_moving")) for _, row in group.iterrows()]
+        if not swept:
+            rows.append((first, STANDS_STILL, *_still(group, "_moving")))
+    if swept:
+        rows.append((ANY_MASS, STANDS_STILL, *_still(chosen, "_moving")))
+    columns = ("Mass" if swept else "Case", "Algorithm")
+    return Table(
+        name=f"{slug(suite)}_moving",
+        caption=f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
+        f"95 % interval. {conditions(chosen)} {measures(chosen)}",
+        head=(*columns, *HEADS.values()),
+        latex_head=(*columns, *LATEX_HEADS.values()),
+        rows=tuple(rows),
+        numbers=chosen,
+    )
+
+
+def slug(suite: str) -> str:
+    """A suite's name as that of a file."""
+    return suite.replace(" ", "_")
+
+
+def _groups(chosen: pd.DataFrame, swept: bool) -> list[tuple[str, pd.DataFrame]]:
+    """The rows of each mass, or case with its mass, with what stands in the first column."""
+    named = chosen.groupby("mass" if swept else ["case", "mass"], sort=False)
+    return [(f"{key:g} kg" if swept else f"{key[0]} ({key[1]:g} kg)", group) for key, group in named]
+
+
+def _errors(row: pd.Series, part: str = "") -> list[str]:
+    return [_with_half(row[f"{name}{part}"], row[f"{name}{part}_half"]) for name in ERRORS]
+
+
+def _outcome(row: pd.Series) -> list[str]:
+    ways = (float(row["transport_robot"]), float(row["transport_object"]))
+    share = float(row["weight_in_hands"])
+    return [
+        f"{row['survived']}/{row['trials']}",
+        f"{row['succeeded']}/{row['trials']}",
+        " / ".join(f"{way:.2f}" for way in ways if not np.isnan(way)) or ABSENT,
+        ABSENT if np.isnan(share) else f"{100 * share:.0f} %",
+    ]
+
+
+def _still(rows: pd.DataFrame, part: str = "") -> list[str]:
+    values = [float(rows[f"still_{name}{part}"].mean()) for name in ERRORS]
+    return [ABSENT if np.isnan(value) else f"{value:.3f}" for value in values]
+
+
+def _still_outcome(rows: pd.DataFrame) -> list[str]:
+    walks = bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
+    return [ABSENT, "none" if walks else ABSENT, "0.00" if walks else ABSENT, ABSENT]
+
+
+def _theirs(kind: str, mass: float, variant: str) -> list[str]:
+    paper = reported(kind, mass, variant)
+    if paper == "absent":
+        return [ABSENT] * len(ERRORS)
+    return [FAILS] * len(ERRORS) if paper is None else [f"{value:.3f}" for value in paper]
+
+
+def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
+    title = f"cooperative {kind} (paper's Table {NUMBERS[kind]})" if kind in NUMBERS else f"the suite {kind}"
+    aim = " Success here is survival in posture, for the push is infeasible." if kind == "stagnation" else ""
+    beside = " Right, what the paper reports for its own commands." if with_paper else ""
+    return (
+        f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
+        f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
+        f"in hands: part of the weight that the robot carries which rests in its hands; {STANDS_STILL}: what doing "
+        f"nothing scores, from the script.{aim}{beside}"
+    )
+
+
+def _with_half(value: float, half: float) -> str:
+    if np.isnan(value):
+        return FAILS
+    return f"{value:.3f}" if np.isnan(half) else f"{value:.3f} ± {half:.3f}"

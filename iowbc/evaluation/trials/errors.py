@@ -1,0 +1,114 @@
+"""The paper's tracking errors (eq. 9): means of absolute deviations from the command."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.control import gait
+from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+from iowbc.evaluation.trials.trace import Trace
+from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.task.commands.script import CommandScript
+
+ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
+"""The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How far a trial was from a command, one row a control step, each of shape (T,)."""
+
+    pitch: Array
+    """[rad]."""
+    height: Array
+    """[m]."""
+    velocity: Array
+    """Planar |v_sys - v_coll| [m/s]."""
+    heading: Array
+    """[rad]."""
+
+    def means(self, suffix: str = "", part: Mask | slice = slice(None)) -> dict[str, float]:
+        """The four errors over a part of the trial, by `ERRORS` and a suffix; NaN where the part is empty."""
+        values = (self.pitch[part], self.height[part], self.velocity[part], self.heading[part])
+        means = (float(np.mean(value)) if len(value) else np.nan for value in values)
+        return {f"{name}{suffix}": mean for name, mean in zip(ERRORS, means, strict=True)}
+
+
+def given_commands(script: CommandScript, steps: int, dt: float) -> Array:
+    """The commands that a script gives in force in each of the first control steps, (steps, 11)."""
+    times, values = script.knots()
+    at = dt * np.arange(steps)
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
+
+
+def moving(given: Array, settings: GaitPrior) -> Mask:
+    """Where a command (T, 11) asks for steps, (T,)."""
+    return gait.wants_to_move(given, settings)
+
+
+def given_heading(trace: Trace, given: Array) -> Array:
+    """The heading that the given yaw rates lead to, (T,) [rad]."""
+    start = trace.heading_reference[0] - trace.commanded_velocity[0, YAW_RATE] * trace.dt
+    heading: Array = start + trace.dt * np.cumsum(given[:, YAW_RATE])
+    return heading
+
+
+def deviations_from_given(trace: Trace, given: Array, window: int) -> Deviations:
+    """Against the commands (T, 11) as given; `window`: control steps over which v_sys is averaged, one gait period."""
+    return Deviations(
+        pitch=np.abs(trace.torso_pitch - given[:, PITCH]),
+        height=np.abs(trace.pelvis_height - given[:, HEIGHT]),
+        velocity=velocity_deviation(trace.system_velocity, given, window),
+        heading=np.abs(wrapped(trace.heading - given_heading(trace, given))),
+    )
+
+
+def deviations_from_clamped(trace: Trace, window: int) -> Deviations:
+    """Against the commands as they were clamped to what is feasible and limited in their rate."""
+    return Deviations(
+        pitch=np.abs(trace.torso_pitch - trace.torso_pitch_command),
+        height=np.abs(trace.pelvis_height - trace.height_command),
+        velocity=velocity_deviation(trace.system_velocity, trace.commanded_velocity, window),
+        heading=np.abs(wrapped(trace.heading - trace.heading_reference)),
+    )
+
+
+def deviations_standing_still(given: Array, commands: Commands, dt: float) -> Deviations:
+    """What a robot that stands still in the nominal posture would be off, from the commands (T, 11) alone."""
+    return Deviations(
+        pitch=np.abs(given[:, PITCH] - commands.nominal_pitch),
+        height=np.abs(given[:, HEIGHT] - commands.nominal_height),
+        velocity=np.hypot(given[:, 0], given[:, 1]),
+        heading=np.abs(wrapped(dt * np.cumsum(given[:, YAW_RATE]))),
+    )
+
+
+def velocity_deviation(system_velocity: Array, commanded: Array, window: int) -> Array:
+    """Planar |v_sys - v_coll| with v_sys (T, 3) averaged over `window` steps, (T,) [m/s]."""
+    averaged = moving_average(system_velocity[:, :2], window)
+    return np.asarray(np.linalg.norm(averaged - commanded[:, :2], axis=1))
+
+
+def moving_average(values: Array, window: int) -> Array:
+    """Mean over a centred window (>= 1 step) along the first axis, shortened at both ends, shape as `values`."""
+    before, after = (window - 1) // 2, window // 2
+    summed = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
+    steps = np.arange(len(values))
+    first, last = np.maximum(steps - before, 0), np.minimum(steps + after + 1, len(values))
+    counts = (last - first).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((summed[last] - summed[first]) / counts)
+
+
+def wrapped(angle: Array) -> Array:
+    """The same angle in [-pi, pi) [rad]."""
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def error_norm(errors: Array) -> Array:
+    """Euclidean norm of the paper's four errors in SI units, shape (..., 4) to (...).
+
+    The paper's "norm error" is not defined there; this is the plainest reading.
+    """
+    return np.asarray(np.linalg.norm(errors, axis=-1))

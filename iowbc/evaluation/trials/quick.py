@@ -1,0 +1,90 @@
+"""A small fixed evaluation that a training plays again and again, to tell its better policies from its worse."""
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from iowbc.evaluation.paper import LIFTING
+from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, Trial, command_script, sequence_for
+from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.table import measure_of, trial_row
+from iowbc.robot.description import load_robot
+from iowbc.task.specification import Specification
+from iowbc.task.vector.vector_env import VectorEnv
+
+SCALES = dict(zip(ERRORS, LIFTING[0.0]["IO-WBC"] or (), strict=True))
+"""Errors that halve the score: the paper's own without a load."""
+
+FIGURES = {
+    "survived": "survived",
+    "succeeded": "succeeded",
+    "transport_robot": "transport",
+    "weight_in_hands": "weight_in_hands",
+}
+"""Columns of the long table that are told, and their names here."""
+
+
+def quick_trials(world: Specification, scene: str, masses: Sequence[float], count: int, seed: int) -> list[Trial]:
+    """`count` trials of a scene's sequence at each mass [kg], without a partner and without disturbances."""
+    script = command_script(sequence_for(world.recipe, scene), world.recipe.task.commands)
+    condition = Condition(scene, script, UNDISTURBED | {"partner_share": 0.0})
+    return [
+        Trial("quick", "quick", scene, mass, number, condition.episode(mass, seed + number))
+        for mass in masses
+        for number in range(count)
+    ]
+
+
+class QuickEvaluation:
+    """Plays the same trials with one policy after another. Use as a context manager, or `close` it."""
+
+    def __init__(self, world: Specification, trials: Sequence[Trial], *, workers: int = 0) -> None:
+        """`workers`: processes; 0 steps the trials in this one. The figures do not depend on it."""
+        self.trials, self.recipe = tuple(trials), world.recipe
+        self._measure = measure_of(world.recipe, load_robot(world.robot).joints)
+        episodes = [trial.episode for trial in trials]
+        self._environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=episodes)
+
+    def play(self, policy: Acting) -> dict[str, float]:
+        """Means over all trials: see `figures`."""
+        outcomes = play_in(self._environment, policy)
+        return figures([self._row(trial, outcome) for trial, outcome in zip(self.trials, outcomes, strict=True)])
+
+    def _row(self, trial: Trial, outcome: Outcome) -> dict[str, float]:
+        row = trial_row(self.recipe, self._measure, trial, outcome)
+        return {name: float(row[name]) for name in (*FIGURES, *ERRORS)} | {
+            "upright": outcome.seconds / trial.episode.duration
+        }
+
+    def close(self) -> None:
+        """Ends the environments."""
+        self._environment.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def figures(rows: Sequence[dict[str, float]]) -> dict[str, float]:
+    """Means over trials: survived, succeeded, transport, weight_in_hands, upright (part of the time), four errors up
+    to the end of each trial, and `score`.
+
+    The score of a trial, in [0, 1], is the part of the time that it stayed upright times the mean over the four errors
+    of 1 / (1 + error / scale): 1 without any error, 1/2 at the paper's.
+    """
+    means = {
+        told: float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
+        for name, told in [*FIGURES.items(), *((error, error) for error in ERRORS), ("upright", "upright")]
+        for values in [np.array([row[name] for row in rows])]
+    }
+    quality = [np.mean([1.0 / (1.0 + row[name] / SCALES[name]) for name in ERRORS]) for row in rows]
+    score = np.mean([row["upright"] * one for row, one in zip(rows, quality, strict=True)])
+    return means | {"score": float(score)}

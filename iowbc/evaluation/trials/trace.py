@@ -1,0 +1,60 @@
+"""The signals of one trial."""
+
+from dataclasses import dataclass
+
+from iowbc.arrays import Array
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One row a control step, up to the trial's end or its fall. Vectors are in the world frame unless said."""
+
+    dt: float
+    """Control period [s]."""
+    system_velocity: Array
+    """Common centre of mass of robot and object, heading frame, shape (T, 3) [m/s]."""
+    commanded_velocity: Array
+    """v_x, v_y [m/s], yaw rate [rad/s] as clamped to what is feasible, heading frame, shape (T, 3)."""
+    heading: Array
+    """Yaw of the base, shape (T,) [rad]."""
+    heading_reference: Array
+    """Integrated commanded yaw rate, shape (T,) [rad]."""
+    torso_pitch: Array
+    """Shape (T,) [rad]."""
+    torso_pitch_command: Array
+    """As clamped, shape (T,) [rad]."""
+    pelvis_height: Array
+    """What H speaks of, shape (T,) [m]."""
+    height_command: Array
+    """As clamped, shape (T,) [m]."""
+    saturation: Array
+    """Share of the joints at their torque limit, shape (T,)."""
+    slipped: Array
+    """1 while a hand does not hold the object, or in a push does not touch it, shape (T,)."""
+    partner_force: Array
+    """Partner's force on the object, shape (T, 3) [N]."""
+    grip_force: Array
+    """Force of the object on each hand, left then right, shape (T, 6) [N]."""
+    power: Array
+    """Sum over the joints of |torque x speed|, shape (T,) [W]."""
+    base_position: Array
+    """Shape (T, 3) [m]."""
+    torso_position: Array
+    """A point within the torso, shape (T, 3) [m]."""
+    object_position: Array
+    """Shape (T, 3) [m]; zero without an object."""
+    foot_position: Array
+    """Sole centres, left then right, shape (T, 6) [m]."""
+    foot_velocity: Array
+    """Of the sole centres, shape (T, 6) [m/s]."""
+    foot_load: Array
+    """Vertical force of the ground on each foot, shape (T, 2) [N]."""
+    foot_contact: Array
+    """1 while a foot touches the ground, shape (T, 2)."""
+    joint_torque: Array
+    """Shape (T, joints) [N·m]."""
+    joint_saturation: Array
+    """1 while a joint is at its torque limit, shape (T, joints)."""
+
+    def __len__(self) -> int:
+        return len(self.heading)

@@ -1,0 +1,95 @@
+"""Made-up trials, whose figures are known."""
+
+import numpy as np
+import pandas as pd
+
+from iowbc.evaluation.report.aggregate import ALL_ERRORS, COSTS, STILL
+from iowbc.evaluation.trials.metrics import Measure
+from iowbc.evaluation.trials.trace import Trace
+from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.task.commands.script import CommandScript, CommandSegment
+
+DT = 0.02
+JOINTS = ("hip", "knee")
+MEASURE = Measure(50.0, GaitPrior(frequency=1.25), Commands(nominal_height=0.75), foot_load=50.0, joints=JOINTS)
+GAIT_STEPS = MEASURE.window
+
+
+def script(seconds: float = 8.0, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> CommandScript:
+    """One segment at H 0.75 m, upright."""
+    return CommandScript((CommandSegment(seconds, (*velocity, 0.75, 0.0, *[0.0] * 6)),))
+
+
+def trace(steps: int = 400) -> Trace:
+    """A robot that stands as it is told, heading along x, with nothing in its hands."""
+    zeros, vectors = np.zeros(steps), np.zeros((steps, 3))
+    return Trace(
+        dt=DT,
+        system_velocity=vectors,
+        commanded_velocity=vectors,
+        heading=zeros,
+        heading_reference=zeros,
+        torso_pitch=zeros,
+        torso_pitch_command=zeros,
+        pelvis_height=np.full(steps, 0.75),
+        height_command=np.full(steps, 0.75),
+        saturation=zeros,
+        slipped=zeros,
+        partner_force=vectors,
+        grip_force=np.zeros((steps, 6)),
+        power=np.full(steps, 100.0),
+        base_position=vectors,
+        torso_position=vectors,
+        object_position=vectors,
+        foot_position=np.zeros((steps, 6)),
+        foot_velocity=np.zeros((steps, 6)),
+        foot_load=np.full((steps, 2), 160.0),
+        foot_contact=np.ones((steps, 2)),
+        joint_torque=np.zeros((steps, len(JOINTS))),
+        joint_saturation=np.zeros((steps, len(JOINTS))),
+    )
+
+
+def trials_of(
+    variant: str,
+    suite: str,
+    survivors: dict[float, int],
+    case: str = "",
+    *,
+    error: float = 0.1,
+    kind: str = "",
+    impulse: float = 0.0,
+) -> pd.DataFrame:
+    """Five trials a mass, of which the given number survived and succeeded, with errors that grow by 0.1 a trial."""
+    rows = [
+        {
+            "variant": variant,
+            "kind": kind or suite.split(" ")[0],
+            "suite": suite,
+            "case": case or suite,
+            "mass": mass,
+            "impulse": impulse,
+            "trial": trial,
+            "survived": trial < count,
+            "succeeded": trial < count,
+            "carried": trial < count,
+            **dict.fromkeys(ALL_ERRORS, error + 0.1 * trial),
+            **dict.fromkeys(STILL, 0.25),
+            **dict.fromkeys(COSTS, 1.0),
+            "transport_robot": 0.9,
+            "transport_object": 0.8,
+            "commanded_distance": 4.0,
+            "partner_share": 0.5 if "partner" in suite else 0.0,
+            "rolling_resistance": 0.06,
+            "height": "pelvis",
+            "gait_period": 0.8,
+            "peak_torque/hip": 20.0,
+            "peak_torque/knee": 40.0,
+            "saturated/hip": 0.0,
+            "saturated/knee": 0.1,
+        }
+        for mass, count in survivors.items()
+        for trial in range(5)
+    ]
+    return pd.DataFrame(rows)

@@ -1,0 +1,70 @@
+"""Slip, swing clearance, and who carries the object, on signals that are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_up_trials import DT, trace
+
+from iowbc.evaluation.trials.feet import foot_metrics, runs
+from iowbc.evaluation.trials.load import load_metrics
+
+
+def test_only_loaded_feet_slip() -> None:
+    signals = trace(100)
+    velocity, load = signals.foot_velocity.copy(), signals.foot_load.copy()
+    velocity[:50, 0] = 0.1  # left foot, loaded in the first half
+    velocity[:, 5] = 3.0  # upward speed of the right foot is no slip
+    load[50:, 0] = 0.0
+    velocity[50:, 0] = 2.0
+    metrics = foot_metrics(replace(signals, foot_velocity=velocity, foot_load=load), 50.0, walked=2.0)
+    assert metrics["foot_slip"] == pytest.approx(0.1 * 50 * DT)
+    assert metrics["foot_slip_per_metre"] == pytest.approx(0.05)
+
+
+def test_the_largest_slip_is_that_of_one_stance() -> None:
+    signals = trace(90)
+    load, velocity = signals.foot_load.copy(), signals.foot_velocity.copy()
+    load[30:60, 0] = 0.0
+    velocity[:30, 0], velocity[60:, 0] = 0.1, 0.3
+    metrics = foot_metrics(replace(signals, foot_velocity=velocity, foot_load=load), 50.0, walked=0.0)
+    assert metrics["foot_slip_peak"] == pytest.approx(0.3 * 30 * DT)
+    assert np.isnan(metrics["foot_slip_per_metre"]), "nobody walked"
+
+
+def test_swing_clearance_is_the_mean_of_the_highest_points_of_each_foot() -> None:
+    signals = trace(100)
+    contact, position = signals.foot_contact.copy(), signals.foot_position.copy()
+    for begin, height in ((10, 0.06), (50, 0.10)):
+        contact[begin : begin + 20, 0] = 0
+        position[begin : begin + 20, 2] = height * np.sin(np.pi * np.linspace(0, 1, 20))
+    metrics = foot_metrics(replace(signals, foot_contact=contact, foot_position=position), 50.0, walked=1.0)
+    assert metrics["swings"] == 2
+    assert metrics["swing_clearance_left"] == pytest.approx(0.08, rel=0.01)
+    assert metrics["swing_clearance_right"] == 0.0
+
+
+def test_runs_are_where_the_mask_is_true() -> None:
+    assert runs(np.array([True, False, True, True])) == [slice(0, 1), slice(2, 4)]
+    assert runs(np.zeros(3, bool)) == []
+
+
+def test_what_the_partner_bears_is_not_asked_of_the_hands() -> None:
+    signals = trace(200)
+    grip, partner = signals.grip_force.copy(), signals.partner_force.copy()
+    grip[:, [2, 5]], partner[:, 2] = -20.0, 40.0  # 40 N by the hands, 40 N by the partner, of 80 N
+    metrics = load_metrics(replace(signals, grip_force=grip, partner_force=partner), 80.0)
+    assert metrics["hand_weight_share"] == pytest.approx(0.5)
+    assert metrics["partner_weight_share"] == pytest.approx(0.5)
+    assert metrics["weight_in_hands"] == pytest.approx(1.0)
+
+
+def test_weight_on_the_thighs_is_not_in_the_hands() -> None:
+    signals = trace(200)
+    grip = signals.grip_force.copy()
+    grip[:, [2, 5]] = -10.0
+    assert load_metrics(replace(signals, grip_force=grip), 40.0)["weight_in_hands"] == pytest.approx(0.5)
+
+
+def test_without_an_object_in_the_hands_there_is_no_share() -> None:
+    assert np.isnan(list(load_metrics(trace(200), 0.0).values())).all()
