@@ -16,6 +16,15 @@ PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
 
 
+WITH_OBJECT = (
+    *("object_mass_scale", "inertia_scale", "object_com_offset", "surface_friction", "object_latency"),
+    *("partner_share", "partner_stiffness", "partner_damping", "partner_delay", "partner_pace", "partner_noise"),
+)
+"""Quantities that are zero in a scene without an object."""
+WITH_WHEELS = ("object_ground_friction",)
+"""Quantities that are zero but in a push."""
+
+
 class Table:
     """Distributions side by side, a column each number; drawn in one sweep, for many small draws cost more."""
 
@@ -60,7 +69,13 @@ class Draws:
         self._with_object = np.array([scene.object is not None for scene in scenes])
         self._nominal_mass = np.array([scene.object.mass if scene.object else 0.0 for scene in scenes])
         self._smallest_mass = np.array([scene.object.smallest_mass if scene.object else 0.0 for scene in scenes])
-        self._strength = np.array([scene.grasp.strength for scene in scenes])
+        self._strength = np.array([scene.grasp.strength * (scene.kind == "lift") for scene in scenes])
+        self._present = np.ones((n, self._table.width))
+        for name, place in self._table.columns.items():
+            if name in WITH_OBJECT:
+                self._present[~self._with_object, place] = 0.0
+            elif name in WITH_WHEELS:
+                self._present[~self._pushing, place] = 0.0
         self._rows = np.tile(self._table.nominal, (n, 1))
         self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES}
         for name, place in self._table.columns.items():
@@ -91,6 +106,8 @@ class Draws:
         for name, held in fixed.items():
             if name != "object_mass":
                 self._hold(name, which, held)
+        self._rows[which] *= self._present[which]
+        values["impulse_scale"][which] *= self._with_object[which]
         above = values["object_mass_scale"][which] - self._lightest
         mass = self._nominal_mass[which] * (self._lightest + above * values["load_scale"][which])
         values["object_mass"][which] = mass

@@ -96,9 +96,8 @@ class Simulation:
             level=True,
         )
         self._robot_mass = np.zeros(n)
-        self._handover = (
-            np.array([model.grasp.handover if model.kind == "lift" else 0.0 for model in models]) / self.period
-        )
+        handover = np.array([model.grasp.handover if model.kind == "lift" else 0.0 for model in models])
+        self._handover = handover / self.period
         width = self._sensing.noise_width + partner.NOISE_WIDTH
         self._noise = np.zeros((n, width + width % 2))
         self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
@@ -198,7 +197,7 @@ class Simulation:
     def _hand_over(self, wrench: Array) -> None:
         """Bears at first the robot's part of a held object's weight, less and less: f = (1 - share) m g (1 - t / T)."""
         if np.any(self.clock < self._handover):
-            left = np.maximum(1.0 - self.clock / np.maximum(self._handover, 1.0), 0.0)
+            left = np.maximum(self._handover - self.clock, 0.0) / np.maximum(self._handover, 1.0)
             wrench[:, 2] += GRAVITY * left * (1.0 - self.drawn["partner_share"]) * self.drawn["object_mass"]
 
     def _deliver(self) -> None:

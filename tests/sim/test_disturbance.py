@@ -55,6 +55,20 @@ def test_scale_zero_switches_blows_off(start):
     assert np.all(simulation.state.external_force == 0.0)
 
 
+def test_handing_over_a_box_adds_no_force_to_a_crate_or_to_nothing(start, calm):
+    simulation = start(calm, ["lift", "push", "free"])
+    simulation.step()
+    assert simulation.state.external_force[0, 2] > 50.0
+    assert not simulation.state.external_force[1:].any()
+
+
+def test_no_impulse_strikes_where_there_is_no_object(start, calm):
+    simulation = start(changed(calm, "impulses.enabled", True), ["free"] * 8)
+    for _ in range(220):
+        simulation.step()
+        assert not simulation.state.external_force.any()
+
+
 def test_blows_come_at_different_times_in_different_environments(start, calm):
     simulation = start(changed(calm, "pushes.enabled", True), ["free"] * 16)
     first = np.zeros(16)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from task_worlds import rollout, same
+from task_worlds import actions, rollout, same
 
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -20,6 +20,30 @@ def test_a_rollout_does_not_depend_on_the_number_of_workers(make: Make) -> None:
     assert courses[0]["done"].any()
     for course in courses[1:]:
         assert same(courses[0], course)
+
+
+def test_a_rollout_over_mixed_scenes_does_not_depend_on_the_number_of_workers(make: Make) -> None:
+    changes = {f"task.scenes.{name}": 0.25 for name in ("free", "lift", "tyre", "push")}
+    courses = []
+    for workers in (0, 1, 2):
+        env = make(num_envs=8, workers=workers, changes=changes)
+        start = env.reset()
+        courses.append(rollout(env, 40) | {"start": start} | env.drawn())
+    assert courses[0]["done"].any()
+    for course in courses[1:]:
+        assert same(courses[0], course)
+
+
+def test_what_the_teacher_sees_of_an_absent_object_is_zero(make: Make) -> None:
+    changes = {"task.scenes.free": 1.0, "task.scenes.lift": 0.0, "simulation.impulses.interval.low": 0.2}
+    env = make(num_envs=6, changes=changes)
+    rows = [env.reset()] + [env.step(actions(step, 6))[0] for step in range(60)]
+    seen = np.stack(rows)[..., env.layout.privileged]
+    for name in (
+        *("object_mass", "object_com_offset", "inertia_scale", "object_ground_friction", "surface_friction"),
+        *("partner_share", "external_force", "external_torque"),
+    ):
+        assert not seen[..., env.layout.extra.slices[name]].any(), name
 
 
 def test_an_environment_does_not_depend_on_its_company(make: Make) -> None:
