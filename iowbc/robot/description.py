@@ -45,7 +45,9 @@ class Robot:
     armature: Array
     """Rotor inertias at the joints [kg·m²]."""
     velocity_limit: Array
-    """Joint speed limits [rad/s]."""
+    """Joint speeds at which the motors have no torque left [rad/s]."""
+    linkages: Indices
+    """Pairs of joints that two motors move together, shape (linkages, 2)."""
     lower: Array
     upper: Array
     """Joint ranges [rad]."""
@@ -141,6 +143,7 @@ def load_robot(folder: Path) -> Robot:
         effort=np.array([hinge.effort for hinge in hinges]),
         armature=np.array([hinge.armature for hinge in hinges]),
         velocity_limit=np.array([float(row["velocity"]) for row in rows]),
+        linkages=_linkages(entries.get("linkages", []), joints, source),
         lower=lower,
         upper=upper,
         default_position=default,
@@ -202,6 +205,16 @@ def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...], 
     if missing:
         raise ValueError(f"{source}: support: joints of legs and waist belong to it, missing {', '.join(missing)}")
     return np.array([names.index(hinge.name) for hinge in hinges], dtype=np.int64)
+
+
+def _linkages(pairs: list[list[str]], joints: tuple[str, ...], source: Path) -> Indices:
+    named = [name for pair in pairs for name in pair]
+    unknown = [name for name in named if name not in joints]
+    if unknown or len(set(named)) != len(named) or any(len(pair) != 2 for pair in pairs):
+        raise ValueError(
+            f"{source}: linkages: expected pairs of different joints, found {pairs}; the MJCF has {', '.join(joints)}"
+        )
+    return np.array([[joints.index(name) for name in pair] for pair in pairs], np.int64).reshape(-1, 2)
 
 
 def _pair(entries: Mapping[str, Any], key: str, source: Path) -> tuple[str, str]:

@@ -11,6 +11,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import Robot
+from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
 
 
@@ -40,11 +41,12 @@ class Divergence:
         return cls(arrays=arrays, **about)
 
 
-def replay(robot: Robot, recipe: Recipe, divergence: Divergence, substeps: int) -> bool:
+def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing) -> bool:
     """Whether the recorded period diverges again; it does, with the same physics and robot."""
     scene, arrays = getattr(recipe.scenes, divergence.scene), divergence.arrays
-    world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), substeps)
+    world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
     world.recall(0, arrays)
     diverged = np.zeros(1, bool)
-    world.step(arrays["target"][None], arrays["wrench"][None], arrays["push"][None], diverged)
+    given = [arrays[name][None] for name in ("target", "effort", "wrench", "push")]
+    world.step(given[0], given[1], given[2], given[3], diverged)
     return bool(diverged[0])

@@ -61,10 +61,10 @@ class Table:
 class Draws:
     """The quantities drawn for n environments, by name; arrays (n,) or (n, k)."""
 
-    def __init__(self, recipe: Recipe, scenes: list[Scene], robot: Robot, links: int) -> None:
+    def __init__(self, recipe: Recipe, scenes: list[Scene], robot: Robot) -> None:
         self.recipe = recipe
         n = len(scenes)
-        self._table = Table(_entries(recipe, len(robot.joints), links))
+        self._table = Table(_entries(recipe, robot))
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
         self._with_object = np.array([scene.object is not None for scene in scenes])
         self._nominal_mass = np.array([scene.object.mass if scene.object else 0.0 for scene in scenes])
@@ -123,11 +123,14 @@ class Draws:
         target[held] = values[held] if target.ndim == 1 else values[held, None]
 
 
-def _entries(recipe: Recipe, joints: int, links: int) -> dict[str, tuple[Distribution, int]]:
+def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]]:
     """Distribution and width of each quantity that is drawn."""
     randomization, partner = recipe.randomization, recipe.partner
+    links = len(robot.tree.bodies)
     widths = {"object_com_offset": 3, "link_mass_scale": links, "link_inertia_scale": links}
-    widths |= dict.fromkeys(("joint_friction", "motor_damping", "kp_scale", "kd_scale", "encoder_bias"), joints)
+    widths |= {"linkage_effort": len(robot.linkages), "imu_tilt": 2, "gyro_bias": 3}
+    each = ("joint_friction", "motor_damping", "motor_strength", "kp_scale", "kd_scale", "encoder_bias")
+    widths |= dict.fromkeys(each, len(robot.joints))
     entries = {name: (value, widths.get(name, 1)) for name, value in randomization if isinstance(value, Distribution)}
     if not randomization.enabled:
         entries = {name: (_off(value), width) for name, (value, width) in entries.items()}

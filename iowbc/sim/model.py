@@ -8,6 +8,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
 from iowbc.sim.objects import OBJECT_BIT, add_object
+from iowbc.sim.timing import Timing
 
 GROUND_BIT = 1
 ARENA = 2 << 20
@@ -26,7 +27,7 @@ SOLVERS = {"newton": mujoco.mjtSolver.mjSOL_NEWTON, "cg": mujoco.mjtSolver.mjSOL
 CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 
 
-def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, dressed: bool) -> Any:
+def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, dressed: bool) -> Any:
     """The editable description. With `dressed`, everything that is for the eye; without, only what moves or touches."""
     spec = mujoco.MjSpec.from_file(str(robot.mjcf))
     option = spec.option
@@ -50,7 +51,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, dressed: bool) -
     spec.worldbody.add_geom(
         name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0
     )
-    _add_motors(spec, robot)
+    _add_motors(spec, robot, timing)
     if scene.object is not None:
         ground_bit = GROUND_BIT if scene.kind == "lift" else 0
         touched = physics.body_contact != "nothing"
@@ -64,13 +65,14 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, *, dressed: bool) -
     return spec
 
 
-def compile_scene(robot: Robot, physics: Physics, scene: Scene) -> Any:
+def compile_scene(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
     """The model that is stepped. Its one sensor makes MuJoCo compute `cfrc_ext`, which holds all contact forces."""
-    return scene_spec(robot, physics, scene, dressed=False).compile()
+    return scene_spec(robot, physics, scene, timing, dressed=False).compile()
 
 
-def _add_motors(spec: Any, robot: Robot) -> None:
-    """torque = kp (target - position) - kd velocity, within the effort limit; motor i drives joint i."""
+def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
+    """torque = kp (target - position) - kd velocity, within the effort limit; motor i drives joint i. Each keeps its
+    past targets, of which it may follow an earlier one."""
     for index, joint in enumerate(robot.joints):
         kp, kd, effort = float(robot.kp[index]), float(robot.kd[index]), float(robot.effort[index])
         spec.add_actuator(
@@ -83,6 +85,7 @@ def _add_motors(spec: Any, robot: Robot) -> None:
             biasprm=[0.0, -kp, -kd] + [0.0] * 7,
             forcelimited=True,
             forcerange=[-effort, effort],
+            nsample=timing.kept_targets,
         )
 
 

@@ -10,10 +10,12 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.model_index import Layout
 from iowbc.sim.objects import TORSION, inertia_per_mass
+from iowbc.sim.timing import Timing
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "dof_damping", "dof_frictionloss", "geom_friction"),
     *("actuator_gainprm", "actuator_biasprm", "site_pos", "geom_size", "geom_rbound", "geom_aabb"),
+    *("actuator_forcerange", "actuator_delay"),
 )
 """Model fields that differ between simulations."""
 
@@ -21,8 +23,8 @@ FIELDS = (
 class ModelFields:
     """The parameters of a batch's models that differ between its simulations; writes what was drawn."""
 
-    def __init__(self, batch: Any, layout: Layout, scene: Scene) -> None:
-        self._layout, self._scene = layout, scene
+    def __init__(self, batch: Any, layout: Layout, scene: Scene, timing: Timing) -> None:
+        self._layout, self._scene, self._timing = layout, scene, timing
         self._fields = {name: batch.expand(name) for name in FIELDS}
         self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
         self._object_inertia = inertia_per_mass(scene.object) if scene.object is not None else np.zeros(3)
@@ -48,6 +50,7 @@ class ModelFields:
         fields["actuator_gainprm"][ids, :, 0] = nominal["actuator_gainprm"][:, 0] * drawn["kp_scale"]
         fields["actuator_biasprm"][ids, :, 1] = nominal["actuator_biasprm"][:, 1] * drawn["kp_scale"]
         fields["actuator_biasprm"][ids, :, 2] = nominal["actuator_biasprm"][:, 2] * drawn["kd_scale"]
+        fields["actuator_delay"][ids] = self._timing.delay(drawn["action_latency"])[:, None]
         fields["geom_friction"][ids[:, None], self._layout.foot_geoms, 0] = drawn["ground_friction"][:, None]
         if self._layout.object is not None:
             self._write_object(ids, drawn)
@@ -71,6 +74,12 @@ class ModelFields:
             friction = drawn["surface_friction"][:, None]
             fields["geom_friction"][ids[:, None], self._layout.palms, 0] = friction
             fields["geom_friction"][ids[:, None], self._layout.palms, 1] = TORSION * friction
+
+    @property
+    def torque_range(self) -> Array:
+        """Least and greatest torque of each motor, (n, joints, 2) [N·m]; to be written."""
+        ranges: Array = self._fields["actuator_forcerange"]
+        return ranges
 
     def place_grips(self, ids: Indices, places: Array) -> None:
         """Where on the object the grips are connected, (k, 2, 3), object frame [m]."""

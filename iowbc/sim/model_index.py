@@ -49,6 +49,8 @@ class Layout:
     """Entries of the inertia matrix that couple the base's translation to the robot's other velocities, (3, speeds)."""
     momentum_speeds: slice
     """Those velocities in qvel."""
+    past_targets: slice
+    """What MuJoCo remembers of each motor, the first in its history: two counters, times, past targets."""
     object_geom: int | None
     """Geom with which the object touches palms."""
 
@@ -85,6 +87,7 @@ class Layout:
             palms=_pair(geoms, "left_palm", "right_palm"),
             momentum=np.array([model.M_rowadr[3 : 6 + count] + axis for axis in range(3)]),
             momentum_speeds=slice(3, 6 + count),
+            past_targets=slice(0, int(np.sum(2 + 2 * model.actuator_history[:, 0]))),
             object_geom=geoms.get("object"),
         )
 

@@ -25,6 +25,7 @@ class Columns:
     def __init__(self, joints: int) -> None:
         self.position, self.velocity = slice(0, joints), slice(joints, 2 * joints)
         self.angular, self.gravity = slice(2 * joints, 2 * joints + 3), slice(2 * joints + 3, 2 * joints + 6)
+        self.inertial = slice(2 * joints, 2 * joints + 6)
         self.robot = slice(0, 2 * joints + 6)
         self.width = self.robot.stop + OBJECT_WIDTH
 
@@ -42,6 +43,7 @@ class Sensing:
         self._robot_line = DelayLine(n, width, longest_latency)
         self._object_line = DelayLine(n, OBJECT_WIDTH, longest_latency)
         self._bias = np.zeros((n, joints))
+        self._mounting, self._gyro_bias = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
         self._deviation = np.zeros((n, columns.width))
         self._nominal = _deviations(recipe, columns)
         self.rows = np.zeros((n, columns.width))
@@ -65,6 +67,9 @@ class Sensing:
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """Fills the past of some environments with their present."""
         self._bias[which] = drawn["encoder_bias"][which]
+        roll, pitch = drawn["imu_tilt"][which].T
+        self._mounting[which] = rotations.matrix(rotations.from_euler(roll, pitch, np.zeros_like(roll)))
+        self._gyro_bias[which] = drawn["gyro_bias"][which]
         self._deviation[which] = self._nominal * drawn["noise_scale"][which, None]
         self._deviation[which, self._columns.robot.stop :] *= state.has_object[which, None]
         self._robot_line.set_latency(which, drawn["sensor_latency"][which])
@@ -83,7 +88,11 @@ class Sensing:
         """Refreshes `measured`; `noise` (n, noise_width) standard normal."""
         rows, columns = self.rows, self._columns
         np.multiply(noise, self._deviation, out=rows)
-        rows[:, columns.robot] += self._robot_line.read()
+        seen = self._robot_line.read()
+        inertial = seen[:, columns.inertial].reshape(-1, 2, 3)
+        inertial[...] = inertial @ self._mounting
+        inertial[:, 0] += self._gyro_bias
+        rows[:, columns.robot] += seen
         rows[:, columns.position] += self._bias
         if not self._see_object:
             self.measured.object_quaternion[:, 0] = 1.0
@@ -124,7 +133,8 @@ class Sensing:
 
     def arrays(self) -> dict[str, Array]:
         """The sensors' memory, by name."""
-        own = {"bias": self._bias, "deviation": self._deviation, "rows": self.rows}
+        own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
+        own |= {"bias": self._bias, "deviation": self._deviation, "rows": self.rows}
         for name, line in (("robot", self._robot_line), ("object", self._object_line)):
             own |= {f"{name}/{key}": values for key, values in line.arrays().items()}
         return own

@@ -13,13 +13,14 @@ from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim import partner
-from iowbc.sim.delay import DelayLine
 from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.divergence import Divergence
+from iowbc.sim.drives import Drives
 from iowbc.sim.episode_draws import Draws
 from iowbc.sim.sensing import Sensing
 from iowbc.sim.snapshots import by_environment, by_world
 from iowbc.sim.state import MeasuredState, SimulationState
+from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
 
 
@@ -51,14 +52,13 @@ class Simulation:
         models = [_scene(recipe, name) for name in self.scene_names]
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
-        substeps = _substeps(self.period, recipe.physics.timestep)
+        timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
         self._scenes = tuple(dict.fromkeys(self.scene_names))
         self.worlds = tuple(
-            World(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), substeps)
+            World(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
             for name in self._scenes
         )
-        links = self.worlds[0].layout.links
-        self._draws = Draws(recipe, models, robot, links.stop - links.start)
+        self._draws = Draws(recipe, models, robot)
         self.hold(fixed or {})
         self._key = random.environment_key(seed, self.envs)
         self._episode_key = self._key.copy()
@@ -74,7 +74,7 @@ class Simulation:
         self._sensing = Sensing(
             recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency
         )
-        self._targets = DelayLine(n, len(robot.joints), recipe.randomization.longest_latency)
+        self._drives = Drives(robot, recipe.physics, n)
         self._impulses = Disturbance(
             n,
             name="impulse",
@@ -135,19 +135,20 @@ class Simulation:
     ) -> None:
         """Starts new episodes: draws what is random, puts the robot on its soles and the object into its hands.
 
-        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch`, `yaw` (k,) [rad], zero by default. The height
-        of the base follows from kinematics: the lowest corner of the soles touches the ground.
+        `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch` (k,) [rad], zero by default; `yaw` (k,)
+        [rad], drawn by default. The height of the base follows from kinematics: the lowest corner of the soles touches
+        the ground.
         """
         which = np.asarray(which, np.int64)
         if len(which) == 0:
             return
         pitch = np.zeros(len(which)) if base_pitch is None else np.asarray(base_pitch)
-        heading = np.zeros(len(which)) if yaw is None else np.asarray(yaw)
         self.episode[which] += 1
         self.clock[which] = 0
         key = random.absorb(self._key[which], self.episode[which])
         self._episode_key[which] = key
         self._draws.draw(which, key, self.fixed)
+        heading = self.drawn["start_yaw"][which] if yaw is None else np.asarray(yaw)
         self.target[which] = joint_position
         state = self.state
         state.diverged[which] = False
@@ -159,8 +160,7 @@ class Simulation:
         for name in ("slipped", "partner_force", "partner_energy", "external_force", "push_force"):
             getattr(state, name)[which] = 0
         state.grasped[which] = state.has_object[which, None]
-        self._targets.set_latency(which, self.drawn["action_latency"][which])
-        self._targets.fill(which, self.target[which])
+        self._drives.reset(which, self.drawn)
         self._impulses.reset(which, key)
         self._pushes.reset(which, key)
         self._partner.reset(which, self.drawn, state)
@@ -177,17 +177,17 @@ class Simulation:
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
         np.add(state.push_force, self.planned_push, out=state.push_force)
-        self._targets.push(self.target)
-        target = self._targets.read()
+        target = self.target - drawn["encoder_bias"]
+        effort = self._drives.ranges(target, state)
         self.clock += 1
-        diverged[:] = False
+        diverged[:] = np.isnan(target.sum(axis=1))
         for world in self.worlds:
             place = world.place
             failed = diverged[place]
-            world.step(target[place], wrench[place], state.push_force[place], failed)
+            world.step(target[place], effort[place], wrench[place], state.push_force[place], failed)
             if failed.any():
                 diverged[place] = failed
-                self._keep_divergences(world, np.flatnonzero(failed), target, wrench)
+                self._keep_divergences(world, np.flatnonzero(failed), target, effort, wrench)
             world.gather(state)
             world.release(state, drawn["slip_force"])
         self._partner.observe(state)
@@ -211,12 +211,13 @@ class Simulation:
             if len(chosen):
                 yield world, np.searchsorted(world.rows, which[chosen]), chosen
 
-    def _keep_divergences(self, world: World, ids: Indices, target: Array, wrench: Array) -> None:
+    def _keep_divergences(self, world: World, ids: Indices, target: Array, effort: Array, wrench: Array) -> None:
         self.divergence_count += len(ids)
         for index in ids:
             row = int(world.rows[index])
             arrays = world.record(int(index))
-            arrays |= {"target": target[row], "wrench": wrench[row], "push": self.state.push_force[row]}
+            arrays |= {"target": target[row], "effort": effort[row], "wrench": wrench[row]}
+            arrays["push"] = self.state.push_force[row]
             self.divergences.append(
                 Divergence(
                     scene=self.scene_names[row],
@@ -236,7 +237,7 @@ class Simulation:
             "drawn": self.drawn,
             "partner": self._partner.arrays(),
             "sensing": self._sensing.arrays(),
-            "targets": self._targets.arrays(),
+            "drives": self._drives.arrays(),
             "impulses": self._impulses.arrays(),
             "pushes": self._pushes.arrays(),
             "fixed": self.fixed,
@@ -264,7 +265,7 @@ class Simulation:
         for index, world in enumerate(self.worlds):
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
-        for part in (self._partner, self._sensing, self._targets):
+        for part in (self._partner, self._sensing):
             part.restored()
 
     def world_of(self, env: int) -> tuple[World, int]:
@@ -308,13 +309,3 @@ def _scene(recipe: Recipe, name: str) -> Any:
 
 def _rows(names: Sequence[str], name: str) -> Indices:
     return np.array([index for index, given in enumerate(names) if given == name])
-
-
-def _substeps(period: float, timestep: float) -> int:
-    count = round(period / timestep)
-    if count < 1 or abs(count * timestep - period) > 1e-9:
-        raise ValueError(
-            f"a control period of {period:g} s is no whole number of physics steps of {timestep:g} s; "
-            f"choose simulation.physics.timestep as {period:g} s divided by a whole number"
-        )
-    return count

@@ -10,7 +10,7 @@ import numpy as np
 
 from iowbc.arrays import Array
 
-RINGS = ("targets/values", "sensing/robot/values", "sensing/object/values", "partner/line/values")
+RINGS = ("sensing/robot/values", "sensing/object/values", "partner/line/values")
 """Names of delay lines, (length, n, width); beside each stands the index of its newest value."""
 
 

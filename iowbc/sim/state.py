@@ -42,8 +42,10 @@ class SimulationState(_Arrays):
     """(n, joints) [rad/s²]."""
     joint_torque: Array
     """Torque of the motors, (n, joints) [N·m]."""
+    torque_limit: Array
+    """What they could have given in that direction in this control period, (n, joints) [N·m]."""
     saturation: Mask
-    """Motors at their torque limit, (n, joints)."""
+    """Motors at that limit, (n, joints)."""
     torso_rotation: Array
     """Rotation matrix of the torso, (n, 3, 3)."""
     com_position: Array
@@ -101,6 +103,7 @@ class SimulationState(_Arrays):
             "joint_velocity": (joints,),
             "joint_acceleration": (joints,),
             "joint_torque": (joints,),
+            "torque_limit": (joints,),
             "base_quaternion": (4,),
             "base_rotation": (3, 3),
             "torso_rotation": (3, 3),

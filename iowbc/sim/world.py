@@ -15,7 +15,9 @@ from iowbc.sim.model import compile_scene
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
 from iowbc.sim.squeeze import Squeeze
+from iowbc.sim.stability import require_stable
 from iowbc.sim.state import SimulationState
+from iowbc.sim.timing import Timing
 
 POSITION = mujoco.mjtStage.mjSTAGE_POS.value
 VELOCITY = mujoco.mjtStage.mjSTAGE_VEL.value
@@ -33,20 +35,24 @@ class World:
     next step, so that exact observations cost nothing.
     """
 
-    def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, substeps: int) -> None:
-        self.scene, self.physics, self.rows, self.substeps, self._robot = scene, physics, rows, substeps, robot
+    def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing) -> None:
+        self.scene, self.physics, self.rows, self.timing, self._robot = scene, physics, rows, timing, robot
         self.place: slice | Indices = as_slice(rows)
-        self.model = compile_scene(robot, physics, scene)
+        self.model = compile_scene(robot, physics, scene, timing)
+        if physics.pd == "explicit":
+            require_stable(self.model, robot, timing)
         self.layout = Layout.of(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1, persistent=True)
-        self.fields = ModelFields(self.batch, self.layout, scene)
-        self._limit = AT_LIMIT * robot.effort
+        self.fields = ModelFields(self.batch, self.layout, scene, timing)
         bind = self.batch.bind
         self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
         self._acceleration, self._torque, self._external = bind("qacc"), bind("actuator_force"), bind("cfrc_ext")
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
+        kept = timing.kept_targets
+        history = bind("history")[:, self.layout.past_targets].reshape(len(rows), -1, 2 + 2 * kept)
+        self._past_targets = history[..., 2 + kept :]
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         by_contact = scene.kind == "lift" and scene.grasp.kind == "contact"
         self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
@@ -70,7 +76,8 @@ class World:
         self.qpos[ids, :3] = (0.0, 0.0, 1.0)
         self.qpos[ids, 3:7] = rotations.from_euler(np.zeros_like(pitch), pitch, yaw)
         self.qpos[ids, self.layout.joints] = joint_position
-        self.control[ids] = joint_position
+        self.control[ids] = joint_position - drawn["encoder_bias"]
+        self._past_targets[ids] = self.control[ids, :, None]
         self.batch.forward(ids, stage=POSITION)
         drop = self._lowest_sole(ids)
         self.qpos[ids, 2] -= drop
@@ -122,18 +129,20 @@ class World:
         )
         return turned
 
-    def step(self, target: Array, wrench: Array, push: Array, diverged: Mask) -> None:
-        """One control period with joint targets held; `wrench` (n, 6) on the object's and `push` (n, 3) on the base's
-        centre of mass. Marks in `diverged` the simulations that left the numbers and puts them back."""
+    def step(self, target: Array, effort: Array, wrench: Array, push: Array, diverged: Mask) -> None:
+        """One control period with joint targets held, and torques within `effort` (n, joints, 2); `wrench` (n, 6) on
+        the object's and `push` (n, 3) on the base's centre of mass. Marks in `diverged` the simulations that left the
+        numbers and puts them back."""
         np.copyto(self.before, self.batch.state)
         np.copyto(self.control, target)
+        np.copyto(self.fields.torque_range, effort)
         if self._squeeze is not None:
             self._squeeze.add(self.control)
         self._applied[:, self.layout.base, :3] = push
         if self.layout.object is not None:
             self._applied[:, self.layout.object] = wrench
         try:
-            self.batch.step(nstep=self.substeps, stage=VELOCITY)
+            self.batch.step(nstep=self.timing.substeps, stage=VELOCITY)
         except SimulationError as error:
             diverged[error.ids] = True
         self._check(diverged)
@@ -184,7 +193,11 @@ class World:
         state.joint_velocity[place] = qvel[:, layout.joint_speeds]
         state.joint_acceleration[place] = self._acceleration[:, layout.joint_speeds]
         state.joint_torque[place] = self._torque
-        state.saturation[place] = np.abs(self._torque) >= self._limit
+        ranges = self.fields.torque_range
+        limit = np.where(self._torque < 0.0, -ranges[..., 0], ranges[..., 1])
+        state.torque_limit[place] = limit
+        limit *= AT_LIMIT
+        state.saturation[place] = np.abs(self._torque) >= limit
         state.torso_rotation[place] = self._body_rotation[:, layout.torso].reshape(-1, 3, 3)
         com = self._subtree_com[:, layout.base]
         state.com_position[place] = com

@@ -178,7 +178,9 @@ def test_explicit_and_implicit_joint_control_agree_where_both_are_stable(start, 
     hold_base()
     heights = []
     for kind in ("implicit", "explicit"):
-        simulation = start(changed(calm, "physics.pd", kind), ["lift"], object_mass=5.0)
+        simulation = start(
+            changed(changed(calm, "physics.timestep", 0.002), "physics.pd", kind), ["lift"], object_mass=5.0
+        )
         run(simulation, 150)
         heights.append(simulation.state.object_position[0, 2])
     assert heights[0] == pytest.approx(heights[1], abs=0.001)

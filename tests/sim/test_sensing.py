@@ -63,6 +63,16 @@ def test_encoder_bias_stays_for_an_episode(start, calm):
     assert 0.005 < np.abs(error).max() <= 0.015
 
 
+def test_a_tilted_inertial_unit_sees_gravity_tilted_and_its_gyroscope_adds_a_bias(start, calm):
+    simulation = start(calm, ["free"] * 2, imu_tilt=[0.0, 0.03], gyro_bias=[0.0, 0.02])
+    run(simulation, 10)
+    gravity, turning = simulation.measured.projected_gravity, simulation.measured.base_angular_velocity
+    angle = np.arccos(np.vecdot(gravity[0], gravity[1]))
+    assert angle == pytest.approx(np.hypot(0.03, 0.03), rel=0.02)
+    assert np.linalg.norm(gravity[1]) == pytest.approx(1.0)
+    assert np.allclose(turning[1], turning[0] + 0.02, atol=0.05 * np.abs(turning[0]).max() + 1e-9)
+
+
 @pytest.mark.parametrize("latency", [0.0, 1.0, 2.0, 1.5])
 def test_latency_of_n_periods_delays_measurements_by_n_periods(start, calm, latency):
     simulation = start(calm, ["lift"], sensor_latency=latency, object_latency=latency)

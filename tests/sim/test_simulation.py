@@ -9,6 +9,7 @@ from iowbc import counter_random as random
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.sim.divergence import Divergence, replay
 from iowbc.sim.simulation import Simulation
+from iowbc.sim.timing import Timing
 
 SCENES = ["lift", "free", "push", "lift", "tyre", "lift"]
 
@@ -137,7 +138,7 @@ def test_divergence_is_kept_and_diverges_again_when_replayed(start, robot, tmp_p
     kept = simulation.divergences[-1]
     assert (kept.scene, kept.environment, kept.episode, kept.step) == ("lift", 1, 1, 5)
     kept.save(tmp_path / "kept.npz")
-    assert replay(robot, recipe, Divergence.load(tmp_path / "kept.npz"), substeps=4)
+    assert replay(robot, recipe, Divergence.load(tmp_path / "kept.npz"), Timing(0.02, 0.005, 4))
 
 
 def test_mujoco_writes_no_log_file(start, tmp_path, monkeypatch):

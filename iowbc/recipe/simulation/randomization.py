@@ -35,10 +35,21 @@ class Randomization(Section):
     """Position gain of each joint as a part of its nominal one."""
     kd_scale: Distribution = Distribution(low=0.9, high=1.1, nominal=1.0)
     """Velocity gain of each joint as a part of its nominal one."""
+    motor_strength: Distribution = Distribution(low=0.85, high=1.0, nominal=1.0)
+    """Torque limit of each joint as a part of its nominal one; batteries run down and motors warm up."""
+    linkage_effort: Distribution = Distribution(low=35.0, high=50.0, nominal=50.0)
+    """Torque that the two joints of a linkage (ankles, waist roll and pitch) have together [N·m]; public sources give
+    35 and 50."""
     encoder_bias: Distribution = Distribution(low=-0.015, high=0.015, nominal=0.0)
-    """Constant error of each joint position sensor [rad]."""
+    """Constant error of each joint position sensor [rad]; the joint controllers take it for true, too."""
+    imu_tilt: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
+    """Constant roll and pitch of the inertial unit against the base [rad]; two degrees of mounting and calibration."""
+    gyro_bias: Distribution = Distribution(low=-0.02, high=0.02, nominal=0.0)
+    """Constant error of the measured angular velocity, per axis [rad/s]; a warm low-cost gyroscope drifts by this."""
+    start_yaw: Distribution = Distribution(low=-3.141592653589793, high=3.141592653589793, nominal=0.0)
+    """Heading in which an episode begins, against the world's x axis [rad]; nothing may depend on it."""
     action_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
-    """Delay of the joint targets [control periods]."""
+    """Delay of the joint targets [control periods], to the nearest physics step."""
     sensor_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
     """Delay of joint and inertial measurements [control periods]."""
     object_latency: Distribution = Distribution(low=0.0, high=2.0, nominal=0.0)

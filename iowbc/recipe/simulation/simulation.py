@@ -18,7 +18,10 @@ class Physics(Section):
     """Physics step [s]; a whole number of them makes a control period."""
     pd: Literal["implicit", "explicit"] = "implicit"
     """Whether the damping of the joint controllers is integrated implicitly (stable at any gain) or, as on the robot,
-    computed explicitly from the measured state at the physics rate."""
+    computed explicitly from the measured state at the physics rate; then the step must be short enough, 2 ms here."""
+    torque_corner: float = Field(default=0.6, ge=0.0, lt=1.0)
+    """Part of the no-load speed up to which a motor gives its full torque; beyond, it falls to nothing in a line.
+    Published curves of such motors bend at about six tenths."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
     """Friction cone: the pyramid inscribed in it, or the cone itself, with which a step costs half as much again."""
     solver: Literal["newton", "cg"] = "newton"

@@ -15,6 +15,7 @@ from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
 from iowbc.sim.simulation import Simulation
+from iowbc.sim.timing import Timing
 
 LIGHT_PARTS = (0.80, 0.81, 0.83, 1.0)
 DARK_PARTS = (0.16, 0.17, 0.19, 1.0)
@@ -39,7 +40,7 @@ class Appearance:
 
     def __init__(self, simulation: Simulation, env: int) -> None:
         self._world, self._index = simulation.world_of(env)
-        self.model = dressed_model(simulation.robot, self._world.physics, self._world.scene)
+        self.model = dressed_model(simulation.robot, self._world.physics, self._world.scene, self._world.timing)
         self.data = mujoco.MjData(self.model)
         self.update()
 
@@ -55,9 +56,9 @@ class Appearance:
         return data
 
 
-def dressed_model(robot: Robot, physics: Physics, scene: Scene) -> Any:
+def dressed_model(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
     """Compiled model with the same positions and velocities as the stepped one, and looks."""
-    spec = scene_spec(robot, physics, scene, dressed=True)
+    spec = scene_spec(robot, physics, scene, timing, dressed=True)
     _dress(spec)
     meshes = list(installed_meshes(robot))
     if meshes:

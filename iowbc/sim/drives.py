@@ -1,0 +1,55 @@
+"""What the motors can give: drawn strength, less at speed, and what two joints of one linkage share."""
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices
+from iowbc.recipe.simulation.simulation import Physics
+from iowbc.robot.description import Robot
+from iowbc.sim.state import SimulationState
+
+
+class Drives:
+    """Torque limits of n environments, from the state at the start of each control period."""
+
+    def __init__(self, robot: Robot, physics: Physics, n: int) -> None:
+        self._robot = robot
+        self._effort = np.tile(robot.effort, (n, 1))
+        self._slope = 1.0 / ((1.0 - physics.torque_corner) * robot.velocity_limit)
+        self._range = np.zeros((n, len(robot.joints), 2))
+
+    def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
+        """Strengths of new episodes."""
+        self._effort[which] = self._robot.effort * drawn["motor_strength"][which]
+        self._effort[which[:, None, None], self._robot.linkages] = drawn["linkage_effort"][which][..., None]
+
+    def ranges(self, target: Array, state: SimulationState) -> Array:
+        """Least and greatest torque of each motor over the period to come, (n, joints, 2) [N·m]; `target` (n, joints)
+        [rad].
+
+        A motor that drives gives its full torque up to a corner speed and less beyond, down to nothing at its no-load
+        speed; a motor that brakes gives all. The joints a, b of a linkage are moved by two motors together:
+        |τ_a| + |τ_b| ≤ the linkage's limit, shared as the joint control asks for it.
+        """
+        effort = self._effort.copy()
+        self._share(effort, target, state)
+        reserve = state.joint_velocity * self._slope
+        ranges = self._range
+        ranges[..., 1] = effort * (self._slope * self._robot.velocity_limit - reserve).clip(0.0, 1.0)
+        ranges[..., 0] = -effort * (self._slope * self._robot.velocity_limit + reserve).clip(0.0, 1.0)
+        return ranges
+
+    def _share(self, effort: Array, target: Array, state: SimulationState) -> None:
+        robot, pairs = self._robot, self._robot.linkages
+        if not len(pairs):
+            return
+        wanted = robot.kp[pairs] * (target[:, pairs] - state.joint_position[:, pairs])
+        wanted -= robot.kd[pairs] * state.joint_velocity[:, pairs]
+        np.abs(np.nan_to_num(wanted, copy=False), out=wanted)
+        limit = effort[:, pairs]
+        both = wanted[..., 0] + wanted[..., 1]
+        scale = np.minimum(1.0, limit[..., 0] / np.maximum(both, 1e-9))
+        effort[:, pairs] = limit - wanted[..., ::-1] * scale[..., None]
+
+    def arrays(self) -> dict[str, Array]:
+        """What the drives remember, by name."""
+        return {"effort": self._effort}

@@ -1,0 +1,43 @@
+"""How physics steps, control periods and the longest latency fit together."""
+
+import numpy as np
+
+from iowbc.arrays import Array
+
+
+class Timing:
+    """Physics steps in a control period, and how many of them past targets are kept."""
+
+    def __init__(self, period: float, timestep: float, longest_latency: int) -> None:
+        """`period` of control and `timestep` of physics [s]; `longest_latency` [control periods]."""
+        self.period, self.timestep, self.longest_latency = period, timestep, longest_latency
+        self.substeps = round(period / timestep)
+        if self.substeps < 1 or abs(self.substeps * timestep - period) > 1e-9:
+            raise ValueError(
+                f"a control period of {period:g} s is no whole number of physics steps of {timestep:g} s; "
+                f"choose simulation.physics.timestep as {period:g} s divided by a whole number"
+            )
+
+    @property
+    def kept_targets(self) -> int:
+        """Targets that are remembered: one a physics step of the longest latency, and the newest."""
+        return self.substeps * self.longest_latency + 1
+
+    def delay(self, latency: Array) -> Array:
+        """Time by which MuJoCo holds targets back for a latency [control periods], of any shape [s].
+
+        A whole number of physics steps, less half of one: targets are read by time, and times are rounded.
+        """
+        if np.any(latency > self.longest_latency) or np.any(latency < 0.0):
+            worst = latency[np.argmax(np.abs(latency))]
+            raise ValueError(
+                f"a latency of {worst:g} periods is outside 0 to {self.longest_latency}; "
+                f"see randomization.longest_latency"
+            )
+        steps = np.round(latency * self.substeps)
+        delay: Array = np.where(steps > 0.0, (steps - 0.5) * self.timestep, 0.0)
+        return delay
+
+    def longest_stable_step(self, rate: float) -> float:
+        """Longest physics step that divides the control period and is below 1 / `rate` [s]."""
+        return float(self.period / np.ceil(self.period * rate - 1e-9))
