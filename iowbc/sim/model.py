@@ -55,7 +55,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
     if scene.object is not None:
         ground_bit = GROUND_BIT if scene.kind == "lift" else 0
         touched = physics.body_contact != "nothing"
-        add_object(spec, robot, scene, ground_bit=ground_bit, touched=touched, dressed=dressed)
+        add_object(spec, robot, scene, timing, ground_bit=ground_bit, touched=touched, dressed=dressed)
     spec.add_sensor(
         name="contact_forces",
         type=mujoco.mjtSensor.mjSENS_FORCE,

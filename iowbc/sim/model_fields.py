@@ -42,9 +42,10 @@ class ModelFields:
         links, speeds = self._layout.links, self._layout.joint_speeds
         fields, nominal = self._fields, self._nominal
         mass = drawn["link_mass_scale"]
-        fields["body_mass"][ids, links] = nominal["body_mass"][links] * mass
+        rows = ids if isinstance(links, slice) else ids[:, None]
+        fields["body_mass"][rows, links] = nominal["body_mass"][links] * mass
         inertia = mass * drawn["link_inertia_scale"]
-        fields["body_inertia"][ids, links] = nominal["body_inertia"][links] * inertia[..., None]
+        fields["body_inertia"][rows, links] = nominal["body_inertia"][links] * inertia[..., None]
         fields["dof_damping"][ids, speeds] = drawn["motor_damping"]
         fields["dof_frictionloss"][ids, speeds] = drawn["joint_friction"]
         fields["actuator_gainprm"][ids, :, 0] = nominal["actuator_gainprm"][:, 0] * drawn["kp_scale"]

@@ -7,6 +7,7 @@ import numpy as np
 
 from iowbc.arrays import Indices, as_slice
 from iowbc.robot.description import Robot
+from iowbc.sim.objects import HANDS
 
 BASE = slice(0, 7)
 BASE_LINEAR = slice(0, 3)
@@ -30,11 +31,11 @@ class Layout:
     feet: slice | Indices
     """Bodies of the feet, (2,)."""
     hands: slice | Indices
-    """Bodies of the hands, (2,)."""
+    """Bodies of the hands, (2,); without an object those of the wrists."""
     object: int | None
     """Body of the object."""
-    links: slice
-    """Bodies of the robot."""
+    links: slice | Indices
+    """Bodies of the robot's own description, in its order."""
     soles: slice | Indices
     """Sites of the soles, (2,)."""
     grips: slice | Indices
@@ -49,6 +50,8 @@ class Layout:
     """Entries of the inertia matrix that couple the base's translation to the robot's other velocities, (3, speeds)."""
     momentum_speeds: slice
     """Those velocities in qvel."""
+    past_forces: slice
+    """What MuJoCo remembers of each hand, in the history: two counters, times and forces, those of a period."""
     past_targets: slice
     """What MuJoCo remembers of each motor, the first in its history: two counters, times, past targets."""
     object_geom: int | None
@@ -77,9 +80,9 @@ class Layout:
             base=bodies[robot.base],
             torso=bodies[robot.torso],
             feet=as_slice(feet),
-            hands=as_slice(np.array([bodies[name] for name in robot.wrist_bodies])),
+            hands=as_slice(np.array([bodies[name] for name in (robot.wrist_bodies if thing is None else HANDS)])),
             object=thing,
-            links=slice(1, model.nbody if thing is None else thing),
+            links=as_slice(np.array([bodies[name] for name in robot.tree.bodies])),
             soles=as_slice(np.array([sites[name] for name in robot.soles])),
             grips=as_slice(np.array([sites[name] for name in robot.wrists])),
             object_grips=_pair(sites, "object_left_grip", "object_right_grip"),
@@ -87,9 +90,16 @@ class Layout:
             palms=_pair(geoms, "left_palm", "right_palm"),
             momentum=np.array([model.M_rowadr[3 : 6 + count] + axis for axis in range(3)]),
             momentum_speeds=slice(3, 6 + count),
+            past_forces=slice(0, 0) if thing is None else _past_forces(model),
             past_targets=slice(0, int(np.sum(2 + 2 * model.actuator_history[:, 0]))),
             object_geom=geoms.get("object"),
         )
+
+
+def _past_forces(model: Any) -> slice:
+    first = model.sensor(HANDS[0]).id
+    start = int(model.sensor_historyadr[first])
+    return slice(start, start + 2 * (2 + 4 * int(model.sensor_history[first, 0])))
 
 
 def _pair(indices: dict[str, int], left: str, right: str) -> Indices | None:

@@ -8,8 +8,13 @@ import numpy as np
 
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.robot.description import Robot
+from iowbc.sim.timing import Timing
 
 OBJECT_BIT = 4
+HANDS = ("left_hand", "right_hand")
+"""Bodies without mass at the grip points, through which all passes between the hands and an object."""
+WEIGHTLESS = 1e-9
+"""Mass [kg] and inertia [kg·m²] of those bodies."""
 OFF_CENTRE = [0.001, 0.001, 0.001]
 """Centre of mass before one is drawn [m]; off the centre, or else the compiler hard-codes that it is there."""
 PALM_CONDIM = 4
@@ -26,8 +31,10 @@ RUBBER = (0.13, 0.13, 0.14, 1.0)
 WOOD = (0.62, 0.47, 0.30, 1.0)
 
 
-def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, touched: bool, dressed: bool) -> None:
-    """Body `object` with the scene's nominal mass, its joints, its grips or the palms that touch it.
+def add_object(
+    spec: Any, robot: Robot, scene: Scene, timing: Timing, *, ground_bit: int, touched: bool, dressed: bool
+) -> None:
+    """Body `object` with the scene's nominal mass, its joints, the hands with its grips or the palms that touch it.
 
     `touched`: links other than the palms may touch it too; `dressed`: with what is for the eye.
     """
@@ -41,26 +48,21 @@ def add_object(spec: Any, robot: Robot, scene: Scene, *, ground_bit: int, touche
     body.inertia = inertia_per_mass(thing) * thing.mass
     half = 0.5 * np.asarray(thing.size)
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
-    ring = thing.shape == "tyre"
-    body.add_geom(
-        name="object",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=half,
-        contype=OBJECT_BIT if by_contact or touched else 0,
-        conaffinity=ground_bit,
-        group=3 if ring else 2,
-        rgba=WOOD if scene.kind == "push" else CARDBOARD,
-    )
-    if dressed and ring:
-        _add_ring(body, thing)
+    bits = {"contype": OBJECT_BIT if by_contact or touched else 0, "conaffinity": ground_bit}
+    if thing.shape == "tyre":
+        _add_ring(body, thing, bits)
+    else:
+        colour = WOOD if scene.kind == "push" else CARDBOARD
+        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, group=2, rgba=colour, **bits)
     if scene.kind == "push":
         _add_wheels(body, thing, dressed)
     else:
         body.add_freejoint(name="object_joint")
+    _add_hands(spec, robot, timing)
     if by_contact:
-        _add_palms(spec, robot, scene)
+        _add_palms(spec, scene)
     else:
-        _add_grips(spec, body, robot, scene)
+        _add_grips(spec, body, scene)
 
 
 def inertia_per_mass(thing: Object) -> Any:
@@ -79,30 +81,46 @@ def resting_height(scene: Scene) -> float:
     return CLEARANCE + 0.5 * scene.object.size[2] if scene.object is not None else 0.0
 
 
-def _add_grips(spec: Any, body: Any, robot: Robot, scene: Scene) -> None:
+def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
+    """The hands, each with a sensor of the force that passes through it, which keeps those of a control period."""
+    for name, wrist, place in zip(HANDS, robot.wrist_bodies, robot.grip_offset, strict=True):
+        hand = spec.body(wrist).add_body(name=name, pos=place)
+        hand.explicitinertial = True
+        hand.mass, hand.inertia = WEIGHTLESS, [WEIGHTLESS] * 3
+        hand.add_site(name=name).group = 4
+        spec.add_sensor(
+            name=name,
+            type=mujoco.mjtSensor.mjSENS_FORCE,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=name,
+            nsample=timing.substeps,
+        )
+
+
+def _add_grips(spec: Any, body: Any, scene: Scene) -> None:
     """A compliant point connection of each grip; its place on the object is set when that is put between the hands."""
-    for side, grip, sign in (("left", robot.wrists[0], 1.0), ("right", robot.wrists[1], -1.0)):
+    for side, hand, sign in (("left", HANDS[0], 1.0), ("right", HANDS[1], -1.0)):
         site = body.add_site(name=f"object_{side}_grip", pos=[0.0, sign * 0.15, scene.grasp.height])
         site.group = 4
         spec.add_equality(
             name=f"{side}_grasp",
             type=mujoco.mjtEq.mjEQ_CONNECT,
             objtype=mujoco.mjtObj.mjOBJ_SITE,
-            name1=grip,
+            name1=hand,
             name2=site.name,
             solref=[scene.grasp.time_constant, 1.0],
         )
 
 
-def _add_palms(spec: Any, robot: Robot, scene: Scene) -> None:
+def _add_palms(spec: Any, scene: Scene) -> None:
     """A sphere on each hand that touches the object, and nothing else."""
     x, y, z = scene.palm
-    for name, grip, sign in (("left_palm", 0, 1.0), ("right_palm", 1, -1.0)):
-        spec.body(robot.wrist_bodies[grip]).add_geom(
+    for name, hand, sign in (("left_palm", HANDS[0], 1.0), ("right_palm", HANDS[1], -1.0)):
+        spec.body(hand).add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[scene.palm_radius, 0.0, 0.0],
-            pos=robot.grip_offset[grip] + np.array([x, sign * y, z]),
+            pos=[x, sign * y, z],
             contype=0,
             conaffinity=OBJECT_BIT,
             condim=PALM_CONDIM,
@@ -134,8 +152,8 @@ def _add_wheels(body: Any, thing: Object, dressed: bool) -> None:
             )
 
 
-def _add_ring(body: Any, thing: Object) -> None:
-    """A ring of capsules around the x axis, for the eye."""
+def _add_ring(body: Any, thing: Object, bits: dict[str, int]) -> None:
+    """A ring of capsules around the x axis."""
     outer = 0.25 * (thing.size[1] + thing.size[2])
     thickness = 0.5 * outer * (1.0 - HOLE)
     middle = outer - thickness
@@ -146,8 +164,7 @@ def _add_ring(body: Any, thing: Object) -> None:
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[*start, *end],
             size=[thickness, 0.0, 0.0],
-            contype=0,
-            conaffinity=0,
             rgba=RUBBER,
             group=2,
+            **bits,
         )

@@ -76,6 +76,10 @@ class SimulationState(_Arrays):
     """Hands that let go in this control period, (n, 2)."""
     grip_force: Array
     """Force of the object on each hand, (n, 2, 3) [N]."""
+    hand_weight_share: Array
+    """Vertical force of the hands on a held object as a part of its weight, (n,); zero with nothing to hold."""
+    link_object_force: Array
+    """Size of the force of links other than the hands, or of the ground, on the object, (n,) [N]."""
     partner_force: Array
     """Force of the partner on the object, (n, 3) [N]."""
     partner_energy: Array
@@ -113,6 +117,8 @@ class SimulationState(_Arrays):
             "foot_force": (2, 3),
             "grip_force": (2, 3),
             "external_force": (6,),
+            "hand_weight_share": (),
+            "link_object_force": (),
             "partner_energy": (),
         }
         arrays: dict[str, Any] = {}

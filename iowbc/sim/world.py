@@ -10,7 +10,7 @@ from iowbc.arrays import Array, Indices, Mask, as_slice
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
-from iowbc.robot.description import Robot
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.model import compile_scene
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
@@ -50,9 +50,12 @@ class World:
         self._acceleration, self._torque, self._external = bind("qacc"), bind("actuator_force"), bind("cfrc_ext")
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
-        kept = timing.kept_targets
-        history = bind("history")[:, self.layout.past_targets].reshape(len(rows), -1, 2 + 2 * kept)
-        self._past_targets = history[..., 2 + kept :]
+        kept, count, history = timing.kept_targets, len(rows), bind("history")
+        targets = history[:, self.layout.past_targets].reshape(count, -1, 2 + 2 * kept)
+        self._past_targets = targets[..., 2 + kept :]
+        if self.layout.object is not None:
+            forces = history[:, self.layout.past_forces].reshape(count, 2, -1)
+            self._past_forces = forces[..., 2 + timing.substeps :].reshape(count, 2, timing.substeps, 3)
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         by_contact = scene.kind == "lift" and scene.grasp.kind == "contact"
         self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
@@ -63,7 +66,7 @@ class World:
 
     def _mass_cache(self) -> None:
         mass = self.fields.body_mass
-        self.robot_mass = mass[:, self.layout.links].sum(axis=1)
+        self.robot_mass = np.ascontiguousarray(mass[:, self.layout.links]).sum(axis=1)
         thing = mass[:, self.layout.object] if self.layout.object is not None else np.zeros(len(mass))
         self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
@@ -123,7 +126,7 @@ class World:
 
     def _palm_offset(self, ids: Indices) -> Array:
         """From the grips to the centres of the palms, world frame, (k, 2, 3) [m]."""
-        local = self.model.geom_pos[self.layout.palms] - self._robot.grip_offset
+        local = self.model.geom_pos[self.layout.palms]
         turned: Array = rotations.rotate(
             self._body_quaternion[ids][:, self.layout.hands], np.broadcast_to(local, (len(ids), 2, 3))
         )
@@ -165,13 +168,13 @@ class World:
         return {"state": self.before[index]} | self.fields.of(index)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
-        """Lets go the hands whose grip carries more than its slip force, (all environments,) [N]."""
+        """Lets go the hands whose grip carried more than its slip force, (all environments,) [N], at any physics step
+        of the period."""
         if self.scene.kind == "free":
             return
-        force = state.grip_force[self.place]
-        load = np.vecdot(force, force)
+        load = np.vecdot(self._past_forces, self._past_forces).max(axis=2)
         if self.layout.object_grips is None:
-            state.grasped[self.place] = load > 0.0
+            state.grasped[self.place] = load > self.physics.contact_force**2
             return
         limit = slip_force[self.place]
         slipped = load > (limit * limit)[:, None]
@@ -236,7 +239,19 @@ class World:
         common *= self._object_part
         common += robot_velocity
         state.system_velocity[place] = common
-        state.grip_force[place] = self._external[:, self.layout.hands, 3:]
+        self._gather_load(state, thing)
+
+    def _gather_load(self, state: SimulationState, thing: int) -> None:
+        """Forces of hands and of other links on the object: what neither hands nor partner and impulses exert."""
+        place = self.place
+        grip = self._external[:, self.layout.hands, 3:]
+        state.grip_force[place] = grip
+        hands = grip[:, 0] + grip[:, 1]
+        if self.scene.kind == "lift":
+            state.hand_weight_share[place] = hands[:, 2] / (-GRAVITY * self.fields.body_mass[:, thing])
+        hands += self._external[:, thing, 3:]
+        hands -= self._applied[:, thing, :3]
+        state.link_object_force[place] = np.sqrt(np.vecdot(hands, hands))
 
     def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
         """Puts a simulation into what `record` kept."""

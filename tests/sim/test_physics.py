@@ -242,7 +242,7 @@ def test_forces_on_feet_and_hands_are_the_contact_forces(start, calm, hold_base)
             body = model.geom_bodyid[geom]
             total[body] = total.get(body, 0.0) + sign * world
     feet = [total[model.body(name).id] for name in ("left_ankle_roll_link", "right_ankle_roll_link")]
-    hands = [total[model.body(name).id] for name in ("left_wrist_yaw_link", "right_wrist_yaw_link")]
+    hands = [total[model.body(name).id] for name in ("left_hand", "right_hand")]
     assert np.allclose(simulation.state.foot_force[0], feet, atol=2.0)
     assert np.allclose(simulation.state.grip_force[0], hands, atol=2.0)
 

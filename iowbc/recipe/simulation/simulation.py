@@ -35,7 +35,7 @@ class Physics(Section):
     """What links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs and
     torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` tells what each costs."""
     contact_force: float = Field(default=1.0, gt=0.0)
-    """Vertical force above which a foot counts as being on the ground [N]."""
+    """Force above which a foot counts as being on the ground, and a palm as touching an object [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
     """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
     divergences_kept: int = Field(default=8, ge=0, json_schema_extra=COSMETIC)
