@@ -31,5 +31,8 @@ def robot_of_23(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     entries["name"] = "g1_23"
     entries["support"] = [name for name in entries["support"] if name.removesuffix("_joint") not in STIFF]
     entries["joints"] = {kind: row for kind, row in entries["joints"].items() if kind not in STIFF}
+    entries["linkages"] = [
+        pair for pair in entries["linkages"] if not {name.removesuffix("_joint") for name in pair} & set(STIFF)
+    ]
     (folder / DESCRIPTION).write_text(yaml.safe_dump(entries))
     return load_robot(folder)

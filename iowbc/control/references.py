@@ -10,6 +10,7 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.control.gravity import ArmGravity
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
@@ -35,7 +36,9 @@ class ReferenceLayer:
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
             self.feasible = FeasibleMap.load(rg / FEASIBLE)
-        self._start = references.arms
+        self._start, self._lean = references.arms, references.lean
+        self._gravity = ArmGravity(robot) if references.arms.gravity else None
+        self._compliance = 1.0 / robot.kp[robot.interaction]
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
@@ -106,5 +109,23 @@ class ReferenceLayer:
 
         The torso stands where the references put it, not where it is measured: the arms do not answer to swaying.
         """
-        wrists = grasp + command[:, OFFSET].reshape(-1, 2, 3)
+        wrists = self.wrists(command, grasp)
         return self.arms.into_torso(support[:, self.waist], self.pelvis_pitch(support, command), wrists)
+
+    def wrists(self, command: Array, grasp: Array) -> Array:
+        """x_wrist in the heading frame, ahead of the base grasp where the torso leans forward, (n, 2, 3) [m]."""
+        wrists: Array = grasp + command[:, OFFSET].reshape(-1, 2, 3)
+        wrists[:, :, 0] += self._lean * np.maximum(np.sin(command[:, PITCH]), 0.0)[:, None]
+        return wrists
+
+    def arm_target(self, arms: Array, support: Array, command: Array, load: Array) -> Array:
+        """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references and what balances the weight of
+        the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references."""
+        if self._gravity is None:
+            return arms
+        pitch = self.pelvis_pitch(support, command)
+        down = np.stack([np.sin(pitch), np.zeros_like(pitch), -np.cos(pitch)], axis=1)
+        each = np.repeat(0.5 * load[:, None], 2, axis=1)
+        torque = self._gravity.torque(arms, support[:, self.waist], down, each)
+        target: Array = arms + torque * self._compliance
+        return target

@@ -81,6 +81,7 @@ class Controller:
         actions = len(contract.support)
         self._command: Array = np.zeros((robots, len(COMMAND)))
         self._grasp: Array = np.zeros((robots, 2, 3))
+        self._load: Array = np.zeros(robots)
         self._arms: Array = np.zeros((robots, len(contract.interaction)))
         self._support: Array = np.zeros((robots, actions))
         self._phase: Array = np.zeros(robots)
@@ -107,11 +108,13 @@ class Controller:
         return cls(contract, robot, session, feasible, robots)
 
     def reset(self, which: NDArray[np.bool_] | None = None, *, scene: str | None = None) -> None:
-        """Forget the past of the marked robots, (n,), or of all; `scene` chooses the base grasp ("lift" at first)."""
+        """Forget the past of the marked robots, (n,), or of all; `scene` chooses base grasp and expected load
+        ("lift" at first)."""
         which = np.ones(self.robots, np.bool_) if which is None else which
         self._starts |= which
         if scene is not None or not self._grasp.any():
             self._grasp[which] = both_wrists(base_grasp(self.contract.references.grasps, scene or "lift"))
+            self._load[which] = getattr(self.contract.references.loads, scene or "lift")
 
     def step(self, measured: Measured, command: Array, *, limit_rates: bool = True) -> Targets:
         """Joint targets for the next control period.
@@ -143,7 +146,9 @@ class Controller:
         self._inputs["history"], self._inputs["last_action"] = outputs["history_next"], outputs["action"].copy()
         position = np.empty((self.robots, len(self.contract.joints)))
         position[:, self.robot.support] = outputs["support_target"]
-        position[:, self.robot.interaction] = self._arms
+        position[:, self.robot.interaction] = self._references.arm_target(
+            self._arms, self._support, self._command, self._load
+        )
         return Targets(position, self._kp, self._kd, outputs["action"], outputs["support_reference"])
 
     def _advance(self, starts: NDArray[np.bool_]) -> None:

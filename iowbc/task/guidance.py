@@ -8,7 +8,7 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
-from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
+from iowbc.control.command import HEIGHT, YAW_RATE
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.robot.description import Robot
 from iowbc.task.commands.commander import Commander
@@ -36,6 +36,7 @@ class Guidance:
         self.references = ReferenceLayer(robot, task.references, specification.rg)
         self.commander = Commander(task, self.references, scripts, holding, period)
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
+        self._load = np.array([getattr(task.references.loads, name) for name in scenes])
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._joints, self._scale, self._bound = len(robot.joints), action_scale(robot, task.action), task.action.bound
 
@@ -74,11 +75,11 @@ class Guidance:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref."""
         target = np.empty((len(action), self._joints))
         target[:, self._support] = memory.support + self._scale * action.clip(-self._bound, self._bound)
-        target[:, self._arms] = memory.arms
+        target[:, self._arms] = self.references.arm_target(memory.arms, memory.posture, memory.command, self._load)
         return target
 
     def object_place(self, memory: Memory) -> Array:
         """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
-        wrists = self._grasp + memory.command[:, OFFSET].reshape(-1, 2, 3)
+        wrists = self.references.wrists(memory.command, self._grasp)
         place: Array = 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place
         return place

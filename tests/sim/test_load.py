@@ -51,7 +51,7 @@ def test_a_hand_slips_at_a_peak_between_two_control_steps(start, calm, hold_base
 
 def test_a_tyre_is_a_ring_through_whose_hole_things_pass(start, calm):
     simulation = start(changed(calm, "physics.body_contact", "object"), ["tyre"])
-    model, data = simulation.physics_model(0)
+    model, _ = simulation.physics_model(0)
     geoms = [index for index in range(model.ngeom) if model.geom_bodyid[index] == model.body("object").id]
     nearest = min(np.linalg.norm(model.geom_pos[index][1:]) - model.geom_size[index][0] for index in geoms)
     assert nearest == pytest.approx(0.55 * 0.28, rel=0.03)

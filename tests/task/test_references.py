@@ -13,7 +13,7 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.joint_references import References
+from iowbc.recipe.task.joint_references import ArmReference, References
 from iowbc.robot.description import Robot
 from iowbc.task.commands.drawing import nominal_command
 from iowbc.task.specification import Specification
@@ -67,7 +67,8 @@ def test_an_episode_starts_with_the_wrists_at_the_base_grasp_and_the_offset(
 ) -> None:
     asked = command(pitch=pitch, offset=(0.02, 0.01, 0.03, 0.0, 0.01, -0.03))
     arms, support = layer.start(asked, GRASP)
-    expected = GRASP[0] + asked[0, OFFSET].reshape(2, 3)
+    ahead = [0.3 * np.sin(pitch), 0.0, 0.0]
+    expected = GRASP[0] + asked[0, OFFSET].reshape(2, 3) + ahead
     assert wrists(layer, arms, support, asked) == pytest.approx(expected, abs=2e-3)
 
 
@@ -142,8 +143,22 @@ def test_rollouts_with_a_generator_do_not_depend_on_the_number_of_workers(
     assert same(*courses)
 
 
+def test_arms_are_driven_ahead_of_their_references_by_what_their_weight_and_the_expected_load_bend_them(
+    layer: ReferenceLayer, robot: Robot
+) -> None:
+    asked = command()
+    arms, support = layer.start(asked, GRASP)
+    alone, laden = (layer.arm_target(arms, support, asked, np.array([load])) for load in (0.0, 4.0))
+    _, jacobian = layer.arms.forward(arms)
+    upright = jacobian[0, :, 2].ravel()  # rise of each wrist with its joints
+    torque = (laden - alone)[0] * robot.kp[robot.interaction]
+    assert torque == pytest.approx(0.5 * 4.0 * 9.81 * upright, abs=0.05)
+    unweighted = ReferenceLayer(robot, References(arms=ArmReference(gravity=False)), None)
+    assert np.array_equal(unweighted.arm_target(arms, support, asked, np.array([4.0])), arms)
+
+
 def test_the_observed_references_are_those_that_the_joints_are_driven_to(make: Make, robot: Robot) -> None:
-    env = make(num_envs=2, changes=QUIET)
+    env = make(num_envs=2, changes=QUIET | {"task.references.arms.gravity": False})
     rows = env.reset()
     place = env.layout.state.slices
     batch = env.batch
