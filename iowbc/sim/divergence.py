@@ -47,6 +47,6 @@ def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing)
     world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
     world.recall(0, arrays)
     diverged = np.zeros(1, bool)
-    given = [arrays[name][None] for name in ("target", "effort", "wrench", "push")]
-    world.step(given[0], given[1], given[2], given[3], diverged)
+    given = [arrays[name][None] for name in ("target", "effort", "wrench", "push", "resistance")]
+    world.step(given[0], given[1], given[2], given[3], given[4], diverged)
     return bool(diverged[0])

@@ -10,7 +10,7 @@ from iowbc.recipe.simulation.distribution import Distribution
 from iowbc.recipe.simulation.holding import SWITCHES
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
-from iowbc.robot.description import Robot
+from iowbc.robot.description import GRAVITY, Robot
 
 PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
@@ -84,6 +84,7 @@ class Draws:
                 self.values[name] = self._rows[:, place.start] if single else self._rows[:, place]
         self.values["object_mass"] = self._nominal_mass.copy()
         self.values["slip_force"] = self._strength.copy()
+        self.values["rolling_resistance"] = np.zeros(n)
         self._lightest = recipe.randomization.object_mass_scale.low
 
     @property
@@ -115,6 +116,8 @@ class Draws:
             self._hold("object_mass", which, fixed["object_mass"])
         mass = np.maximum(values["object_mass"][which], self._smallest_mass[which])
         values["object_mass"][which] = mass * self._with_object[which]
+        friction = values["object_ground_friction"][which] * values["resistance_scale"][which]
+        values["rolling_resistance"][which] = friction * values["object_mass"][which] * GRAVITY
         values["slip_force"][which] = values["surface_friction"][which] * self._strength[which]
 
     def _hold(self, name: str, which: Indices, values: Array) -> None:

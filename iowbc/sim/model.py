@@ -11,6 +11,8 @@ from iowbc.sim.objects import OBJECT_BIT, add_object
 from iowbc.sim.timing import Timing
 
 GROUND_BIT = 1
+LEG_BITS = (8, 16)
+"""What left and right leg are; each touches the other."""
 ARENA = 2 << 20
 """Memory for contacts and constraints of one simulation [bytes]; twenty contacts take a tenth of it."""
 
@@ -40,11 +42,16 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
         option.cone, option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, scene.grasp.settling
     spec.memory = ARENA
     foot_points = [geom for geom in spec.geoms if geom.parent.name in robot.sole_bodies and geom.conaffinity]
+    legs = _legs(robot)
     for geom in list(spec.geoms):
         if geom in foot_points:
             geom.priority = 1
-        else:
-            geom.contype, geom.conaffinity = _touches(geom, physics.body_contact)
+            continue
+        shape = bool(geom.contype) or geom.parent.name in robot.sole_bodies
+        geom.contype, geom.conaffinity = _touches(geom, shape, physics.body_contact)
+        if physics.leg_contact and shape and geom.parent.name in legs:
+            own = legs[geom.parent.name]
+            geom.contype, geom.conaffinity = geom.contype | LEG_BITS[own], geom.conaffinity | LEG_BITS[1 - own]
     if not dressed:
         for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
             spec.delete(geom)
@@ -89,9 +96,17 @@ def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
         )
 
 
-def _touches(geom: Any, body_contact: str) -> tuple[int, int]:
-    """Contact bits of a link's geom: what it is and what it touches. Hands and forearms hold the object with palms or
-    grips, and do not touch it themselves."""
+def _legs(robot: Robot) -> dict[str, int]:
+    """Links of the left leg (0) and of the right one (1), feet included."""
+    chains = [robot.tree.chain(sole, robot.base) for sole in robot.sole_bodies]
+    return {body.name: side for side, chain in enumerate(chains) for body in chain}
+
+
+def _touches(geom: Any, shape: bool, body_contact: str) -> tuple[int, int]:
+    """Contact bits of a link's geom: what it is and what it touches; `shape`: it is one to collide with.
+
+    Hands and forearms hold the object with palms or grips, and do not touch it themselves.
+    """
     links = (geom.contype, geom.conaffinity & ~OBJECT_BIT) if body_contact == "everything" else (0, 0)
-    solid = geom.contype and body_contact != "nothing" and not any(part in geom.parent.name for part in HOLDING)
+    solid = shape and body_contact != "nothing" and not any(part in geom.parent.name for part in HOLDING)
     return links[0], links[1] | (OBJECT_BIT if solid else 0)

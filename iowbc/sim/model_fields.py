@@ -7,7 +7,6 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
-from iowbc.robot.description import GRAVITY
 from iowbc.sim.model_index import Layout
 from iowbc.sim.objects import TORSION, inertia_per_mass
 from iowbc.sim.timing import Timing
@@ -18,6 +17,8 @@ FIELDS = (
     *("actuator_forcerange", "actuator_delay"),
 )
 """Model fields that differ between simulations."""
+WHEELS = ("tendon_frictionloss", "tendon_damping", "wrap_prm")
+"""Those of a crate's wheels."""
 
 
 class ModelFields:
@@ -25,7 +26,8 @@ class ModelFields:
 
     def __init__(self, batch: Any, layout: Layout, scene: Scene, timing: Timing) -> None:
         self._layout, self._scene, self._timing = layout, scene, timing
-        self._fields = {name: batch.expand(name) for name in FIELDS}
+        names = FIELDS + WHEELS * (scene.kind == "push")
+        self._fields = {name: batch.expand(name) for name in names}
         self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
         self._object_inertia = inertia_per_mass(scene.object) if scene.object is not None else np.zeros(3)
         batch.set_const()
@@ -64,17 +66,24 @@ class ModelFields:
         fields["body_mass"][ids, thing] = mass
         fields["body_inertia"][ids, thing] = inertia
         fields["body_ipos"][ids, thing] = drawn["object_com_offset"]
-        if self._scene.kind == "push":
-            resistance = drawn["object_ground_friction"] * mass * GRAVITY
-            lever = np.array([1.0, 1.0, self._scene.yaw_arm])
-            fields["dof_frictionloss"][ids, speed] = resistance[:, None] * lever
-        elif speed is not None:
+        if self._scene.kind == "lift" and speed is not None:
             turning = slice(speed.start + 3, speed.stop)
             fields["dof_damping"][ids, turning] = self._scene.grasp.swing_damping * inertia
         if self._layout.palms is not None:
             friction = drawn["surface_friction"][:, None]
             fields["geom_friction"][ids[:, None], self._layout.palms, 0] = friction
             fields["geom_friction"][ids[:, None], self._layout.palms, 1] = TORSION * friction
+
+    @property
+    def rolling(self) -> tuple[Array, Array]:
+        """Dry friction [N] and damping [N·s/m] of a crate's wheels in each direction, (n, 3); to be written."""
+        return self._fields["tendon_frictionloss"], self._fields["tendon_damping"]
+
+    @property
+    def rolling_directions(self) -> Array:
+        """Those directions, x, y and yaw of each, (n, 9); to be written."""
+        directions: Array = self._fields["wrap_prm"]
+        return directions
 
     @property
     def torque_range(self) -> Array:

@@ -55,7 +55,7 @@ def add_object(
         colour = WOOD if scene.kind == "push" else CARDBOARD
         body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, group=2, rgba=colour, **bits)
     if scene.kind == "push":
-        _add_wheels(body, thing, dressed)
+        _add_wheels(spec, body, thing, dressed)
     else:
         body.add_freejoint(name="object_joint")
     _add_hands(spec, robot, timing)
@@ -131,11 +131,15 @@ def _add_palms(spec: Any, scene: Scene) -> None:
         )
 
 
-def _add_wheels(body: Any, thing: Object, dressed: bool) -> None:
-    """Planar motion and turning; rolling resistance is the dry friction of these joints."""
+def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
+    """Planar motion and turning; rolling resistance is the dry friction of tendons over these joints."""
     for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0))):
         body.add_joint(name=f"object_{name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     body.add_joint(name="object_yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=(0.0, 0.0, 1.0))
+    for direction in np.eye(3):
+        tendon = spec.add_tendon(frictionloss=1.0)
+        for name, part in zip(("object_x", "object_y", "object_yaw"), direction, strict=True):
+            tendon.wrap_joint(name, part)
     if not dressed:
         return
     x, y, z = 0.5 * np.asarray(thing.size)

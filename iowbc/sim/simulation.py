@@ -184,7 +184,14 @@ class Simulation:
         for world in self.worlds:
             place = world.place
             failed = diverged[place]
-            world.step(target[place], effort[place], wrench[place], state.push_force[place], failed)
+            world.step(
+                target[place],
+                effort[place],
+                wrench[place],
+                state.push_force[place],
+                drawn["rolling_resistance"][place],
+                failed,
+            )
             if failed.any():
                 diverged[place] = failed
                 self._keep_divergences(world, np.flatnonzero(failed), target, effort, wrench)
@@ -217,7 +224,7 @@ class Simulation:
             row = int(world.rows[index])
             arrays = world.record(int(index))
             arrays |= {"target": target[row], "effort": effort[row], "wrench": wrench[row]}
-            arrays["push"] = self.state.push_force[row]
+            arrays |= {"push": self.state.push_force[row], "resistance": self.drawn["rolling_resistance"][row]}
             self.divergences.append(
                 Divergence(
                     scene=self.scene_names[row],

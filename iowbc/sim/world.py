@@ -14,6 +14,7 @@ from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.model import compile_scene
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
+from iowbc.sim.rolling import Rolling
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.stability import require_stable
 from iowbc.sim.state import SimulationState
@@ -59,6 +60,7 @@ class World:
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         by_contact = scene.kind == "lift" and scene.grasp.kind == "contact"
         self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
+        self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
         self.before = self.batch.state.copy()
@@ -132,16 +134,20 @@ class World:
         )
         return turned
 
-    def step(self, target: Array, effort: Array, wrench: Array, push: Array, diverged: Mask) -> None:
-        """One control period with joint targets held, and torques within `effort` (n, joints, 2); `wrench` (n, 6) on
-        the object's and `push` (n, 3) on the base's centre of mass. Marks in `diverged` the simulations that left the
-        numbers and puts them back."""
+    def step(self, target: Array, effort: Array, wrench: Array, push: Array, resistance: Array, diverged: Mask) -> None:
+        """One control period with joint targets held, and torques within `effort` (n, joints, 2).
+
+        `wrench` (n, 6) acts on the object's and `push` (n, 3) on the base's centre of mass; `resistance` (n,) is
+        that of a crate's wheels [N]. Marks in `diverged` the simulations that left the numbers and puts them back.
+        """
         np.copyto(self.before, self.batch.state)
         np.copyto(self.control, target)
         np.copyto(self.fields.torque_range, effort)
         if self._squeeze is not None:
             self._squeeze.add(self.control)
         self._applied[:, self.layout.base, :3] = push
+        if self._rolling is not None:
+            self._rolling.turn(resistance, wrench - self._applied[:, self.layout.object])
         if self.layout.object is not None:
             self._applied[:, self.layout.object] = wrench
         try:

@@ -74,23 +74,6 @@ def test_eight_kilograms_stay_within_the_torque_of_the_wrists(start, calm, hold_
     assert not simulation.state.saturation.any()
 
 
-def test_crate_starts_to_move_at_the_rolling_resistance(start, calm):
-    resistance, mass = 0.08, 40.0
-    simulation = start(calm, ["push"], object_mass=mass, object_ground_friction=resistance)
-    threshold = resistance * mass * GRAVITY
-    for factor, moves in ((0.95, False), (1.05, True)):
-        model, data = simulation.physics_model(0)
-        data.qpos[36] += 5.0  # out of the reach of a robot that falls
-        mujoco.mj_forward(model, data)
-        data.xfrc_applied[model.body("object").id, 0] = factor * threshold
-        start_x = data.body("object").xpos[0]
-        while data.time < 2.0:
-            mujoco.mj_step(model, data)
-        moved = data.body("object").xpos[0] - start_x
-        expected = 0.5 * (factor - 1.0) * threshold / mass * 4.0
-        assert moved == (pytest.approx(expected, rel=0.1) if moves else pytest.approx(0.0, abs=0.01))
-
-
 @pytest.mark.parametrize("body_contact", ["nothing", "object", "everything"])
 def test_hands_push_the_crate_with_what_it_resists(start, calm, hold_base, robot, body_contact):
     hold_base()

@@ -84,7 +84,8 @@ def test_drawn_values_reach_the_model(start, robot):
         assert model.body_subtreemass[0] == pytest.approx(model.body_mass.sum())
     model, _ = simulation.physics_model(1)
     resistance = drawn["object_ground_friction"][1] * drawn["object_mass"][1] * 9.81
-    assert np.allclose(model.dof_frictionloss[35:37], resistance)
+    assert drawn["rolling_resistance"][1] == pytest.approx(resistance)
+    assert drawn["rolling_resistance"][0] == 0.0
     assert model.geom("left_palm").friction[0] == drawn["surface_friction"][1]
 
 

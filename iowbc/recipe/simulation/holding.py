@@ -15,9 +15,10 @@ FREE = "free"
 """The scene without an object."""
 LOADED = tuple(name for name in SCENES if name != FREE)
 """Scenes with an object."""
-SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale")
-"""Factors on impulses, pushes and sensor noise, and on how far the object's mass may rise above the lower end of its
-range. One unless held at another value; zero switches off."""
+SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale", "resistance_scale")
+"""Factors on impulses, pushes and sensor noise, on how far the object's mass may rise above the lower end of its range,
+and on a crate's rolling resistance (fifty times as much blocks it). One unless held at another value; zero switches
+off."""
 HOLDABLE = (
     *(name for name, field in Randomization.model_fields.items() if field.annotation is Distribution),
     *(

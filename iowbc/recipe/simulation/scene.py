@@ -62,8 +62,10 @@ class Scene(Section):
     """Distance from the palms to the crate's face at the start of a push [m]."""
     palm_radius: float = Field(default=0.03, gt=0.0)
     """Radius of the spheres with which palms touch an object [m]."""
-    yaw_arm: float = Field(default=0.3, ge=0.0)
+    yaw_arm: float = Field(default=0.3, gt=0.0)
     """Mean distance of the crate's wheels from its centre [m]; times the rolling resistance it resists turning."""
+    creep: float = Field(default=0.02, gt=0.0)
+    """Speed below which a crate counts as at rest [m/s]; stuck, the solver lets it creep at 1 mm/s."""
 
     @model_validator(mode="after")
     def _object_fits_kind(self) -> Self:

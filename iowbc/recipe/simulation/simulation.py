@@ -34,6 +34,8 @@ class Physics(Section):
     body_contact: Literal["nothing", "object", "everything"] = "object"
     """What links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs and
     torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` tells what each costs."""
+    leg_contact: bool = True
+    """Whether the legs, feet included, touch each other; off, feet pass through each other and steps may cross."""
     contact_force: float = Field(default=1.0, gt=0.0)
     """Force above which a foot counts as being on the ground, and a palm as touching an object [N]."""
     fastest: float = Field(default=200.0, gt=0.0)

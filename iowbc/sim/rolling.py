@@ -1,0 +1,67 @@
+"""Dry friction of a crate's wheels: alike in every direction, and coupled with its turning.
+
+Three tendons without elasticity lie along orthonormal directions of the space of (x, y, arm · yaw); each control period
+turns them. With w the crate's velocity there, friction is -R w / |w| (an ellipsoidal limit surface, Goyal et al. 1991),
+whose exact linearisation is dry friction R along w and damping R / |w| across it. A crate at rest sticks along the
+force on it up to R.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.robot import rotations
+from iowbc.sim.model_fields import ModelFields
+from iowbc.sim.model_index import Layout
+
+TINY = 1e-9
+
+
+class Rolling:
+    """Wheels of n crates."""
+
+    def __init__(self, batch: Any, layout: Layout, fields: ModelFields, scene: Scene) -> None:
+        if layout.object is None or layout.object_velocity is None:
+            raise ValueError("a crate is needed to roll")
+        self._thing, self._speeds, self._fields = layout.object, layout.object_velocity, fields
+        self._arm, self._slow = scene.yaw_arm, scene.creep
+        self._velocity, self._external = batch.bind("qvel"), batch.bind("cfrc_ext")
+        self._place, self._centre = batch.bind("xpos"), batch.bind("xipos")
+        self._scale = np.array([1.0, 1.0, self._arm])
+
+    def turn(self, resistance: Array, change: Array) -> None:
+        """Directs friction over the period to come: `resistance` (n,) [N]; `change` (n, 6) of the force and torque that
+        are applied to the crate from outside, against the last period, about its centre of mass [N, N·m]."""
+        moving = self._velocity[:, self._speeds] * self._scale
+        speed = np.sqrt(np.vecdot(moving, moving))
+        slides = speed > self._slow
+        ahead = np.where(slides[:, None], moving, self._push(change))
+        length = np.sqrt(np.vecdot(ahead, ahead))
+        ahead /= np.maximum(length, TINY)[:, None]
+        ahead[length < TINY] = (1.0, 0.0, 0.0)
+        self._direct(ahead)
+        dry, damping = self._fields.rolling
+        dry[:, 0] = resistance
+        dry[:, 1:] = np.where(slides, 0.0, resistance)[:, None]
+        damping[:, 1:] = np.where(slides, resistance / np.maximum(speed, self._slow), 0.0)[:, None]
+
+    def _push(self, change: Array) -> Array:
+        """Force on the crates but that of their wheels, and its torque about the vertical by the arm, (n, 3) [N]."""
+        force = self._external[:, self._thing] + change[:, [3, 4, 5, 0, 1, 2]]
+        lever = self._centre[:, self._thing] - self._place[:, self._thing]
+        pushed: Array = force[:, 3:].copy()
+        turning = force[:, 2] + lever[:, 0] * force[:, 4] - lever[:, 1] * force[:, 3]
+        pushed[:, 2] = turning / self._arm
+        return pushed
+
+    def _direct(self, ahead: Array) -> None:
+        """Writes the tendons' coefficients for their first direction, unit vectors (n, 3)."""
+        steep = np.abs(ahead[:, 2]) > 0.9
+        other = np.zeros_like(ahead)
+        other[:, 2], other[:, 0] = ~steep, steep
+        across = rotations.cross(other, ahead)
+        across /= np.sqrt(np.vecdot(across, across))[:, None]
+        frame = np.stack([ahead, across, rotations.cross(ahead, across)], axis=1)
+        self._fields.rolling_directions[:] = (frame * self._scale).reshape(len(ahead), -1)
