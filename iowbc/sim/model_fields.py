@@ -32,6 +32,7 @@ class ModelFields:
         self._object_inertia = inertia_per_mass(scene.object) if scene.object is not None else np.zeros(3)
         batch.set_const()
         self._batch = batch
+        self._yielding = batch.expand("tendon_invweight0") if scene.kind == "push" else None
 
     @property
     def body_mass(self) -> Array:
@@ -57,7 +58,13 @@ class ModelFields:
         fields["geom_friction"][ids[:, None], self._layout.foot_geoms, 0] = drawn["ground_friction"][:, None]
         if self._layout.object is not None:
             self._write_object(ids, drawn)
-        self._batch.set_const(np.sort(ids))
+        self._derive(np.sort(ids))
+
+    def _derive(self, ids: Indices) -> None:
+        """What follows from the fields; wheels give way alike in whatever direction they were turned last."""
+        self._batch.set_const(ids)
+        if self._yielding is not None:
+            self._yielding[ids] = 1.0 / self.body_mass[ids, self._layout.object][:, None]
 
     def _write_object(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
         fields, thing, speed = self._fields, self._layout.object, self._layout.object_velocity
@@ -121,10 +128,10 @@ class ModelFields:
         """Inverse of `of`."""
         for name, field in self._fields.items():
             field[index] = values[name]
-        self._batch.set_const()
+        self._derive(np.arange(len(self.body_mass)))
 
     def restore(self, values: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`."""
         for name, field in self._fields.items():
             field[...] = values[name]
-        self._batch.set_const()
+        self._derive(np.arange(len(self.body_mass)))

@@ -17,6 +17,8 @@ from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import Layout
 
 TINY = 1e-9
+TORQUE_FIRST = [3, 4, 5, 0, 1, 2]
+"""Order of MuJoCo's spatial forces."""
 
 
 class Rolling:
@@ -30,14 +32,16 @@ class Rolling:
         self._velocity, self._external = batch.bind("qvel"), batch.bind("cfrc_ext")
         self._place, self._centre = batch.bind("xpos"), batch.bind("xipos")
         self._scale = np.array([1.0, 1.0, self._arm])
+        self.touch = np.zeros((len(self._velocity), 6))
+        """Torque about the centre of mass and force of what touches the crates, (n, 6)."""
 
-    def turn(self, resistance: Array, change: Array) -> None:
-        """Directs friction over the period to come: `resistance` (n,) [N]; `change` (n, 6) of the force and torque that
-        are applied to the crate from outside, against the last period, about its centre of mass [N, N·m]."""
+    def turn(self, resistance: Array, wrench: Array) -> None:
+        """Directs friction over the period to come: `resistance` (n,) [N]; `wrench` (n, 6) that is applied to the crate
+        beside what touches it, about its centre of mass [N, N·m]."""
         moving = self._velocity[:, self._speeds] * self._scale
         speed = np.sqrt(np.vecdot(moving, moving))
         slides = speed > self._slow
-        ahead = np.where(slides[:, None], moving, self._push(change))
+        ahead = np.where(slides[:, None], moving, self._push(wrench))
         length = np.sqrt(np.vecdot(ahead, ahead))
         ahead /= np.maximum(length, TINY)[:, None]
         ahead[length < TINY] = (1.0, 0.0, 0.0)
@@ -47,9 +51,13 @@ class Rolling:
         dry[:, 1:] = np.where(slides, 0.0, resistance)[:, None]
         damping[:, 1:] = np.where(slides, resistance / np.maximum(speed, self._slow), 0.0)[:, None]
 
-    def _push(self, change: Array) -> Array:
+    def observe(self, wrench: Array) -> None:
+        """Remembers what touched the crates at the end of a period in which `wrench` (n, 6) was applied."""
+        np.subtract(self._external[:, self._thing], wrench[:, TORQUE_FIRST], out=self.touch)
+
+    def _push(self, wrench: Array) -> Array:
         """Force on the crates but that of their wheels, and its torque about the vertical by the arm, (n, 3) [N]."""
-        force = self._external[:, self._thing] + change[:, [3, 4, 5, 0, 1, 2]]
+        force = self.touch + wrench[:, TORQUE_FIRST]
         lever = self._centre[:, self._thing] - self._place[:, self._thing]
         pushed: Array = force[:, 3:].copy()
         turning = force[:, 2] + lever[:, 0] * force[:, 4] - lever[:, 1] * force[:, 3]

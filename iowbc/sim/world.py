@@ -61,6 +61,7 @@ class World:
         by_contact = scene.kind == "lift" and scene.grasp.kind == "contact"
         self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
         self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
+        self._touch = {} if self._rolling is None else {"touch": self._rolling.touch}
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
         self.before = self.batch.state.copy()
@@ -89,6 +90,8 @@ class World:
         if self.layout.object_position is not None:
             self._place_object(ids, drop, yaw, self.layout.object_position.start)
         self._connected[ids] = 1.0
+        for touch in self._touch.values():
+            touch[ids] = 0.0
         self.batch.forward(ids)
         self._warnings[ids] = self._warning_counts[ids]
         self._mass_cache()
@@ -147,13 +150,15 @@ class World:
             self._squeeze.add(self.control)
         self._applied[:, self.layout.base, :3] = push
         if self._rolling is not None:
-            self._rolling.turn(resistance, wrench - self._applied[:, self.layout.object])
+            self._rolling.turn(resistance, wrench)
         if self.layout.object is not None:
             self._applied[:, self.layout.object] = wrench
         try:
             self.batch.step(nstep=self.timing.substeps, stage=VELOCITY)
         except SimulationError as error:
             diverged[error.ids] = True
+        if self._rolling is not None:
+            self._rolling.observe(wrench)
         self._check(diverged)
 
     def _check(self, diverged: Mask) -> None:
@@ -171,7 +176,8 @@ class World:
 
     def record(self, index: int) -> dict[str, Array]:
         """What a simulation was at the start of the last control period: its state row and its model's own fields."""
-        return {"state": self.before[index]} | self.fields.of(index)
+        kept = {name: values[index] for name, values in self._touch.items()}
+        return kept | {"state": self.before[index]} | self.fields.of(index)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
         """Lets go the hands whose grip carried more than its slip force, (all environments,) [N], at any physics step
@@ -262,6 +268,8 @@ class World:
     def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
         """Puts a simulation into what `record` kept."""
         self.fields.set(index, recorded)
+        for name, touch in self._touch.items():
+            touch[index] = recorded[name]
         self.batch.state[index] = recorded["state"]
         self.batch.forward(np.array([index]), stage=VELOCITY)
         self._mass_cache()
@@ -273,11 +281,14 @@ class World:
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""
-        return {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
+        touch = {name: values.copy() for name, values in self._touch.items()}
+        return touch | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`; the simulations then take bit for bit the same course."""
         self.fields.restore(values)
+        for name, touch in self._touch.items():
+            touch[...] = values[name]
         self.batch.state[...] = values["state"]
         self._warning_counts[...] = values["warnings"]
         self._warnings[...] = values["warnings"]

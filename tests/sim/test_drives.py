@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 import pytest
-from conftest import changed, run
+from changes import changed
+from stepping import run
 
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.sim.drives import Drives

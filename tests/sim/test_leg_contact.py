@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from conftest import changed
+from changes import changed
 
 
 def crossed(simulation, hip_roll):

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import changed, run
+from changes import changed
+from stepping import run
 
 GRAVITY = 9.81
 MASS, FRICTION = 40.0, 0.08
