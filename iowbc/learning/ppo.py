@@ -20,8 +20,9 @@ from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.networks import Mirrors, mirror_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.precision import reduced, threads
+from iowbc.learning.precision import reduced
 from iowbc.learning.rollout import Rollout
+from iowbc.learning.side_by_side import SideBySide
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
 from iowbc.recipe.teacher import Teacher
 
@@ -39,7 +40,7 @@ class Learner(PPO):  # type: ignore[misc]
 
     def configure(self, teacher: Teacher, mirrors: Mirrors, cores: int) -> None:
         """What stable-baselines3's constructor does not know; `cores`: on which the networks learn."""
-        self.settings, self.cores = teacher, cores
+        self.settings, self.side_by_side = teacher, SideBySide(teacher.parts, cores)
         symmetric = teacher.symmetry != "none"
         (size,) = self.observation_space.shape
         self.normalization = Normalization(size, self.n_envs, self.gamma, mirrors[0] if symmetric else None)
@@ -50,7 +51,7 @@ class Learner(PPO):  # type: ignore[misc]
         """Of the last update's last epoch."""
 
     def _excluded_save_params(self) -> list[str]:
-        own = ["settings", "normalization", "mirrored", "seconds", "cores", "kl", "rollout_buffer"]
+        own = ["settings", "normalization", "mirrored", "seconds", "side_by_side", "kl", "rollout_buffer"]
         return [*super()._excluded_save_params(), *own]
 
     @contextmanager
@@ -88,29 +89,35 @@ class Learner(PPO):  # type: ignore[misc]
                 return False
         self._last_obs = observation
         self._last_episode_starts = ended
-        with self._timed("learning"), threads(self.cores), torch.inference_mode():
+        with self._timed("learning"):
             self._look_back(rollout_buffer, cut)
         callback.on_rollout_end()
         return True
 
     def _look_back(self, rollout: Rollout, cut: list[tuple[int, int, Any]]) -> None:
         """What policy and value were during a rollout, and its advantages; `cut`: where time limits ended episodes."""
-        policy, columns, flat = self.policy, rollout.columns, rollout.named(rollout.flat)
-        with reduced(self.settings.precision):
-            hidden = policy.actor.hidden(flat["observation"])
-        flat["mean"].copy_(policy.actor.head(hidden))
-        flat["log_density"].copy_(log_density(flat["action"], flat["mean"], policy.log_std))
-        flat["value"].copy_(policy.critic.head(policy.critic.hidden(flat["observation"]))[:, 0])
+        self.side_by_side(self._judge, rollout.flat)
         behind = np.concatenate([self._last_obs, *(observation[None] for _, _, observation in cut)])
-        values = policy.predict_values(torch.from_numpy(behind))[:, 0].numpy()
+        with torch.inference_mode():
+            values = self.policy.predict_values(torch.from_numpy(behind))[:, 0].numpy()
         for (step, index, _), value in zip(cut, values[self.n_envs :], strict=True):
             rollout.rewards[step, index] += self.gamma * value
         rollout.finish(values[: self.n_envs], self.gamma, self.gae_lambda)
-        self.explained = explained_variance(columns["value"], columns["target"])
+        self.explained = explained_variance(rollout.columns["value"], rollout.columns["target"])
+
+    def _judge(self, samples: Tensor) -> None:
+        """Writes the policy's mean, the density of the action and the value into rows of samples."""
+        policy, own = self.policy, self.rollout_buffer.named(samples)
+        with torch.inference_mode():
+            with reduced(self.settings.precision):
+                hidden = policy.actor.hidden(own["observation"])
+            own["mean"].copy_(policy.actor.head(hidden))
+            own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
+            own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
     def train(self) -> None:
         """Gradient steps on the rollout in the buffer."""
-        with self._timed("learning"), threads(self.cores):
+        with self._timed("learning"):
             self._train()
 
     def _train(self) -> None:
@@ -121,18 +128,11 @@ class Learner(PPO):  # type: ignore[misc]
         before = self.policy.log_std.detach().clone()
         samples = rollout.flat
         images = None if self.mirrored is None else self.mirrored.images(rollout, self.policy)
-        parameters = [*self.policy.actor.parameters(), *self.policy.critic.parameters(), self.policy.log_stds]
         found: list[Tensor] = []
         for _ in range(self.n_epochs):
             shuffled = (samples if images is None else half_mirrored(samples, images))[torch.randperm(len(samples))]
             for batch in torch.split(shuffled, self.batch_size):
-                loss, figures = self._loss(rollout.named(batch), before)
-                optimizer.zero_grad()
-                loss.backward()  # type: ignore[no-untyped-call]
-                torch.nn.utils.clip_grad_norm_(parameters, self.max_grad_norm)
-                optimizer.step()
-                self._bound_deviation()
-                found.append(figures)
+                found.append(self._gradient_step(batch, before))
             self._n_updates += 1
         every = torch.stack(found).view(self.n_epochs, -1, len(FIGURES))
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
@@ -144,22 +144,40 @@ class Learner(PPO):  # type: ignore[misc]
             self.logger.record(f"train/{name}", value)
         self.learning_rate = adapted(rate, self.kl, settings)
 
-    def _loss(self, batch: dict[str, Tensor], before: Tensor) -> tuple[Tensor, Tensor]:
-        """The loss of a minibatch, and `FIGURES`; `before`: log std before the update."""
-        policy, settings = self.policy, self.settings
+    def _gradient_step(self, batch: Tensor, before: Tensor) -> Tensor:
+        """One step of the optimiser on a minibatch of rows; returns `FIGURES`. `before`: log std before the update."""
+        policy, size = self.policy, len(batch)
+        parameters = [*policy.actor.parameters(), *policy.critic.parameters(), policy.log_stds]
+        advantage = self.rollout_buffer.named(batch)["advantage"]
+        advantage.sub_(advantage.mean()).div_(advantage.std() + 1e-8)
+
+        def gradient(part: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+            loss, figures = self._loss(self.rollout_buffer.named(part), before)
+            share = len(part) / size
+            return torch.autograd.grad(share * loss, parameters), share * figures
+
+        gradients, figures = zip(*self.side_by_side(gradient, batch), strict=True)
+        for parameter, *parts in zip(parameters, *gradients, strict=True):
+            parameter.grad = torch.stack(parts).sum(0) if len(parts) > 1 else parts[0]
+        torch.nn.utils.clip_grad_norm_(parameters, self.max_grad_norm)
+        policy.optimizer.step()
+        self._bound_deviation()
+        return torch.stack(figures).sum(0)
+
+    def _loss(self, samples: dict[str, Tensor], before: Tensor) -> tuple[Tensor, Tensor]:
+        """The loss of samples, and `FIGURES`; their advantages are normalised."""
+        policy, settings, advantage = self.policy, self.settings, samples["advantage"]
         with reduced(settings.precision):
-            acting, judging = policy.actor.hidden(batch["observation"]), policy.critic.hidden(batch["observation"])
+            acting, judging = policy.actor.hidden(samples["observation"]), policy.critic.hidden(samples["observation"])
         mean, value, log_std = policy.actor.head(acting), policy.critic.head(judging)[:, 0], policy.log_std
-        advantage = batch["advantage"]
-        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-        difference = log_density(batch["action"], mean, log_std) - batch["log_density"]
+        difference = log_density(samples["action"], mean, log_std) - samples["log_density"]
         ratio = torch.exp(difference)
         clipped = torch.clamp(ratio, 1.0 - settings.clip, 1.0 + settings.clip)
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
-        value_loss = torch.nn.functional.mse_loss(value, batch["target"])
+        value_loss = torch.nn.functional.mse_loss(value, samples["target"])
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
         with torch.no_grad():
-            kl = divergence(batch["mean"], before, mean, log_std).mean()
+            kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()
             share = ((ratio - 1.0).abs() > settings.clip).float().mean()
             figures = torch.stack([policy_loss, value_loss, kl, sampled, share])

@@ -1,7 +1,6 @@
-"""In which numbers and on how many cores the networks learn."""
+"""In which numbers the networks learn."""
 
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from typing import Literal
 
 import torch
@@ -20,13 +19,3 @@ def reduced(precision: Precision) -> AbstractContextManager[None]:
     wanted = precision == "bfloat16" or (precision == "auto" and has_bfloat16())
     context: AbstractContextManager[None] = torch.autocast("cpu", torch.bfloat16, enabled=wanted)
     return context
-
-
-@contextmanager
-def threads(count: int) -> Iterator[None]:
-    """Lets torch use `count` threads inside, and one again behind: the cores belong to the simulation then."""
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(1)

@@ -16,6 +16,7 @@ from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors, TeacherNetwork
 from iowbc.learning.ppo import make_learner
+from iowbc.processes import keep_freed_memory
 from iowbc.recipe.teacher import Teacher
 
 
@@ -27,6 +28,7 @@ class TeacherTraining:
     ) -> None:
         """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest."""
         torch.set_num_threads(1)
+        keep_freed_memory()
         self.settings = settings
         self.environments = environments
         self.model = make_learner(settings, environments, seed, mirrors, cores)

@@ -71,6 +71,9 @@ class Teacher(Section):
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """Numbers in which the hidden layers learn. `auto`: bfloat16 where the processor multiplies in it (avx512_bf16,
     amx), which is up to twice as fast; rollouts, values and the last layers are float32 in any case."""
+    parts: int = Field(default=2, ge=1)
+    """Parts of a minibatch that cores work on side by side while the environments rest; where there are fewer cores,
+    one after another, with the same result."""
     checkpoint_every: int = Field(default=20, ge=1, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
