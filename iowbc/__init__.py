@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from iowbc.control.sensors import Measured
     from iowbc.deploy.controller import Controller, Targets
     from iowbc.errors import IowbcError
-    from iowbc.pipeline.store.store import Artifact
+    from iowbc.pipeline.store.artifact import Artifact
     from iowbc.recipe.reading.loading import load_recipe
     from iowbc.recipe.recipe import Recipe
     from iowbc.task.vector.vector_env import VectorEnv
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "Artifact": "iowbc.pipeline.store.store",
+    "Artifact": "iowbc.pipeline.store.artifact",
     "Controller": "iowbc.deploy.controller",
     "IowbcError": "iowbc.errors",
     "Measured": "iowbc.control.sensors",

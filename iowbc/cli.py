@@ -93,6 +93,15 @@ def plan(
     print_plan(_request(recipe, overrides, until, force, None, on_code_change, runs), STAGES, _console())
 
 
+@app.command()
+def publish(recipe: RecipeFile, overrides: Overrides = None, until: Until = None, runs: RunsFolder = None) -> None:
+    """Put a recipe's finished artifacts into the repository (runs/published): a fresh clone starts from them."""
+    from iowbc.commands.publish import publish_recipe
+    from iowbc.stages.registry import STAGES
+
+    publish_recipe(_request(recipe, overrides, until, None, None, "report", runs), STAGES, _console())
+
+
 def _request(
     recipe: Path,
     overrides: list[str] | None,

@@ -10,7 +10,8 @@ from iowbc.commands.named import Named, named
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.planner import changed_code
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
 
 

@@ -73,14 +73,15 @@ def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
                 f"--recipe {recipe}: no such recipe has run; those that have: {listing}{nearest(recipe, recipes)}"
             )
     kept = {use["key"] for name in recipes if name not in scope.recipes for use in _uses(store, name)}
-    free = [a for a in store.artifacts() if a.manifest.key not in kept and not holder(runs, a.manifest.key)]
+    own = [artifact for artifact in store.artifacts() if not artifact.published]
+    free = [a for a in own if a.manifest.key not in kept and not holder(runs, a.manifest.key)]
     if scope.unused:
         remembered = {use["key"] for name in recipes for use in _uses(store, name)}
         yield from (artifact.folder for artifact in free if artifact.manifest.key not in remembered)
         yield from runs.store.glob(f"*/{REMOVING}*")
     for recipe in scope.recipes:
-        own = {artifact.manifest.key for artifact in last_used(store, recipe).values()}
-        yield from (artifact.folder for artifact in free if artifact.manifest.key in own)
+        keys = {artifact.manifest.key for artifact in last_used(store, recipe).values()}
+        yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)
         yield runs.recipes / f"{recipe}.json"
     if scope.work:
         yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iowbc.errors import Damaged, UsageError, nearest
+from iowbc.errors import UsageError, nearest
+from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.store import Store
 
 SHORTEST_PREFIX = 4
 """Characters of a key that are enough to name an artifact, where they are unique."""
@@ -62,10 +63,7 @@ def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     """By stage: the artifacts that a recipe used last, as far as they are still stored."""
     found = {}
     for stage, use in recall(store.runs, recipe).get("stages", {}).items():
-        try:
-            artifact = store.find(stage, use["key"])
-        except Damaged:
-            continue
+        artifact = store.find_any(stage, use["key"])
         if artifact is not None:
             found[stage] = artifact
     return found

@@ -43,6 +43,7 @@ def _row(step: Step) -> tuple[str | Text, ...]:
     """Stage, what is planned for it, why, and the time that it takes."""
     if step.cached:
         why = "\n".join(step.notes) or (step.key or "")[:KEY_LENGTH]
-        return step.stage.name, Text("cached", style="cyan"), Text(why), ""
+        published = step.artifact is not None and step.artifact.published
+        return step.stage.name, Text("cached (published)" if published else "cached", style="cyan"), Text(why), ""
     why = "\n".join((short(step.reasons, REASONS_SHOWN), *step.notes))
     return step.stage.name, Text("run", style="bold yellow"), Text(why), duration(step.expected)

@@ -8,9 +8,10 @@ from rich.console import Console
 from iowbc.commands.named import named
 from iowbc.commands.training import require_training
 from iowbc.errors import Damaged, Interrupted, UsageError
-from iowbc.evaluation.play_request import PlayRequest as PlayRequest
+from iowbc.evaluation.play_request import PlayRequest
+from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import remaking
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.store import Store
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
@@ -63,7 +64,7 @@ def playable(store: Store, word: str, stage: str | None) -> Artifact:
 def _check_whole(store: Store, artifact: Artifact) -> None:
     """Raises `UsageError` where a file of an artifact is not what was published."""
     try:
-        store.verify(artifact)
+        artifact.verify()
     except Damaged as error:
         raise UsageError(
             f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact)}"

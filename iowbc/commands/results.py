@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.pipeline.store.store import Artifact
+from iowbc.pipeline.store.artifact import Artifact
 
 SEEN_FOLDERS = ("figures", "videos")
 """Folders whose files are listed; tables are printed."""

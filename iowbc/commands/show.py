@@ -13,7 +13,8 @@ from iowbc.commands.tables import plain_table
 from iowbc.errors import shown
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
 from iowbc.pipeline.nested import flattened
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.store import Store
 from iowbc.recipe.recipe import Recipe
 
 

@@ -1,6 +1,6 @@
 """What would run, and why."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -8,12 +8,14 @@ from typing import Any, Literal
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, folder_digest
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.reading.loading import LoadedRecipe
 from iowbc.recipe.section import deciding
 
+NOT_WHOLE = "its published artifact leaves out large files"
 OnCodeChange = Literal["report", "rerun"]
 
 
@@ -94,14 +96,22 @@ class Planner:
             step = self.decide(stage, inputs)
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None) if unknown else step
+        for stage in reversed(self.stages):
+            for name in self.reads(stage):
+                made = steps[name].artifact
+                if not steps[stage.name].cached and steps[name].cached and made is not None and not made.whole:
+                    steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         return list(steps.values())
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
         """Names of the stages whose artifacts a stage reads."""
         return stage.reads(self.loaded.recipe)
 
-    def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> Step:
-        """What is to be done for a stage whose inputs are these; None is an input that would be made anew."""
+    def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> Step:
+        """What is to be done for a stage whose inputs are these; None is an input that would be made anew.
+
+        whole: a published artifact does not do that leaves out large files.
+        """
         code = stage_code(stage)
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {
@@ -117,24 +127,24 @@ class Planner:
             reasons = self._reasons(ingredients, former, unknown)
             return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
         key = data_digest(ingredients)
-        damage = ""
-        artifact: Artifact | None = None
-        try:
-            artifact = self.store.find(stage.name, key)
-            if artifact is not None:
-                self.store.verify(artifact)
-        except Damaged as error:
-            damage = str(error)
-            artifact = None
-        found: list[str] = []
+        artifact, damage = _checked(self.store.find, stage.name, key)
         notes: list[str] = []
+        if artifact is None:
+            artifact, published_damage = _checked(self.store.find_published, stage.name, key)
+            if published_damage:
+                notes.append(f"the published artifact is ignored, it is damaged: {published_damage}")
+        found: list[str] = []
         if stage.name in self.options.force:
             found.append("forced by --force")
-        if damage:
+        if artifact is None and damage:
             found.append(f"damaged: {damage}")
         elif artifact is None:
             found.extend(self._reasons(ingredients, former, ()))
+        elif whole and not artifact.whole:
+            found.append(NOT_WHOLE)
         else:
+            if damage:
+                notes.append(f"the published artifact is used; the one made here is damaged: {damage}")
             expected = artifact.manifest.seconds
             changed = changed_code(artifact.manifest.code, code)
             if changed:
@@ -193,6 +203,17 @@ class Planner:
             if digest is not None and old_inputs.get(name) != digest:
                 yield f"{name} changed" if name in old_inputs else f"{name} is read now"
         yield from (f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
+
+
+def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) -> tuple[Artifact | None, str]:
+    """The artifact that a store finds and whose files are what was written, or what is wrong with it."""
+    try:
+        artifact = find(stage, key)
+        if artifact is not None:
+            artifact.verify()
+    except Damaged as error:
+        return None, str(error)
+    return artifact, ""
 
 
 def _as_long(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:

@@ -11,9 +11,9 @@ from iowbc.pipeline.machine import host, versions
 from iowbc.pipeline.planner import Planner, Step, changed_code
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.store.artifact import Artifact, seal
 from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
-from iowbc.pipeline.store.store import Artifact
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
 from iowbc.processes import available_cores
@@ -39,29 +39,37 @@ class Runner:
         self.display = display
         self.tracker = tracker
         self.interrupted = interrupted
+        self.views = {stage.name: StageView(stage.name) for stage in planner.stages}
         self.artifacts: dict[str, Artifact] = {}
         self.made: list[str] = []
         """Stages that were not cached."""
 
     def run(self) -> dict[str, Artifact]:
         """Bring every stage's artifact about. Raises `PipelineFailed` or `Interrupted`."""
-        views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
-        self.display.begin(list(views.values()))
+        self.display.begin(list(self.views.values()))
         try:
             for stage in self.planner.stages:
                 if self.interrupted():
                     raise Interrupted
-                self.artifacts[stage.name] = self._artifact(stage, views[stage.name])
+                self.artifacts[stage.name] = self._artifact(stage)
                 remember(self.store.runs, self.loaded, stage.name, self.artifacts[stage.name].manifest.key)
         finally:
             self.display.end()
         return self.artifacts
 
-    def _artifact(self, stage: Stage, view: StageView) -> Artifact:
-        """The stage's artifact: the stored one where it can be used, else a new one."""
-        step = self._decide(stage)
+    def _artifact(self, stage: Stage, *, whole: bool = False) -> Artifact:
+        """The stage's artifact: the stored one where it can be used, else a new one.
+
+        whole: a published one does not do that leaves out large files.
+        """
+        view = self.views[stage.name]
+        step = self._decide(stage, whole)
         if step.cached and step.artifact is not None:
             return self._reused(step, step.artifact, view)
+        for read in self.planner.stages:
+            if read.name in self.planner.reads(stage) and not self.artifacts[read.name].whole:
+                self.artifacts[read.name] = self._artifact(read, whole=True)
+                step = self._decide(stage, whole)
         assert step.key is not None
 
         def waits(holder: object) -> None:
@@ -73,8 +81,8 @@ class Runner:
             if not held:
                 raise Interrupted
             workspace = Workspace(self.store.runs, stage.name, step.key)
-            self._finish_publishing(stage, step.key, workspace)
-            step = self._decide(stage)
+            self._finish_adding(stage, step.key, workspace)
+            step = self._decide(stage, whole)
             if step.cached and step.artifact is not None:
                 workspace.remove()
                 return self._reused(step, step.artifact, view)
@@ -84,21 +92,23 @@ class Runner:
                 self.display.say(f"{stage.name}: its artifact is damaged ({step.damage}); set aside in {aside}")
             return self._made(step, workspace, view)
 
-    def _decide(self, stage: Stage) -> Step:
-        return self.planner.decide(stage, {name: self.artifacts[name] for name in self.planner.reads(stage)})
+    def _decide(self, stage: Stage, whole: bool) -> Step:
+        inputs = {name: self.artifacts[name] for name in self.planner.reads(stage)}
+        return self.planner.decide(stage, inputs, whole=whole)
 
     def _reused(self, step: Step, artifact: Artifact, view: StageView) -> Artifact:
-        view.state, view.note = "cached", "; ".join(step.notes)
+        notes = ("published", *step.notes) if artifact.published else step.notes
+        view.state, view.note = "cached", "; ".join(notes)
         self.display.changed(view)
         if self.tracker is not None:
             self.tracker.finished(step.stage.name, artifact, cached=True)
         return artifact
 
-    def _finish_publishing(self, stage: Stage, key: str, workspace: Workspace) -> None:
-        """Publish output that was sealed when its process died on the threshold."""
+    def _finish_adding(self, stage: Stage, key: str, workspace: Workspace) -> None:
+        """Take output into the store that was sealed when its process died on the threshold."""
         try:
             if workspace.out.is_dir() and self.store.sealed(workspace.out, stage.name, key):
-                self.store.publish(workspace.out, stage.name, key)
+                self.store.add(workspace.out, stage.name, key)
                 workspace.remove()
         except Damaged:
             return
@@ -168,8 +178,8 @@ class Runner:
             "code": dict(step.code),
             "versions": versions(),
         }
-        self.store.seal(workspace.out, details, step.ingredients or {}, as_yaml(self.loaded.recipe))
-        artifact = self.store.publish(workspace.out, step.stage.name, step.key)
+        seal(workspace.out, step.stage.results, details, step.ingredients or {}, as_yaml(self.loaded.recipe))
+        artifact = self.store.add(workspace.out, step.stage.name, step.key)
         workspace.remove()
         return artifact
 

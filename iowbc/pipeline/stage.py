@@ -64,5 +64,8 @@ class Stage:
     reads: Callable[[Recipe], tuple[str, ...]]
     """Names of the stages whose artifacts this one reads, for a given recipe."""
     run: Callable[[Job], None]
+    results: tuple[str, ...] = ("*",)
+    """Patterns of the files that decide the stages which read this one, the same for the same key; all others are
+    records: curves, times, pictures, convenience."""
     packages: tuple[str, ...] = ()
     """Subpackages whose code digest is recorded with the artifact, e.g. ("reference", "robot")."""

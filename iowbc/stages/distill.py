@@ -49,5 +49,6 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), "teacher"),
     run=run,
+    results=("student.safetensors", "student.json"),
     packages=("stages.distill", "stages.training", "learning", *ENVIRONMENTS),
 )

@@ -95,5 +95,6 @@ STAGE = Stage(
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
+    results=("trials.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
 )

@@ -108,5 +108,6 @@ STAGE = Stage(
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
+    results=("policy.onnx", "contract.json", "golden.npz"),
     packages=("stages.export", "export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
 )

@@ -121,5 +121,6 @@ STAGE = Stage(
     ),
     reads=lambda recipe: (),
     run=run,
+    results=("dataset.npz", "feasible.npz"),
     packages=("reference", "control", "robot"),
 )

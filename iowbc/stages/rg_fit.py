@@ -88,5 +88,6 @@ STAGE = Stage(
     slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem", "rg.feasible"),
     reads=lambda recipe: ("rg-dataset",),
     run=run,
+    results=("rg.safetensors", "rg.json", "feasible.npz"),
     packages=("reference", "control", "robot"),
 )

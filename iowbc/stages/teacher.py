@@ -60,5 +60,6 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher"),
     reads=generator_stage,
     run=run,
+    results=("teacher.safetensors", "teacher.json"),
     packages=("stages.teacher", "stages.training", "learning", *ENVIRONMENTS),
 )

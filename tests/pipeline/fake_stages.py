@@ -56,7 +56,7 @@ def stage(name: str, reads: tuple[str, ...], slice: tuple[str, ...], version: in
     def known(recipe: Recipe) -> tuple[str, ...]:
         return tuple(read for read in reads if read in recipe.stages)
 
-    return Stage(name=name, version=version, slice=slice, reads=known, run=counting(name))
+    return Stage(name, version, slice, reads=known, run=counting(name), results=("result.json",))
 
 
 STAGES = {

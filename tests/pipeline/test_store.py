@@ -9,7 +9,8 @@ import pytest
 from workplace import Workplace
 
 from iowbc.errors import Damaged, Interrupted
-from iowbc.pipeline.store.store import MANIFEST, Store
+from iowbc.pipeline.store.artifact import MANIFEST
+from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 
 
@@ -44,7 +45,7 @@ def test_a_damaged_artifact_is_set_aside_and_made_anew(workplace: Workplace, dam
     assert workplace.ran() == ["teacher"]
     assert len(list(workplace.store.runs.damaged.iterdir())) == 1
     assert any("set aside" in line for line in workplace.display.lines)
-    workplace.store.verify(again)
+    again.verify()
     assert all(step.cached for step in workplace.plan().values())
 
 
@@ -60,6 +61,27 @@ def test_every_file_of_a_stage_is_in_the_manifest(workplace: Workplace) -> None:
     assert set(artifact.manifest.files) == {"figures/curve.png", "result.json", "summary.json", "tables/counts.md"}
     assert artifact.metrics == {"count": 3.0}
     assert artifact.ingredients["recipe"]["teacher"]["steps"] == 4096
+
+
+def test_records_decide_no_later_key(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Curves, times and pictures of a repeated stage may differ: what reads its results stays."""
+    before = workplace.run()["teacher"].manifest
+    workplace.ran()
+    monkeypatch.setenv("FAKE_BEHAVIOUR", json.dumps({"teacher": {"steps": 5}}))
+    after = workplace.run(force=frozenset({"teacher"}))["teacher"].manifest
+    assert workplace.ran() == ["teacher"]
+    assert after.files["summary.json"] != before.files["summary.json"]
+    assert after.digest == before.digest
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "key.json", "recipe.yaml"])
+def test_a_changed_number_in_what_stands_beside_the_results_is_damage(workplace: Workplace, name: str) -> None:
+    folder = workplace.run()["teacher"].folder
+    text = (folder / name).read_text()
+    assert "4096" in text or name == "manifest.json"
+    (folder / name).write_text(text.replace("4096", "4097").replace('"attempts": 1', '"attempts": 2'))
+    (reason,) = workplace.plan()["teacher"].reasons
+    assert reason.startswith(f"damaged: {name} ")
 
 
 def test_nothing_is_left_of_a_finished_stages_workspace(workplace: Workplace) -> None:
@@ -86,7 +108,7 @@ def test_a_death_between_sealing_and_publishing_loses_nothing(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(Store, "publish", die)
+        patch.setattr(Store, "add", die)
         with pytest.raises(Interrupted):
             workplace.run(until="rg-dataset")
     assert workplace.store.artifacts() == []

@@ -18,8 +18,9 @@ from iowbc.pipeline.console.display import StageView
 from iowbc.pipeline.planner import Options, Planner, Step
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.runs import Runs, read_json
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
 
 COMMAND = Path(fake_stages.__file__)

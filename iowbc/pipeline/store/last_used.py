@@ -8,8 +8,8 @@ from typing import Any
 
 from iowbc.errors import UsageError
 from iowbc.files import write_whole
+from iowbc.pipeline.store.artifact import RECIPE, Artifact
 from iowbc.pipeline.store.runs import Runs, read_json
-from iowbc.pipeline.store.store import RECIPE, Artifact
 from iowbc.recipe.reading.loading import LoadedRecipe
 
 

@@ -18,6 +18,11 @@ class Runs:
         return self.root / "store"
 
     @property
+    def published(self) -> Path:
+        """Artifacts that came with the repository, `<stage>/<key>/`; only `iowbc publish` writes there."""
+        return self.root / "published"
+
+    @property
     def work(self) -> Path:
         """Scratch and checkpoints of stages that are not finished, `<key>/`."""
         return self.root / "work"

@@ -14,9 +14,9 @@ from typing import Any
 
 from iowbc.pipeline.machine import boot, host
 from iowbc.pipeline.nested import flattened
+from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
 from iowbc.processes import SINGLE_THREADED
 from iowbc.recipe.execution import Execution

@@ -1,0 +1,203 @@
+"""A finished stage's folder: its manifest, how it is sealed, and how damage is noticed."""
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from iowbc.errors import Damaged
+from iowbc.files import synchronise, write_whole
+from iowbc.pipeline.stage import SUMMARY
+from iowbc.pipeline.store.digests import content_digest, data_digest, file_digest
+from iowbc.pipeline.store.runs import read_json
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MANIFEST = "manifest.json"
+INGREDIENTS = "key.json"
+RECIPE = "recipe.yaml"
+BESIDE = (INGREDIENTS, RECIPE)
+"""What is written beside a stage's own files."""
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class FileRecord(BaseModel):
+    """A file of an artifact."""
+
+    model_config = ConfigDict(frozen=True)
+
+    sha256: str
+    size: int
+
+
+class Manifest(BaseModel):
+    """What an artifact is, written last."""
+
+    model_config = ConfigDict(frozen=True)
+
+    stage: str
+    version: int
+    key: str
+    digest: str
+    """Digest of the names and contents of the results; the keys of the stages that read it hold it."""
+    files: dict[str, FileRecord]
+    """All files of the stage."""
+    results: tuple[str, ...]
+    """Those among them that decide later stages; the others are records: curves, times, pictures."""
+    omitted: tuple[str, ...] = ()
+    """Those among them that a published copy leaves out, for their size or kind."""
+    beside: dict[str, FileRecord]
+    """What the key was computed from, and the recipe."""
+    recipe: str
+    """Name of the recipe that made it."""
+    made: float
+    """When it was finished [s since 1970]."""
+    seconds: float
+    """Time that the stage took, over all attempts [s]."""
+    attempts: int
+    workers: int
+    host: str
+    code: dict[str, str]
+    """Digests of the code that made it, by subpackage."""
+    versions: dict[str, str]
+    seal: str = ""
+    """Digest of all of the above."""
+
+    def sealed(self) -> "Manifest":
+        """The manifest with its seal."""
+        return self.model_copy(update={"seal": data_digest(self.model_dump(mode="json", exclude={"seal"}))})
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A finished stage's folder and its manifest."""
+
+    folder: Path
+    manifest: Manifest
+    published: bool = False
+    """Whether it came with the repository, and is only read."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether all that the stage left is there: of a published one, what is large may be missing."""
+        return not self.manifest.omitted
+
+    @property
+    def ingredients(self) -> dict[str, Any]:
+        """What its key was computed from."""
+        found = read_json(self.folder / INGREDIENTS)
+        return found if isinstance(found, dict) else {}
+
+    @property
+    def recipe(self) -> dict[str, Any]:
+        """The resolved recipe that it was made with; empty where that is not readable."""
+        try:
+            found = yaml.load((self.folder / RECIPE).read_bytes(), Loader=_LOADER)
+        except (OSError, yaml.YAMLError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    @property
+    def size(self) -> int:
+        """Bytes of the stage's files."""
+        return sum(record.size for name, record in self.manifest.files.items() if name not in self.manifest.omitted)
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """The metrics that the stage left in its summary."""
+        summary = read_json(self.folder / SUMMARY)
+        metrics = summary.get("metrics") if isinstance(summary, dict) else None
+        if not isinstance(metrics, dict):
+            return {}
+        return {str(name): float(value) for name, value in metrics.items() if isinstance(value, (int, float))}
+
+    def table(self, name: str) -> "pd.DataFrame":
+        """A table of the artifact as a pandas frame: `trials` for `trials.parquet`, `summary` for `tables/summary.csv`.
+
+        Raises `KeyError` with the names that there are.
+        """
+        import pandas as pd
+
+        paths = [*self.folder.glob("*.parquet"), *(self.folder / "tables").glob("*.csv")]
+        found = {path.stem: path for path in sorted(paths)}
+        if name not in found:
+            raise KeyError(f"{self.folder} has no table '{name}'; it has: {', '.join(found) or 'none'}")
+        return pd.read_parquet(found[name]) if found[name].suffix == ".parquet" else pd.read_csv(found[name])
+
+    def verify(self) -> None:
+        """Compare everything with its digest. Raises `Damaged`."""
+        manifest = self.manifest
+        for name, record in (manifest.files | manifest.beside).items():
+            if name not in manifest.omitted:
+                _verify(self.folder / name, name, record)
+        if data_digest(self.ingredients) != manifest.key:
+            raise Damaged(f"{INGREDIENTS} does not give the key")
+
+
+def seal(
+    out: Path, results: Sequence[str], details: Mapping[str, Any], ingredients: Mapping[str, Any], recipe: str
+) -> None:
+    """Turn a stage's output into an artifact: records beside it, everything on disk, the manifest last.
+
+    results: patterns of the files that decide later stages. details: the fields of `Manifest` that do not follow from
+    the files.
+    """
+    files = {
+        path.relative_to(out).as_posix(): _record(path)
+        for path in sorted(out.rglob("*"))
+        if path.is_file() and path.relative_to(out).as_posix() not in (MANIFEST, *BESIDE)
+    }
+    deciding = tuple(name for name in files if any(fnmatchcase(name, pattern) for pattern in results))
+    write_whole(out / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
+    write_whole(out / RECIPE, recipe)
+    for name in files:
+        synchronise(out / name)
+    manifest = Manifest(
+        **details,
+        digest=content_digest({name: files[name].sha256 for name in deciding}),
+        files=files,
+        results=deciding,
+        beside={name: _record(out / name) for name in BESIDE},
+        made=time.time(),
+    )
+    write_manifest(out, manifest)
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write a manifest, sealed, as the last of a folder's files."""
+    write_whole(folder / MANIFEST, manifest.sealed().model_dump_json(indent=1))
+
+
+def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False) -> Artifact:
+    """The artifact in a folder. Raises `Damaged` where its manifest is not what was written."""
+    try:
+        manifest = Manifest.model_validate_json((folder / MANIFEST).read_bytes())
+    except OSError:
+        raise Damaged(f"{MANIFEST} is missing") from None
+    except ValidationError:
+        raise Damaged(f"{MANIFEST} is not readable") from None
+    if (manifest.stage, manifest.key) != (stage, key):
+        raise Damaged(f"{MANIFEST} belongs to {manifest.stage} {manifest.key}")
+    if manifest.sealed().seal != manifest.seal:
+        raise Damaged(f"{MANIFEST} differs from its seal")
+    return Artifact(folder, manifest, published)
+
+
+def _record(path: Path) -> FileRecord:
+    return FileRecord(sha256=file_digest(path), size=path.stat().st_size)
+
+
+def _verify(path: Path, name: str, record: FileRecord) -> None:
+    if not path.is_file():
+        raise Damaged(f"{name} is missing")
+    if path.stat().st_size != record.size:
+        raise Damaged(f"{name} has {path.stat().st_size} bytes instead of {record.size}")
+    if file_digest(path) != record.sha256:
+        raise Damaged(f"{name} differs from its digest")

@@ -1,0 +1,58 @@
+"""Artifacts that go into the repository: `runs/published/`, a copy of what the store has, of safe and small files."""
+
+import os
+import shutil
+from pathlib import Path
+
+from iowbc.errors import UsageError
+from iowbc.files import synchronise
+from iowbc.pipeline.store.artifact import BESIDE, MANIFEST, Artifact, read_artifact, write_manifest
+from iowbc.pipeline.store.runs import Runs
+
+KINDS = frozenset(
+    [".safetensors", ".json", ".npz", ".parquet", ".onnx", ".csv", ".md", ".tex", ".png", ".xml", ".yaml"]
+)
+"""Endings of files that are published: reading them executes no code."""
+LARGEST_FILE = 8_000_000
+"""A larger file is left out [bytes]: the stages behind it need its digest alone."""
+LARGEST_REPOSITORY = 60_000_000
+"""All that may be published [bytes]: a clone must stay quick."""
+
+
+def publish(runs: Runs, artifact: Artifact) -> Artifact:
+    """Copy an artifact to `runs/published/` and verify the copy.
+
+    Files of other kinds, and large ones, are left out and named in the copy's manifest.
+    """
+    made = artifact.manifest
+    target = runs.published / made.stage / made.key
+    unfinished = target.with_name(f".{made.key}.{os.getpid()}")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    omitted = tuple(
+        name
+        for name, record in made.files.items()
+        if name in made.omitted or record.size > LARGEST_FILE or Path(name).suffix not in KINDS
+    )
+    for name in (*made.files, *BESIDE):
+        if name not in omitted:
+            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(artifact.folder / name, unfinished / name)
+            synchronise(unfinished / name)
+    write_manifest(unfinished, made.model_copy(update={"omitted": omitted}))
+    if target.is_dir():
+        shutil.rmtree(target)
+    unfinished.rename(target)
+    copy = read_artifact(target, made.stage, made.key, published=True)
+    copy.verify()
+    return copy
+
+
+def published_size(runs: Runs) -> int:
+    """Bytes of all that is published. Raises `UsageError` where that is more than a repository should carry."""
+    size = sum(path.stat().st_size for path in runs.published.rglob("*") if path.is_file())
+    if size > LARGEST_REPOSITORY:
+        raise UsageError(
+            f"{runs.published} has {size / 1e6:.0f} MB, more than the {LARGEST_REPOSITORY / 1e6:.0f} MB that a "
+            f"repository should carry; remove what is out of date ({MANIFEST} in each folder says what it is)"
+        )
+    return size

@@ -1,0 +1,91 @@
+"""What was published with the repository is used like what was made here, and never changed."""
+
+import shutil
+
+import pytest
+from workplace import Workplace
+
+from iowbc.errors import UsageError
+from iowbc.pipeline.store import publishing
+
+
+@pytest.fixture
+def cloned(workplace: Workplace) -> Workplace:
+    """All stages are published, and nothing was made here."""
+    for artifact in workplace.run().values():
+        publishing.publish(workplace.store.runs, artifact)
+    shutil.rmtree(workplace.store.runs.store)
+    workplace.ran()
+    return workplace
+
+
+def test_a_fresh_clone_uses_what_is_published(cloned: Workplace) -> None:
+    assert all(step.cached and step.artifact and step.artifact.published for step in cloned.plan().values())
+    assert cloned.run()["eval"].metrics == {"count": 3.0}
+    assert cloned.ran() == []
+    assert "teacher: cached - published" in cloned.command("run", "small.yaml").output
+    assert cloned.command("plan", "small.yaml").output.count("cached (published)") == 6
+
+
+def test_a_change_leaves_it_behind_as_any_cached_artifact(cloned: Workplace) -> None:
+    assert cloned.plan("eval.trials=9")["eval"].reasons == ("eval.trials (--set eval.trials=9): 5 -> 9",)
+    cloned.run("eval.trials=9")
+    assert cloned.ran() == ["eval"]
+    cloned.run(force=frozenset({"teacher"}))
+    assert cloned.ran() == ["teacher"]
+    step = cloned.plan()["teacher"]
+    assert step.cached
+    assert step.artifact is not None
+    assert not step.artifact.published
+
+
+def test_a_damaged_one_is_named_ignored_and_left_alone(cloned: Workplace) -> None:
+    (folder,) = (cloned.store.runs.published / "teacher").iterdir()
+    (folder / "result.json").write_text("{}")
+    step = cloned.plan()["teacher"]
+    assert not step.cached
+    assert step.notes == ("the published artifact is ignored, it is damaged: result.json has 2 bytes instead of 28",)
+    cloned.run()
+    assert cloned.ran() == ["teacher"]
+    assert (folder / "result.json").read_text() == "{}"
+    assert cloned.plan()["teacher"].cached
+
+
+def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
+    workplace: Workplace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = workplace.run()
+    monkeypatch.setattr(publishing, "LARGEST_FILE", 27)
+    copy = publishing.publish(workplace.store.runs, made["rg-dataset"])
+    assert "result.json" in copy.manifest.omitted
+    monkeypatch.undo()
+    for name in ("rg-fit", "teacher", "distill", "eval", "export"):
+        publishing.publish(workplace.store.runs, made[name])
+    shutil.rmtree(workplace.store.runs.store)
+    workplace.ran()
+    assert all(step.cached for step in workplace.plan().values())
+    steps = workplace.plan("rg.fit.epochs=7")
+    assert steps["rg-dataset"].reasons == ("its published artifact leaves out large files; rg-fit reads it",)
+    workplace.run("teacher.gamma=0.9")
+    assert workplace.ran() == ["teacher"]
+    workplace.run(force=frozenset({"rg-fit"}))
+    assert workplace.ran() == ["rg-dataset", "rg-fit"]
+
+
+def test_publishing_copies_verifies_and_refuses_what_has_not_run(workplace: Workplace) -> None:
+    refused = workplace.command("publish", "small.yaml")
+    assert refused.code == 2
+    assert "rg-dataset, rg-fit, teacher, distill, eval, export: not finished" in refused.errors
+    workplace.run(until="teacher")
+    done = workplace.command("publish", "small.yaml", "--until", "teacher")
+    assert done.code == 0, done.errors
+    assert "teacher: runs/published/teacher/" in done.output
+    shutil.rmtree(workplace.store.runs.store)
+    assert "cached (published)" in workplace.command("plan", "small.yaml", "--until", "teacher").output
+
+
+def test_a_repository_that_grows_too_large_is_refused(cloned: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert publishing.published_size(cloned.store.runs) > 1000
+    monkeypatch.setattr(publishing, "LARGEST_REPOSITORY", 1000)
+    with pytest.raises(UsageError, match="more than the 0 MB"):
+        publishing.published_size(cloned.store.runs)
