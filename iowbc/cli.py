@@ -28,7 +28,7 @@ app.add_typer(bench, name="bench")
 
 PIPE_WIDTH = 160
 """Characters in a line of a table where the output is not a terminal."""
-RecipeFile = Annotated[Path, typer.Argument(help="Recipe, a YAML file or the name of one.", metavar="RECIPE")]
+RecipeFile = Annotated[str, typer.Argument(help="Recipe, a YAML file or the name of one.", metavar="RECIPE")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", help="Change a value of the recipe; repeat for more.", metavar="A.B.C=VALUE"),
@@ -103,7 +103,7 @@ def publish(recipe: RecipeFile, overrides: Overrides = None, until: Until = None
 
 
 def _request(
-    recipe: Path,
+    recipe: str,
     overrides: list[str] | None,
     until: str | None,
     force: list[str] | None,

@@ -1,12 +1,12 @@
 """`iowbc plan`: what would run, why, and how long that takes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.request import Request, prepared
+from iowbc.commands.request import Request, prepared, recipes
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Step
 from iowbc.pipeline.stage import Stage
@@ -16,9 +16,17 @@ REASONS_SHOWN = 8
 
 
 def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> None:
-    """Print what would run, and why."""
-    planner, _ = prepared(request, registry)
-    steps = planner.plan()
+    """Print what would run, and why; of a recipe of recipes for each of them."""
+    loaded = recipes(request)
+    planners = [prepared(one, request, registry)[0] for one in loaded]
+    for one, planner in zip(loaded, planners, strict=True):
+        if len(loaded) > 1:
+            console.print(f"{one.recipe.name}:", highlight=False)
+        _print(planner.plan(), console)
+
+
+def _print(steps: Sequence[Step], console: Console) -> None:
+    """A row for each stage, and the time in all."""
     table = Table(box=None, padding=(0, 1))
     for name in ("stage", "plan", "why", "takes about"):
         table.add_column(name, no_wrap=name != "why")

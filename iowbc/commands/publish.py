@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from rich.console import Console
 
-from iowbc.commands.request import Request, prepared
+from iowbc.commands.request import Request, prepared, recipes
 from iowbc.commands.results import shown_path
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
@@ -18,12 +18,12 @@ def publish_recipe(request: Request, registry: Mapping[str, Stage], console: Con
 
     Code that changed since an artifact was made is no obstacle, and is said.
     """
-    planner, _ = prepared(request, registry)
-    steps = planner.plan()
+    steps = [step for loaded in recipes(request) for step in prepared(loaded, request, registry)[0].plan()]
     missing = [step.stage.name for step in steps if not step.cached]
     if missing:
         raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command([])}")
     require_writable_runs(request.runs)
+    steps = list({step.key: step for step in steps}.values())
     for step in steps:
         assert step.artifact is not None
         copy = step.artifact if step.artifact.published else publish(request.runs, step.artifact)

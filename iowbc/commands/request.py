@@ -11,21 +11,23 @@ from iowbc.pipeline.planner import Options, Planner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.reading.study import load_study
 
 
 @dataclass(frozen=True)
 class Request:
     """What `iowbc run` was asked for."""
 
-    file: Path
+    word: str
+    """The recipe as it was named."""
     overrides: Sequence[str]
     runs: Runs
     options: Options
 
     def command(self, forced: Sequence[str]) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
-        words = ["iowbc", "run", str(self.file)]
+        words = ["iowbc", "run", self.word]
         for override in self.overrides:
             words += ["--set", override]
         if self.options.until:
@@ -41,9 +43,21 @@ class Request:
         return shlex.join(words)
 
 
-def prepared(request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
-    """The planner of a request and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
-    loaded = load_recipe(request.file, request.overrides)
+def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
+    """The recipe of a request, or, of a recipe of recipes, all that it names. Raises `RecipeError`."""
+    study = load_study(request.word, request.overrides)
+    if study is None:
+        return (load_recipe(request.word, request.overrides),)
+    if request.options.force:
+        text = "names a stage of each variant, which they may share; force it in one of them: " + ", ".join(
+            str(variant.file) for variant in study.variants
+        )
+        raise RecipeError([Problem(f"--force {min(request.options.force)}", text)])
+    return study.variants
+
+
+def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
+    """The planner of a recipe and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
 
     from iowbc.robot.description import robot_folder
 

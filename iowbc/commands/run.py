@@ -1,18 +1,22 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.request import Request, prepared
+from iowbc.commands.compare import compare
+from iowbc.commands.request import Request, prepared, recipes
 from iowbc.commands.results import print_results
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, PipelineFailed
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
+from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
+from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import LoadedRecipe
@@ -22,10 +26,28 @@ DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 
 
 def run(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
-    """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`."""
-    planner, robot = prepared(request, registry)
+    """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
+
+    Of a recipe of recipes each is run, in order, up to the first that does not end; then they are compared.
+    """
+    loaded = recipes(request)
+    ready = [prepared(one, request, registry) for one in loaded]
     require_training("run")
     require_writable_runs(request.runs)
+    for planner, robot in ready:
+        if len(ready) > 1:
+            console.print(f"{planner.loaded.recipe.name}:", highlight=False)
+        code = _run(planner, robot, request, console)
+        if code != DONE:
+            return code
+    if len(ready) > 1 and request.options.until is None:
+        output = request.runs.root / "compare" / Path(request.word).stem
+        compare(Store(request.runs), console, [one.recipe.name for one in loaded], output)
+    return DONE
+
+
+def _run(planner: Planner, robot: Path, request: Request, console: Console) -> int:
+    """Run one recipe; returns the exit code."""
     loaded = planner.loaded
     tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
     runner: Runner | None = None

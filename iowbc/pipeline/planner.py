@@ -86,7 +86,11 @@ class Planner:
         if late:
             text = f"{', '.join(late)} comes after {self.options.until}, where --until ends the run; leave one out"
             raise RecipeError([Problem(f"--force {late[0]}", text)])
-        return stages[: last + 1]
+        chosen = stages[: last + 1]
+        problems = [(path, text) for stage in chosen for path, text in stage.problems(self.loaded.recipe)]
+        if problems:
+            raise RecipeError([Problem(self.loaded.place(path), f"key '{path}': {text}") for path, text in problems])
+        return chosen
 
     def plan(self) -> list[Step]:
         """A step for each stage, as things stand; nothing is changed."""

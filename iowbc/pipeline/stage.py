@@ -1,7 +1,7 @@
 """What a stage declares and what it receives."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -52,6 +52,10 @@ class Job:
         (self.out / SUMMARY).write_text(text, encoding="utf-8")
 
 
+def _none(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    return iter(())
+
+
 @dataclass(frozen=True)
 class Stage:
     """A step of the pipeline: what makes its key, and the function that does the work."""
@@ -67,5 +71,7 @@ class Stage:
     results: tuple[str, ...] = ("*",)
     """Patterns of the files that decide the stages which read this one, the same for the same key; all others are
     records: curves, times, pictures, convenience."""
+    problems: Callable[[Recipe], Iterator[tuple[str, str]]] = _none
+    """What a recipe asks that this stage cannot do, known before it runs: dotted paths, and what is wrong there."""
     packages: tuple[str, ...] = ()
     """Subpackages whose code digest is recorded with the artifact, e.g. ("reference", "robot")."""

@@ -19,10 +19,14 @@ PIPELINE: tuple[StageName, ...] = get_args(StageName)
 """All stages, in the order in which they run."""
 
 
+NAME = "[a-z0-9][a-z0-9_-]*"
+"""What the name of an experiment looks like; it names files."""
+
+
 class Recipe(Section):
     """One experiment."""
 
-    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")
+    name: str = Field(pattern=f"^{NAME}$")
     """Name of the experiment: lower-case letters, digits, `-` and `_`."""
     description: str = ""
     """What the experiment is for, in a sentence."""

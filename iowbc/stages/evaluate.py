@@ -1,12 +1,13 @@
 """Stage `eval`: mass sweeps and heavy cases with the trained policy, their tables, figures and films."""
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,6 +18,13 @@ def acting_stage(recipe: Recipe) -> str:
     return policy_stage(recipe) if recipe.eval.policy == "student" else "teacher"
 
 
+def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    """A student that no stage leaves."""
+    if recipe.eval.policy == "student" and not leaves_student(recipe):
+        text = "asks for the student, and no stage of the recipe trains one: add `distill` to its stages, or evaluate "
+        yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
+
+
 def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, tables, figures, films and a summary."""
     import torch
@@ -25,17 +33,12 @@ def run(job: Job) -> None:
     from iowbc.evaluation.films import film_trial, filmed
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-    from iowbc.learning.acting import TeacherPolicy, load_policy
+    from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe = job.recipe
     policy = load_policy(job.inputs[acting_stage(recipe)])
-    if recipe.eval.policy == "student" and isinstance(policy, TeacherPolicy):
-        raise StageFailed(
-            "eval.policy asks for the student, and the recipe trains none: add `distill` to its stages, "
-            "or evaluate the teacher with --set eval.policy=teacher"
-        )
     world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
     protocol = Protocol(
         world,
@@ -95,6 +98,7 @@ STAGE = Stage(
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
+    problems=problems,
     results=("trials.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
 )

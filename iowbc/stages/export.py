@@ -1,8 +1,18 @@
 """Stage `export`: one ONNX graph with everything baked in, its contract and golden vectors, checked and tried out."""
 
+from collections.abc import Iterator
+
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, policy_stage
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
+
+
+def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    """A policy that needs what no robot measures."""
+    if not leaves_student(recipe):
+        text = "names export, and no stage of the recipe trains a student: a policy that needs privileged observations "
+        yield "stages", f"{text}cannot run on a robot; add `distill` to its stages, or leave `export` out"
 
 
 def run(job: Job) -> None:
@@ -108,6 +118,7 @@ STAGE = Stage(
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
+    problems=problems,
     results=("policy.onnx", "contract.json", "golden.npz"),
     packages=("stages.export", "export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
 )

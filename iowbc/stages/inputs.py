@@ -15,6 +15,11 @@ def generator_stage(recipe: Recipe) -> tuple[str, ...]:
     return ("rg-fit",) if recipe.task.references.use_rg or "rg-fit" in recipe.stages else ()
 
 
+def leaves_student(recipe: Recipe) -> bool:
+    """Whether a recipe trains a policy that needs no privileged observation."""
+    return "distill" in recipe.stages
+
+
 def policy_stage(recipe: Recipe) -> str:
     """The stage that leaves the policy that is deployed: the last one that trains."""
     return "distill" if "distill" in recipe.stages else "teacher"

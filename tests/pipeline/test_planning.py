@@ -133,6 +133,16 @@ def test_a_stage_whose_input_the_recipe_leaves_out_is_named_with_its_line(workpl
         workplace.plan()
 
 
+def test_what_a_stage_cannot_do_is_named_with_its_line_before_anything_runs(workplace: Workplace) -> None:
+    asks = dataclasses.replace(
+        workplace.registry["eval"], problems=lambda recipe: iter([("teacher.steps", "too few to evaluate")])
+    )
+    workplace.registry["eval"] = asks
+    with pytest.raises(RecipeError, match=r"small\.yaml:3:3: key 'teacher.steps': too few to evaluate"):
+        workplace.plan()
+    assert len(workplace.plan(until="teacher")) == 3
+
+
 def test_it_is_compared_with_the_artifact_that_differs_least(workplace: Workplace) -> None:
     workplace.run("name=near", "teacher.gamma=0.9", "teacher.steps=8192")
     workplace.run()

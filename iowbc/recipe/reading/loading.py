@@ -56,7 +56,7 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
     """The tree of a file laid upon that of the recipe it extends."""
     if os.path.realpath(file) in map(os.path.realpath, above):
         raise RecipeError([Problem(place, f"recipes extend each other in a circle: {' -> '.join((*above, file))}")])
-    tree = read_document(_text(file, place), file)
+    tree = read_document(read_text(file, place), file)
     if tree.value is None:
         text = "is empty; write at least one line, for example `description: what this tries` or `extends: full.yaml`"
         raise RecipeError([Problem(tree.place, text)])
@@ -79,7 +79,8 @@ def _mapping(tree: Located) -> dict[str, Located]:
     return tree.value if isinstance(tree.value, dict) else {}
 
 
-def _text(file: str, place: str) -> str:
+def read_text(file: str, place: str) -> str:
+    """The text of a recipe file. Raises `RecipeError` where it cannot be read."""
     try:
         return Path(file).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:

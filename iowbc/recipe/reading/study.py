@@ -1,0 +1,70 @@
+"""A recipe of recipes: a file that names variants, which run one after another and are then compared."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from iowbc.errors import Problem, RecipeError
+from iowbc.recipe.reading.document import Located, read_document
+from iowbc.recipe.reading.finding import recipe_file
+from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
+from iowbc.recipe.recipe import NAME
+
+KEYS = ("name", "description", "variants")
+"""All that such a file holds; everything else belongs to the variants."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Recipes that belong together."""
+
+    name: str
+    file: Path
+    variants: tuple[LoadedRecipe, ...]
+
+
+def load_study(word: str | Path, overrides: Sequence[str] = ()) -> Study | None:
+    """The recipes that a file names, each with the overrides; None for a recipe proper. Raises `RecipeError`.
+
+    A variant is named as on the command line, or relative to the file.
+    """
+    file = recipe_file(word)
+    tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))
+    if not isinstance(tree.value, dict) or "variants" not in tree.value:
+        return None
+    entries = tree.value
+    problems = [
+        Problem(entry.place, f"key '{key}': a recipe that names variants holds {', '.join(KEYS)} alone")
+        for key, entry in entries.items()
+        if key not in KEYS
+    ]
+    name = entries["name"].value if "name" in entries else file.stem.lower()
+    if not isinstance(name, str) or not re.fullmatch(NAME, name):
+        problems.append(Problem(entries["name"].place, "key 'name': lower-case letters, digits, `-` and `_`"))
+    found = _files(entries["variants"], file, problems)
+    if problems:
+        raise RecipeError(problems)
+    variants = tuple(load_recipe(variant, overrides) for variant in found)
+    names = [variant.recipe.name for variant in variants]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        text = f"key 'variants': {', '.join(repeated)} is the name of more than one; give each its own"
+        raise RecipeError([Problem(entries["variants"].place, text)])
+    return Study(str(name), file, variants)
+
+
+def _files(variants: Located, file: Path, problems: list[Problem]) -> list[Path]:
+    """The file of each variant."""
+    items = variants.value if isinstance(variants.value, list) else []
+    if len(items) < 2:
+        problems.append(Problem(variants.place, "key 'variants': should be a list of two or more recipes"))
+    found = []
+    for item in items:
+        if not isinstance(item.value, str) or not item.value:
+            problems.append(Problem(item.place, f"key 'variants': {item.value!r} is no recipe's name or file"))
+            continue
+        word = item.value if Path(item.value).suffix else f"{item.value}.yaml"
+        beside = file.parent / word
+        found.append(beside if beside.is_file() else recipe_file(item.value))
+    return found

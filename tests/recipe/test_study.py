@@ -1,0 +1,49 @@
+"""A recipe of recipes names its variants, and says what is wrong with it where it stands."""
+
+from pathlib import Path
+
+import pytest
+
+from iowbc.errors import RecipeError
+from iowbc.recipe.reading.study import load_study
+
+
+def write(folder: Path, text: str, name: str = "paper.yaml") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refused(folder: Path, text: str) -> str:
+    with pytest.raises(RecipeError) as caught:
+        load_study(write(folder, text))
+    return str(caught.value)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write(tmp_path, "seed: 3\n", "full.yaml")
+    write(tmp_path, "extends: full.yaml\ntask: {references: {use_rg: false}}\n", "wo_rg.yaml")
+    return tmp_path
+
+
+def test_variants_lie_beside_the_file_and_take_the_overrides(folder: Path) -> None:
+    study = load_study(write(folder, "description: both\nvariants: [full, wo_rg.yaml]\n"), ["eval.trials=2"])
+    assert study is not None
+    assert study.name == "paper"
+    assert [variant.recipe.name for variant in study.variants] == ["full", "wo_rg"]
+    assert {variant.recipe.eval.trials for variant in study.variants} == {2}
+
+
+def test_a_recipe_proper_is_none(folder: Path) -> None:
+    assert load_study(folder / "full.yaml") is None
+
+
+def test_what_is_wrong_is_named_with_its_place(folder: Path) -> None:
+    assert "paper.yaml:1:1: key 'seed': a recipe that names variants holds" in refused(
+        folder, "seed: 1\nvariants: [full, wo_rg]\n"
+    )
+    assert "should be a list of two or more recipes" in refused(folder, "variants: [full]\n")
+    assert "paper.yaml:1:12: key 'variants': 3 is no recipe's name" in refused(folder, "variants: [3, full]\n")
+    assert "full is the name of more than one" in refused(folder, "variants: [full, full]\n")
+    assert "recipe nothing: no such file" in refused(folder, "variants: [full, nothing]\n")
