@@ -8,7 +8,7 @@ from rich.console import Console
 from iowbc.commands.named import named
 from iowbc.commands.training import require_training
 from iowbc.errors import Damaged, Interrupted, UsageError
-from iowbc.evaluation.play_request import PlayRequest
+from iowbc.evaluation.play_request import PlayRequest as PlayRequest
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import remaking
 from iowbc.pipeline.store.store import Store
