@@ -4,6 +4,7 @@ To add a part, write a function that computes it from `Sensed` and a line of the
 arrays in simulation and torch tensors while the graph is exported, so it uses operators alone.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,7 @@ from iowbc.control.gait import phase_mirror
 from iowbc.control.layout import Layout, Part
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
-from iowbc.robot.mirror import axial_vector, interaction_mirror, joint_mirror, polar_vector, support_mirror
+from iowbc.robot.mirror import axial_vector, interaction_mirror, joint_mirror, polar_vector, support_mirror, turn
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class Sensed:
     measured: Measured
     command: Array
     """C, (n, 11), as commanded at this step."""
+    heading_reference: Array
+    """Measured heading at the start plus the integrated commanded yaw rate, (n, 1) [rad]."""
     joint_reference: Array
     """θ_ref of all joints in MJCF order, without the residual, (n, joints) [rad]."""
     phase: Array
@@ -45,6 +48,12 @@ def joint_deviation(sensed: Sensed) -> Array:
     return sensed.measured.joint_position - sensed.joint_reference
 
 
+def heading_error(sensed: Sensed) -> Array:
+    """How far the base has turned beyond its command, in [-π, π), (n, 1) [rad]; the yaw among the paper's Φ_b."""
+    error: Array = (sensed.measured.heading - sensed.heading_reference + math.pi) % (2.0 * math.pi) - math.pi
+    return error
+
+
 def object_orientation(sensed: Sensed) -> Array:
     """Vector part of the object's quaternion with a positive scalar part: axis · sin(angle/2), (n, 3)."""
     quaternion = sensed.measured.object_quaternion
@@ -57,6 +66,7 @@ PROPRIOCEPTION: tuple[Part[Sensed], ...] = (
     Part("command", command_mirror, "m/s, m/s, rad/s, m, rad, m x 6", "heading", lambda s: s.command),
     Part("projected_gravity", polar_vector, "1", "base", _measured("projected_gravity")),
     Part("base_angular_velocity", axial_vector, "rad/s", "base", _measured("base_angular_velocity")),
+    Part("heading_error", turn, "rad", "world", heading_error),
     Part("joint_position", joint_mirror, "rad", "joint", joint_deviation),
     Part("joint_velocity", joint_mirror, "rad/s", "joint", _measured("joint_velocity")),
     Part("phase", phase_mirror, "1", "-", lambda s: s.phase),

@@ -5,7 +5,7 @@ from functools import cache
 from typing import Annotated, Self, get_type_hints
 
 from iowbc.arrays import Array
-from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, rotation
+from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, rotation, turn
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class Measured:
     """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
     base_angular_velocity: Annotated[Array, Quantity(axial_vector, "rad/s", "base", "gyroscope")]
     """Base frame, (n, 3) [rad/s]."""
+    heading: Annotated[Array, Quantity(turn, "rad", "world", "yaw of the base from any origin, by the inertial unit")]
+    """Yaw of the base as the inertial unit integrates it, from any origin, (n, 1) [rad]; it may drift slowly."""
     joint_position: Annotated[Array, Quantity(joint_mirror, "rad", "joint", "all joints, in the order of `joints`")]
     """(n, joints) [rad]."""
     joint_velocity: Annotated[Array, Quantity(joint_mirror, "rad/s", "joint", "all joints, in the order of `joints`")]

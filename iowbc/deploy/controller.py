@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from iowbc.arrays import Array
 from iowbc.control import gait
-from iowbc.control.command import COMMAND, approach, rate_limits
+from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
@@ -85,6 +85,7 @@ class Controller:
         self._arms: Array = np.zeros((robots, len(contract.interaction)))
         self._support: Array = np.zeros((robots, actions))
         self._phase: Array = np.zeros(robots)
+        self._heading_reference: Array = np.zeros(robots)
         self._stepping = np.zeros(robots, np.bool_)
         self._starts = np.ones(robots, np.bool_)
         self.reset()
@@ -135,14 +136,17 @@ class Controller:
                 value = getattr(measured, name)
                 self._check(name, value, self._inputs[name].shape)
                 self._inputs[name][:] = value
+        self._heading_reference[starts] = self._inputs["heading"][starts, 0]
         self.inputs = self._inputs | self._as_inputs(
             command=self._command,
             arm_reference=self._arms,
+            heading_reference=self._heading_reference[:, None],
             gait=np.stack([self._phase, self._stepping], axis=1),
             restart=starts[:, None],
         )
         self.outputs = outputs = self._run(self.inputs)
         self._starts[:] = False
+        self._heading_reference += self._command[:, YAW_RATE] / self.frequency
         self._inputs["history"], self._inputs["last_action"] = outputs["history_next"], outputs["action"].copy()
         position = np.empty((self.robots, len(self.contract.joints)))
         position[:, self.robot.support] = outputs["support_target"]

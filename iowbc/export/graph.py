@@ -124,6 +124,13 @@ class ControllerGraph(nn.Module):
         return (
             Port("command", (len(COMMAND),), PROPRIOCEPTION[0].unit, "heading", "the skill-level command C, clamped"),
             *self._measured_ports(False),
+            Port(
+                "heading_reference",
+                (1,),
+                "rad",
+                "world",
+                "`heading` at the start plus the integrated yaw rate commanded",
+            ),
             Port("arm_reference", (arms,), "rad", "joint", "θ_I_ref from differential IK, interaction order"),
             Port("gait", (2,), "1, 1", "-", "gait phase in [0, 1), and 1 while the gait clock runs, else 0"),
             Port("last_action", (support,), "action", "joint", "`action` of the step before, 0 at the start"),
@@ -163,6 +170,7 @@ class ControllerGraph(nn.Module):
         measured: dict[str, Any] = {name: given[name] for name in self._measured}
         known: dict[str, Any] = {  # tensors in place of arrays: the observation's parts use operators alone
             "command": command,
+            "heading_reference": given["heading_reference"],
             "joint_reference": torch.cat([support_reference, arm_reference], dim=1).index_select(1, self.joint_order),
             "phase": signal,
             "last_action": given["last_action"],

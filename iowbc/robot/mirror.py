@@ -48,6 +48,8 @@ def in_place(*sign: float) -> Kind:
 scalar = in_place(1.0)
 polar_vector = in_place(*VECTOR_SIGN)
 axial_vector = in_place(*AXIAL_SIGN)
+turn = in_place(-1.0)
+"""An angle about the vertical, or a rate of it."""
 rotation = in_place(*QUATERNION_SIGN)
 
 

@@ -25,16 +25,17 @@ class Columns:
     def __init__(self, joints: int) -> None:
         self.position, self.velocity = slice(0, joints), slice(joints, 2 * joints)
         self.angular, self.gravity = slice(2 * joints, 2 * joints + 3), slice(2 * joints + 3, 2 * joints + 6)
+        self.heading = slice(2 * joints + 6, 2 * joints + 7)
         self.inertial = slice(2 * joints, 2 * joints + 6)
-        self.robot = slice(0, 2 * joints + 6)
+        self.robot = slice(0, 2 * joints + 7)
         self.width = self.robot.stop + OBJECT_WIDTH
 
 
 class Sensing:
     """Sensors of n environments; two delay lines, one for joints and inertial unit, one for the object's tracking."""
 
-    def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int) -> None:
-        n = len(has_object)
+    def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int, period: float) -> None:
+        n, self._period = len(has_object), period
         self._columns = columns = Columns(joints)
         self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
         self._world = np.zeros((n, 3, 3))
@@ -44,6 +45,7 @@ class Sensing:
         self._object_line = DelayLine(n, OBJECT_WIDTH, longest_latency)
         self._bias = np.zeros((n, joints))
         self._mounting, self._gyro_bias = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
+        self._drift, self._drifted = np.zeros(n), np.zeros(n)
         self._deviation = np.zeros((n, columns.width))
         self._nominal = _deviations(recipe, columns)
         self.rows = np.zeros((n, columns.width))
@@ -53,6 +55,7 @@ class Sensing:
             joint_velocity=self.rows[:, columns.velocity],
             base_angular_velocity=self.rows[:, columns.angular],
             projected_gravity=self.rows[:, columns.gravity],
+            heading=self.rows[:, columns.heading],
             object_position=seen[:, PLACE],
             object_quaternion=seen[:, ORIENTATION],
             object_linear_velocity=seen[:, SPEED],
@@ -70,6 +73,7 @@ class Sensing:
         roll, pitch = drawn["imu_tilt"][which].T
         self._mounting[which] = rotations.matrix(rotations.from_euler(roll, pitch, np.zeros_like(roll)))
         self._gyro_bias[which] = drawn["gyro_bias"][which]
+        self._drift[which], self._drifted[which] = drawn["heading_drift"][which], 0.0
         self._deviation[which] = self._nominal * drawn["noise_scale"][which, None]
         self._deviation[which, self._columns.robot.stop :] *= state.has_object[which, None]
         self._robot_line.set_latency(which, drawn["sensor_latency"][which])
@@ -80,6 +84,7 @@ class Sensing:
 
     def advance(self, state: SimulationState) -> None:
         """Takes in the state after a period."""
+        self._drifted += self._drift * self._period
         self._sense(state)
         self._robot_line.push(self._robot)
         self._object_line.push(self._object)
@@ -107,6 +112,8 @@ class Sensing:
         robot[:, columns.velocity] = state.joint_velocity
         robot[:, columns.angular] = state.base_angular_velocity
         np.negative(state.base_rotation[:, 2], out=robot[:, columns.gravity])
+        rotation = state.base_rotation
+        robot[:, columns.heading.start] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted
         if not self._see_object:
             return
         world, turning = self._world, state.base_angular_velocity
@@ -134,6 +141,7 @@ class Sensing:
     def arrays(self) -> dict[str, Array]:
         """The sensors' memory, by name."""
         own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
+        own |= {"drift": self._drift, "drifted": self._drifted}
         own |= {"bias": self._bias, "deviation": self._deviation, "rows": self.rows}
         for name, line in (("robot", self._robot_line), ("object", self._object_line)):
             own |= {f"{name}/{key}": values for key, values in line.arrays().items()}
@@ -145,6 +153,7 @@ def _deviations(recipe: Recipe, columns: Columns) -> Array:
     deviation = np.zeros(columns.width)
     deviation[columns.position], deviation[columns.velocity] = recipe.joint_position, recipe.joint_velocity
     deviation[columns.angular], deviation[columns.gravity] = recipe.angular_velocity, recipe.gravity
+    deviation[columns.heading] = recipe.heading
     seen = deviation[columns.robot.stop :]
     seen[PLACE], seen[ORIENTATION] = recipe.object_position, 0.5 * recipe.object_orientation
     seen[SPEED], seen[TURNING] = recipe.object_velocity, recipe.object_angular_velocity

@@ -72,7 +72,7 @@ class Simulation:
         """Force on the base in the period to come beside the drawn pushes, world frame, (n, 3) [N]."""
         self._partner = partner.Partner(recipe.partner, models, self.period)
         self._sensing = Sensing(
-            recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency
+            recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency, self.period
         )
         self._drives = Drives(robot, recipe.physics, n)
         self._impulses = Disturbance(

@@ -142,6 +142,8 @@ class MeasuredState(_Arrays):
     """(n, joints) [rad/s]."""
     base_angular_velocity: Array
     """Base frame, (n, 3) [rad/s]."""
+    heading: Array
+    """Yaw of the base as integrated by the inertial unit, (n, 1) [rad]; it drifts."""
     projected_gravity: Array
     """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
     object_position: Array

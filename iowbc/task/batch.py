@@ -162,6 +162,7 @@ class Batch:
         self.simulation.reset(which, joints, base_pitch=pitch)
         moved = self.judge.motion(self.simulation.state)
         memory.heading_reference[which] = moved.heading[which]
+        memory.heading_offset[which] = (self.simulation.measured.heading[:, 0] - moved.heading)[which]
         memory.object_place[which] = 0.0
         away = moved.object_offset - self.guidance.object_place(memory)
         memory.object_place[which] = away[which] * self._holding[which, None]

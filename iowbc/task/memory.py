@@ -46,6 +46,8 @@ class Memory:
     """a_{t−1}, (n, 15)."""
     filtered_velocity: Array
     """Low-passed v_sys in the plane, heading frame [m/s], and yaw rate [rad/s], (n, 3)."""
+    heading_offset: Array
+    """Measured less true heading at the start of the episode, (n,) [rad]: the origin of what is measured."""
     heading_reference: Array
     """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
     object_place: Array
@@ -59,7 +61,7 @@ class Memory:
     def blank(cls, n: int, arms: int, support: int) -> Self:
         """All zero."""
         counters = {name: np.zeros(n, np.int64) for name in ("episode", "draws", "steps", "limit", "goal_until")}
-        scalars = ("level", "height_rate", "phase", "heading_reference", "total")
+        scalars = ("level", "height_rate", "phase", "heading_offset", "heading_reference", "total")
         return cls(
             **counters,
             **{name: np.zeros(n) for name in scalars},

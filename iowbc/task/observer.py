@@ -42,6 +42,7 @@ class Observer:
         sensed = Sensed(
             measured=Measured.of(measured),
             command=memory.command,
+            heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],
             joint_reference=self._joint_reference,
             phase=gait.phase_signal(memory.phase, memory.stepping),
             last_action=memory.action,

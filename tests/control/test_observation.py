@@ -25,6 +25,7 @@ def sensed(robot: Robot) -> Sensed:
     return Sensed(
         measured=Measured(**arrays),
         command=random.normal(size=(ROWS, 11)),
+        heading_reference=random.normal(size=(ROWS, 1)),
         joint_reference=random.normal(size=(ROWS, len(robot.joints))),
         phase=random.normal(size=(ROWS, 2)),
         last_action=random.normal(size=(ROWS, support)),
@@ -40,6 +41,7 @@ def test_a_row_holds_the_parts_in_order(robot: Robot) -> None:
         ("command", 11),
         ("projected_gravity", 3),
         ("base_angular_velocity", 3),
+        ("heading_error", 1),
         ("joint_position", 29),
         ("joint_velocity", 29),
         ("phase", 2),
@@ -85,3 +87,11 @@ def test_another_part_is_a_function_and_a_line(robot: Robot, monkeypatch: pytest
     row = layout.gather(seen, np.empty((ROWS, layout.size), np.float32))
     assert row[:, layout.slices["downhill"]] == pytest.approx(downhill(seen), abs=1e-6)
     assert {"name": "downhill", "size": 1, "unit": "1", "frame": "base"} in layout.describe()
+
+
+def test_the_heading_error_turns_with_the_base_and_wraps(robot: Robot) -> None:
+    layout, seen = observation_layout(robot, observe_object=False), sensed(robot)
+    seen.measured.heading[:, 0], seen.heading_reference[:, 0] = [0.3, 3.1, -3.1, 7.0], [0.1, -3.1, 3.1, 0.5]
+    row = layout.gather(seen, np.empty((ROWS, layout.size), np.float32))
+    turned = [0.2, 6.2 - 2 * np.pi, 2 * np.pi - 6.2, 6.5 - 2 * np.pi]
+    assert row[:, layout.slices["heading_error"]][:, 0] == pytest.approx(turned, abs=1e-6)

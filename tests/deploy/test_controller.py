@@ -26,6 +26,7 @@ def measured(robot: Robot, rows: int = 1, noise: float = 0.0) -> Measured:
     return Measured(
         projected_gravity=np.tile([0.0, 0.0, -1.0], (rows, 1)),
         base_angular_velocity=noise * random.normal(size=(rows, 3)),
+        heading=np.zeros((rows, 1)),
         joint_position=robot.default_position + noise * random.normal(size=(rows, 29)),
         joint_velocity=noise * random.normal(size=(rows, 29)),
         object_position=np.tile([0.3, 0.0, 0.1], (rows, 1)),

@@ -67,7 +67,7 @@ def test_the_folder_holds_all_that_a_robot_needs(done: Job, rg: Path) -> None:
 
 
 def test_the_folder_depends_on_nothing_outside_of_the_stages_key(done: Job) -> None:
-    world = exported_source(done.out).recipe
+    world = exported_source(done.out).world.recipe
     assert world.task == done.recipe.task
     assert world.teacher == Recipe(name="default").teacher
     assert [segment.duration for segment in world.eval.sequence] == [0.3], "played as it was accepted"

@@ -59,6 +59,7 @@ def expected_frame(graph: ControllerGraph, rg: Path | None, robot: Robot, inputs
     sensed = Sensed(
         measured=Measured(**{name: inputs[name] for name in seen}),
         command=inputs["command"],
+        heading_reference=inputs["heading_reference"],
         joint_reference=reference,
         phase=phase_signal(phase, stepping),
         last_action=inputs["last_action"],

@@ -92,3 +92,11 @@ def test_noise_scale_zero_is_noise_free(start):
     simulation = start(Recipe(), ["lift"], noise_scale=0.0, sensor_latency=0.0, encoder_bias=0.0)
     run(simulation, 3)
     assert np.allclose(simulation.measured.joint_position, simulation.state.joint_position, atol=1e-12)
+
+
+def test_the_measured_heading_follows_the_base_and_drifts_at_the_drawn_rate(start, calm):
+    simulation = start(calm, ["lift", "free"], heading_drift=np.array([0.0, 0.05]))
+    run(simulation, 10)
+    rotation = simulation.state.base_rotation
+    heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    assert simulation.measured.heading[:, 0] - heading == pytest.approx([0.0, 0.05 * 10 * 0.02], abs=1e-12)

@@ -44,6 +44,9 @@ class Randomization(Section):
     """Constant error of each joint position sensor [rad]; the joint controllers take it for true, too."""
     imu_tilt: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
     """Constant roll and pitch of the inertial unit against the base [rad]; two degrees of mounting and calibration."""
+    heading_drift: Distribution = Distribution(low=-0.002, high=0.002, nominal=0.0)
+    """Drift of the heading that the inertial unit integrates [rad/s]: it knows its gyro's bias from standing still, and
+    errs by some degrees a minute. A skill layer with a view of the world would correct it."""
     gyro_bias: Distribution = Distribution(low=-0.02, high=0.02, nominal=0.0)
     """Constant error of the measured angular velocity, per axis [rad/s]; a warm low-cost gyroscope drifts by this."""
     start_yaw: Distribution = Distribution(low=-3.141592653589793, high=3.141592653589793, nominal=0.0)

@@ -18,6 +18,8 @@ class Sensing(Section):
     """Angular velocity of the base [rad/s]."""
     gravity: float = Field(default=0.02, ge=0.0)
     """Direction of gravity in the base frame, per axis [1]."""
+    heading: float = Field(default=0.005, ge=0.0)
+    """Heading of the base [rad]; its slow drift is `randomization.heading_drift`."""
     object_position: float = Field(default=0.005, ge=0.0)
     """Object position in the base frame, per axis [m]."""
     object_orientation: float = Field(default=0.02, ge=0.0)
