@@ -1,9 +1,17 @@
-"""Files that are whole or not there: a reader, or a crash while one is written, meets the old content or the new."""
+"""Files that are whole or not there: a reader, or a crash while one is written, meets the old content or the new.
 
+A checked file also proves that it is what was written, and for whom: before its content stands a line of JSON with the
+key that it belongs to and the SHA-256 of key and content.
+"""
+
+import hashlib
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from iowbc.errors import Damaged
 
 
 @contextmanager
@@ -36,3 +44,58 @@ def synchronise(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def write_checked(path: Path, key: str, content: bytes, *, keep_previous: bool = False) -> None:
+    """Write a checked file in place of the one at `path`, which stays beside it where `keep_previous` is set."""
+    head = json.dumps({"key": key, "sha256": _digest(key, content)}).encode()
+    with replacing(path) as fresh:
+        fresh.write_bytes(head + b"\n" + content)
+        if keep_previous and path.is_file():
+            synchronise(fresh)
+            os.replace(path, previous(path))
+
+
+def read_checked(path: Path, key: str) -> bytes | None:
+    """Content of a checked file; None where there is none or it belongs to another key. Raises `Damaged`."""
+    try:
+        head, _, content = path.read_bytes().partition(b"\n")
+    except FileNotFoundError:
+        return None
+    try:
+        told = json.loads(head)
+        own, digest = told["key"], told["sha256"]
+    except (ValueError, KeyError, TypeError) as reason:
+        raise Damaged(f"{path} has no readable head: {reason}") from reason
+    if digest != _digest(str(own), content):
+        raise Damaged(f"{path} differs from its digest")
+    return content if own == key else None
+
+
+def newest_checked(path: Path, key: str) -> tuple[bytes | None, list[str]]:
+    """Content of the newest whole checked file, at `path` or the one before it, and the names of damaged ones.
+
+    Damaged ones are put aside as `<name>.damaged`, lest the next write keeps one of them as the previous file.
+    """
+    damaged: list[str] = []
+    for candidate in (path, previous(path)):
+        try:
+            content = read_checked(candidate, key)
+        except Damaged:
+            damaged.append(candidate.name)
+            os.replace(candidate, candidate.with_name(f"{candidate.name}.damaged"))
+            continue
+        if content is not None:
+            return content, damaged
+    return None, damaged
+
+
+def previous(path: Path) -> Path:
+    """Where the checked file before the one at `path` is kept."""
+    return path.with_suffix(".previous")
+
+
+def _digest(key: str, content: bytes) -> str:
+    found = hashlib.sha256(key.encode() + b"\n")
+    found.update(content)
+    return found.hexdigest()

@@ -1,7 +1,5 @@
 """One atomic file with everything that a resumed training needs, bound to the stage's key."""
 
-import os
-import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,76 +7,28 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import load, save
 from torch import nn
 
-from iowbc.errors import Damaged
-from iowbc.files import replacing, synchronise
+from iowbc.files import newest_checked, write_checked
 
 Arrays = dict[str, NDArray[Any]]
 
 
 def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Replace the checkpoint at `path` and keep the one before beside it; a crash at any moment leaves one of them."""
-    contiguous = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
-    metadata = {"key": key, "crc32": _checksum(contiguous)}
-    with replacing(path) as fresh:
-        save_file(contiguous, fresh, metadata=metadata)
-        synchronise(fresh)
-        if path.is_file():
-            os.replace(path, previous_checkpoint(path))
-
-
-def previous_checkpoint(path: Path) -> Path:
-    """Where the checkpoint before the one at `path` is kept."""
-    return path.with_suffix(".previous")
+    content = save({name: np.ascontiguousarray(value) for name, value in arrays.items()})
+    write_checked(path, key, content, keep_previous=True)
 
 
 def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> Arrays | None:
-    """Arrays of the newest whole checkpoint of this key, or None; `say` is told of damaged ones.
-
-    They are put aside as `<name>.damaged`, lest the next save keeps one of them as the previous checkpoint.
-    """
-    damaged, found = [], None
-    for candidate in (path, previous_checkpoint(path)):
-        try:
-            found = _read(candidate, key)
-        except Damaged:
-            damaged.append(candidate.name)
-            os.replace(candidate, candidate.with_name(f"{candidate.name}.damaged"))
-        if found is not None:
-            break
+    """Arrays of the newest whole checkpoint of this key, or None; `say` is told of damaged ones, now put aside."""
+    content, damaged = newest_checked(path, key)
     if damaged:
-        names = " and ".join(damaged)
-        verb = "is" if len(damaged) == 1 else "are"
-        say(f"checkpoint {names} {verb} damaged: {'starts anew' if found is None else 'goes on from the previous one'}")
-    return found
-
-
-def _read(path: Path, key: str) -> Arrays | None:
-    """One file's arrays; None where there is none or it belongs to another key. Raises Damaged."""
-    if not path.is_file():
-        return None
-    try:
-        with safe_open(path, framework="numpy") as file:
-            metadata = file.metadata() or {}
-            if metadata["key"] != key:
-                return None
-            arrays: Arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError, KeyError, ValueError) as reason:
-        raise Damaged(f"{path} is not readable: {reason}") from reason
-    if metadata.get("crc32") not in (None, _checksum(arrays)):
-        raise Damaged(f"{path} differs from its checksum")
-    return arrays
-
-
-def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """CRC-32 of the arrays' bytes, in order of their names."""
-    value = 0
-    for name in sorted(arrays):
-        value = zlib.crc32(np.ascontiguousarray(arrays[name]).tobytes(), value)
-    return f"{value:08x}"
+        names, verb = " and ".join(damaged), "is" if len(damaged) == 1 else "are"
+        then = "starts anew" if content is None else "goes on from the previous one"
+        say(f"checkpoint {names} {verb} damaged: {then}")
+    return None if content is None else load(content)
 
 
 def prefixed(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> Arrays:

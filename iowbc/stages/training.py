@@ -43,7 +43,7 @@ def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[M
     from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
     from iowbc.learning.curves import Curves
 
-    path = job.work / "checkpoint.safetensors"
+    path = job.work / "training.checkpoint"
     found = load_checkpoint(path, job.key, job.report.say)
     if found is not None:
         training.restore(found)

@@ -151,7 +151,7 @@ def test_the_number_of_workers_changes_nothing(done: Job, recipe: Recipe, studen
 
 def test_a_sweep_goes_on_after_its_last_finished_mass(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
     stopping = job(recipe, student, tmp_path)
-    finished = "trials-0-0.parquet"
+    finished = "trials-0-0.batch"
     (stopping.work / finished).write_bytes((done.work / finished).read_bytes())
     stopping = replace(stopping, interrupted=lambda: True)
     with pytest.raises(Interrupted, match="finished batches are kept"):

@@ -61,6 +61,8 @@ class Double:
         assert sample.arm[0] == index
         if index in self.task.crashes:
             os.kill(os.getpid(), signal.SIGSEGV)
+        if index in self.task.killed and self.task.first_time(index):
+            os.kill(os.getpid(), signal.SIGKILL)
         if index in self.task.mistakes:
             raise KeyError(f"a mistake at {index}")
         time.sleep(self.task.pause)
@@ -75,8 +77,19 @@ class DoubleTask:
 
     crashes: tuple[int, ...] = ()
     mistakes: tuple[int, ...] = ()
+    killed: tuple[int, ...] = ()
+    """Samples on which a worker is killed: once each where `marks` names a folder, else every time."""
+    marks: str = ""
     pause: float = 0.0
     start: bool = True
+
+    def first_time(self, index: int) -> bool:
+        if not self.marks:
+            return True
+        mark = Path(self.marks) / str(index)
+        known = mark.exists()
+        mark.touch()
+        return not known
 
     def prepare(self) -> Double:
         if not self.start:

@@ -87,7 +87,7 @@ def test_after_kill_9_finished_shards_are_used_and_the_result_is_the_same(datase
     script = tmp_path / "killed.py"
     script.write_text(KILLED.format(tests=[str(folder) for folder in Path(__file__).parents[:2]], folder=str(tmp_path)))
     process = subprocess.Popen([sys.executable, str(script)], env=os.environ | {"OMP_NUM_THREADS": "1"})
-    first = tmp_path / "work" / "shards" / "00000.npz"
+    first = tmp_path / "work" / "shards" / "00000.shard"
     deadline = time.monotonic() + 120.0
     while not first.exists():
         assert process.poll() is None, "the stage ended before it was killed"

@@ -1,6 +1,7 @@
 """The whole evaluation: trials of many masses and suites at once over all workers, resumable batch by batch."""
 
 from collections.abc import Callable, Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from iowbc.evaluation.trials.batch_policy import PolicyInBatch
 from iowbc.evaluation.trials.plan import PlannedSweep, Trial, case_trials, planned_sweeps, push_trials
 from iowbc.evaluation.trials.rollout import Acting, play_episodes
 from iowbc.evaluation.trials.table import measure_of, trial_row
-from iowbc.files import replacing
+from iowbc.files import newest_checked, write_checked
 from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
 
@@ -74,9 +75,10 @@ class Protocol:
         return pd.concat(tables, ignore_index=True)
 
     def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
-        path = self.work / f"{name}.parquet"
+        path = self.work / f"{name}.batch"
         suites = ", ".join(dict.fromkeys(trial.suite for trial in trials))
-        if not path.is_file():
+        content, _ = newest_checked(path, name)
+        if content is None:
             longest = max(trial.episode.duration for trial in trials)
             size, places = self.world.recipe.eval.batch, np.arange(len(trials))
 
@@ -96,11 +98,11 @@ class Protocol:
                 trial_row(self.world.recipe, self.measure, trial, outcome)
                 for trial, outcome in zip(trials, outcomes, strict=True)
             ]
-            with replacing(path) as fresh:
-                pd.DataFrame(rows).assign(batch_size=size, batch_row=places).to_parquet(fresh, index=False)
+            content = pd.DataFrame(rows).assign(batch_size=size, batch_row=places).to_parquet(index=False)
+            write_checked(path, name, content)
         self.done += len(trials)
         self.progress(self.done, self.total, suites)
-        return pd.read_parquet(path)
+        return pd.read_parquet(BytesIO(content))
 
 
 def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Trial]]:

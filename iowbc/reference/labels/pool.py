@@ -1,4 +1,8 @@
-"""Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample."""
+"""Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample.
+
+Only what a solver does to itself rejects a sample. A worker that was killed says nothing about its sample: somebody
+else ended it, and the dataset must not depend on that.
+"""
 
 import multiprocessing
 import os
@@ -21,6 +25,10 @@ from iowbc.reference.labels.labelling import Solver
 from iowbc.reference.labels.shards import Shard, merge, read_shard, write_shard
 
 CRASHED = "solver crashed"
+CRASHES = tuple(-number for number in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL))
+"""Exit codes of a worker that its sample brought down; after any other death the sample is tried again."""
+TRIES = 5
+"""Deaths of other kinds that a labelling bears before it gives up."""
 POLL = 0.2
 """Seconds between looks at the interruption flag."""
 STARTS_WITHOUT_WORK = 3
@@ -51,6 +59,7 @@ class _Book:
     waiting: list[int]
     crashed: dict[int, list[int]] = field(default_factory=dict)
     barren: int = 0
+    killed: int = 0
 
 
 def label_all(
@@ -67,11 +76,11 @@ def label_all(
     """Labels the samples with these numbers. The result does not depend on the number of workers.
 
     Shards in `folder` that belong to `key` are reused, others made anew. Raises `Interrupted` when `interrupted()`
-    turns true, RuntimeError when a worker fails in Python or cannot start.
+    turns true, RuntimeError when a worker fails in Python or cannot start, or when too many are killed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
-    paths = [folder / f"{number:05d}.npz" for number in range(len(chunks))]
+    paths = [folder / f"{number:05d}.shard" for number in range(len(chunks))]
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
     book = _Book([number for number in range(len(chunks)) if number not in done])
     ready = sum(len(chunks[number]) for number in done)
@@ -154,8 +163,16 @@ def _bury(worker: _Worker, book: _Book) -> None:
                 f"labelling workers end before their first sample (exit code {worker.process.exitcode}); "
                 "try `iowbc doctor`, which checks that crocoddyl and pinocchio fit together"
             )
-    else:
+    elif worker.process.exitcode in CRASHES:
         book.crashed.setdefault(worker.chunk, []).append(sample)
+    else:
+        book.killed += 1
+        if book.killed >= TRIES:
+            raise RuntimeError(
+                f"{book.killed} labelling workers were ended from outside (the last with exit code "
+                f"{worker.process.exitcode}, on sample {sample}); finished shards are kept. Is there too little "
+                "memory? Try fewer workers (`--workers`)"
+            )
     if worker.chunk is not None:
         book.waiting.insert(0, worker.chunk)
 

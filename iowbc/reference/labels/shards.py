@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.files import replacing
+from iowbc.files import newest_checked, write_checked
 
 Array = NDArray[Any]
 
@@ -29,37 +29,31 @@ class Shard:
 
 
 def write_shard(path: Path, key: str, shard: Shard) -> None:
-    """Writes a shard and renames it into place."""
-    with replacing(path) as fresh, fresh.open("wb") as file:
-        np.savez(
-            file,
-            allow_pickle=False,
-            key=np.array(key),
-            kept=shard.kept,
-            rejected=shard.rejected,
-            reasons=np.array(shard.reasons, dtype=np.str_),
-            **{f"label_{name}": values for name, values in shard.labels.items()},
-        )
+    """Writes a shard as a checked file."""
+    content = BytesIO()
+    np.savez(
+        content,
+        allow_pickle=False,
+        kept=shard.kept,
+        rejected=shard.rejected,
+        reasons=np.array(shard.reasons, dtype=np.str_),
+        **{f"label_{name}": values for name, values in shard.labels.items()},
+    )
+    write_checked(path, key, content.getvalue())
 
 
 def read_shard(path: Path, key: str, indices: Sequence[int]) -> Shard | None:
-    """The shard, or None where it is missing, damaged, of another run, or not finite: it is then made anew."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            content = {name: stored[name] for name in stored.files}
-        shard = Shard(
-            content["kept"],
-            {name.removeprefix("label_"): values for name, values in content.items() if name.startswith("label_")},
-            content["rejected"],
-            content["reasons"].tolist(),
-        )
-        matches = str(content["key"]) == key
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+    """The shard, or None where it is missing, damaged, of another run or of other samples: it is then made anew."""
+    content, _ = newest_checked(path, key)
+    if content is None:
         return None
-    complete = sorted([*shard.kept.tolist(), *shard.rejected.tolist()]) == sorted(indices)
-    sizes = all(len(values) == len(shard.kept) for values in shard.labels.values())
-    finite = all(np.isfinite(values).all() for values in shard.labels.values())
-    return shard if matches and complete and sizes and finite and len(shard.reasons) == len(shard.rejected) else None
+    with np.load(BytesIO(content), allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    kept, rejected, reasons = arrays.pop("kept"), arrays.pop("rejected"), arrays.pop("reasons").tolist()
+    labels = {name.removeprefix("label_"): values for name, values in arrays.items()}
+    if sorted([*kept.tolist(), *rejected.tolist()]) != sorted(indices):
+        return None
+    return Shard(kept, labels, rejected, reasons)
 
 
 def merge(shards: Sequence[Shard]) -> Shard:

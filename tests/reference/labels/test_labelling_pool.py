@@ -12,7 +12,7 @@ from reference_doubles import DoubleTask
 
 from iowbc.errors import Interrupted
 from iowbc.reference.labels.pool import CRASHED, label_all
-from iowbc.reference.labels.shards import Shard, read_shard, write_shard
+from iowbc.reference.labels.shards import Shard, read_shard
 
 COUNT, CHUNK = 40, 8
 
@@ -70,6 +70,19 @@ def test_a_native_crash_ends_one_sample(tmp_path: Path, expected: Shard) -> None
     assert set(result.kept) == set(expected.kept) - {10, 13, 31}
 
 
+def test_a_killed_worker_costs_no_sample(tmp_path: Path, expected: Shard) -> None:
+    marks = tmp_path / "killed"
+    marks.mkdir()
+    result = run(tmp_path / "shards", DoubleTask(killed=(4, 13, 31), marks=str(marks)), workers=2)
+    assert len(list(marks.iterdir())) == 3
+    assert same(result, expected)
+
+
+def test_workers_that_are_killed_again_and_again_end_the_stage(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match=r"5 labelling workers were ended from outside .*exit code -9, on sample 13"):
+        run(tmp_path, DoubleTask(killed=(13,)))
+
+
 def test_workers_that_cannot_start_end_the_stage_with_advice(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match=r"end before their first sample \(exit code -11\).*iowbc doctor"):
         run(tmp_path, DoubleTask(start=False))
@@ -81,37 +94,33 @@ def test_an_error_in_python_is_shown(tmp_path: Path) -> None:
 
 
 def test_finished_shards_are_used_again(shards: Path, expected: Shard) -> None:
-    before = {path: path.stat().st_mtime_ns for path in shards.glob("*.npz")}
+    before = {path: path.stat().st_mtime_ns for path in shards.glob("*.shard")}
     ready: list[int] = []
     result = run(shards, DoubleTask(start=False), progress=lambda done, total: ready.append(done))
     assert same(result, expected)
     assert ready == [COUNT]
-    assert {path: path.stat().st_mtime_ns for path in shards.glob("*.npz")} == before
+    assert {path: path.stat().st_mtime_ns for path in shards.glob("*.shard")} == before
 
 
 def test_damaged_shards_are_made_anew(shards: Path, expected: Shard) -> None:
-    paths = sorted(shards.glob("*.npz"))
-    shard = read_shard(paths[4], "key", range(32, 40))
-    assert shard is not None
+    paths = sorted(shards.glob("*.shard"))
     paths[0].write_bytes(paths[0].read_bytes()[:-40])
     paths[1].unlink()
     paths[2].write_bytes(b"")
-    not_a_number = {"support": shard.labels["support"] * np.nan}
-    write_shard(paths[4], "key", Shard(shard.kept, not_a_number, shard.rejected, shard.reasons))
+    content = bytearray(paths[4].read_bytes())
+    content[-200] ^= 1
+    paths[4].write_bytes(content)
     untouched = paths[3].stat().st_mtime_ns
     assert same(run(shards, workers=2), expected)
     assert paths[3].stat().st_mtime_ns == untouched
 
 
 def test_a_shard_of_other_samples_or_another_key_is_not_taken(shards: Path) -> None:
-    path = shards / "00004.npz"
+    path = shards / "00004.shard"
     shard = read_shard(path, "key", range(32, 40))
     assert shard is not None
     assert read_shard(path, "another key", range(32, 40)) is None
     assert read_shard(path, "key", range(31, 39)) is None
-    fewer = {"support": shard.labels["support"][1:]}
-    write_shard(path, "key", Shard(shard.kept, fewer, shard.rejected, shard.reasons))
-    assert read_shard(path, "key", range(32, 40)) is None
 
 
 def stop_after(samples: int) -> tuple[Callable[[], bool], Callable[[int, int], None]]:
@@ -128,5 +137,5 @@ def test_an_interruption_keeps_finished_shards_and_leaves_no_process(tmp_path: P
     with pytest.raises(Interrupted):
         run(tmp_path, DoubleTask(pause=0.02), workers=2, interrupted=interrupted, progress=progress)
     assert not [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
-    assert 2 <= len(list(tmp_path.glob("*.npz"))) < 5
+    assert 2 <= len(list(tmp_path.glob("*.shard"))) < 5
     assert same(run(tmp_path), expected)
