@@ -9,17 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from iowbc.control.feasible_map import FeasibleMap
-from iowbc.control.generator import ReferenceNetwork
+from iowbc.control.generator import ReferenceNetwork, input_names
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
-from iowbc.reference.fit.network_inputs import input_names
 from iowbc.robot.description import Robot, load_robot
 
 
 def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenerator) -> None:
     """Writes an artifact like that of `rg-fit`: a network of the recipe's size whose last layer is zero, and a feasible
     map of that one posture."""
-    names, support = input_names(robot, recipe), robot.support
+    names, support = input_names(robot, recipe.height), robot.support
     sizes = (len(names), *recipe.fit.hidden, len(support))
     rng = np.random.default_rng(0)
     weights = [

@@ -8,6 +8,7 @@ import numpy as np
 from safetensors.numpy import load_file, save_file
 
 from iowbc.arrays import Array
+from iowbc.robot.description import Robot
 
 WEIGHTS, ARCHITECTURE = "rg.safetensors", "rg.json"
 FORMAT = 1
@@ -18,7 +19,7 @@ class ReferenceNetwork:
     """A multilayer perceptron with standardised inputs and outputs, its output kept to the joint limits."""
 
     inputs: tuple[str, ...]
-    """Names: the arm joints, `pelvis_height` or `com_height`, `torso_pitch`, and what else the recipe sampled."""
+    """Names: the arm joints, `pelvis_height` or `com_height`, `torso_pitch`; see `input_names`."""
     outputs: tuple[str, ...]
     """Names of the support joints."""
     layers: tuple[tuple[Array, Array], ...]
@@ -33,7 +34,7 @@ class ReferenceNetwork:
     activation: str = "elu"
 
     def __call__(self, arm_reference: Array, base_command: Array) -> Array:
-        """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2 or more), as in `inputs`."""
+        """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2): height [m], pitch [rad]."""
         x: Array = np.concatenate([arm_reference, base_command], axis=1, dtype=np.float32)
         if x.shape[1] != len(self.inputs):
             raise ValueError(
@@ -90,6 +91,11 @@ class ReferenceNetwork:
             name: tensors[name] for name in ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper")
         }
         return cls(inputs=inputs, outputs=outputs, layers=layers, **rest)
+
+
+def input_names(robot: Robot, height: str) -> tuple[str, ...]:
+    """Inputs of a reference generator: arm joints, `pelvis` or `com` height, torso pitch."""
+    return (*(robot.joints[index] for index in robot.interaction), f"{height}_height", "torso_pitch")
 
 
 def _rowwise(x: Array, weight: Array) -> Array:

@@ -85,9 +85,7 @@ class ReferenceLayer:
         """θ_S_ref = φ_RG(θ_I_ref, σ_base), (n, support joints) [rad], without the gait prior."""
         if self.network is None:
             return np.tile(self.default_support, (len(command), 1))
-        base = np.zeros((len(command), len(self.network.inputs) - arms.shape[1]))
-        base[:, :2] = command[:, HEIGHT : PITCH + 1]
-        return self.network(arms, base)
+        return self.network(arms, command[:, HEIGHT : PITCH + 1])
 
     def with_stride(self, support: Array, command: Array, phase: Array, stepping: Mask) -> Array:
         """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]."""

@@ -49,7 +49,6 @@ class ReferenceModule(nn.Module):
         self.register_buffer("default", _tensor(default))
         if network is None:
             return
-        self.extra = len(network.inputs) - arms - 2
         for name in ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper"):
             self.register_buffer(name, _tensor(getattr(network, name)))
         layers: list[nn.Module] = []
@@ -62,7 +61,7 @@ class ReferenceModule(nn.Module):
     def forward(self, arm_reference: Tensor, base_command: Tensor) -> Tensor:
         if self.constant:
             return torch.zeros_like(arm_reference[:, :1]) + self.default
-        rows = torch.cat([arm_reference, base_command, torch.zeros_like(arm_reference[:, : self.extra])], dim=1)
+        rows = torch.cat([arm_reference, base_command], dim=1)
         normal = (rows - self.input_mean) / self.input_std
         return torch.clamp(self.body(normal) * self.output_std + self.output_mean, self.lower, self.upper)
 

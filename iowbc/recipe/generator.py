@@ -50,12 +50,6 @@ class Sampling(Section):
     """Commanded height [m]."""
     pitch: Interval = Interval(low=-0.5, high=1.5)
     """Commanded torso pitch [rad], positive leaning forward."""
-    roll: Interval | None = None
-    """Commanded torso roll [rad], ±0.7 in the paper; without it the torso stays level and there is no such input."""
-    yaw: Interval | None = None
-    """Commanded torso yaw against the feet [rad]; as for `roll`."""
-    payload: Interval | None = None
-    """Mass at each wrist [kg], drawn for each hand, with two more inputs of the network; without it empty hands."""
     heading_share: Share = 0.5
     """Share of the arms put by inverse kinematics at wrist positions in the heading frame, as wrist commands do."""
     torso_share: Share = 0.35

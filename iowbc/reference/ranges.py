@@ -12,7 +12,7 @@ LOWEST, HIGHEST = 0.3, 1.1
 """Heights that may be tried, in heights of the straight-legged base: a slip of unit or digit lies outside. The feasible
 map finds the true bounds."""
 STEEPEST = np.pi / 2
-"""Largest torso angle [rad]."""
+"""Largest torso pitch [rad]."""
 
 
 def wrong_ranges(robot: Robot, recipe: ReferenceGenerator) -> Iterator[tuple[str, str]]:
@@ -36,12 +36,9 @@ def wrong_ranges(robot: Robot, recipe: ReferenceGenerator) -> Iterator[tuple[str
             f"{height.low:g} to {height.high:g}: {robot.name} is {straight:.3g} m high at its base with straight legs; "
             f"valid: {lower:.2f} to {upper:.2f} m",
         )
-    for name in ("pitch", "roll", "yaw"):
-        angle = getattr(sampling, name)
-        if angle is not None and (angle.low < -STEEPEST or angle.high > STEEPEST):
-            yield f"rg.sampling.{name}", f"{angle.low:g} to {angle.high:g}: valid is within ±{STEEPEST:.4f} rad"
-    if sampling.payload is not None and sampling.payload.low < 0.0:
-        yield "rg.sampling.payload", f"a mass of {sampling.payload.low:g} kg; valid is 0 or more"
+    pitch = sampling.pitch
+    if pitch.low < -STEEPEST or pitch.high > STEEPEST:
+        yield "rg.sampling.pitch", f"{pitch.low:g} to {pitch.high:g}: valid is within ±{STEEPEST:.4f} rad"
 
 
 def straight_height(robot: Robot) -> float:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from iowbc.control.feasible_map import FeasibleMap, build_map
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.reference.fit.network_inputs import base_columns
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 
@@ -56,21 +55,18 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     )
 
 
-def measure_gentle_region(
-    plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array, payload: Array
-) -> GentleRegion:
-    """The part of a map where the network moves gently with height and pitch, for arms (n, 14) with payloads (n, 2).
+def measure_gentle_region(plan: SamplePlan, held: FeasibleMap, network: ReferenceNetwork, arms: Array) -> GentleRegion:
+    """The part of a map where the network moves gently with height and pitch, for arms (n, 14).
 
     Raises ValueError when it is empty.
     """
     recipe, smooth = plan.recipe.feasible, plan.recipe.fit.smoothness
     chosen = np.linspace(0, len(arms) - 1, min(recipe.arms, len(arms))).astype(int)
-    arms, payload = arms[chosen], payload[chosen]
+    arms = arms[chosen]
     jump = np.empty((len(plan.pitches), len(plan.heights)))
 
     def reference(height: float, pitch: float) -> Array:
-        command = np.tile([height, pitch, 0.0, 0.0], (len(arms), 1))
-        return network(arms, base_columns(plan.recipe, command, payload))
+        return network(arms, np.tile([height, pitch], (len(arms), 1)))
 
     for row, pitch in enumerate(plan.pitches):
         for column, height in enumerate(plan.heights):
@@ -84,7 +80,7 @@ def measure_gentle_region(
 
 
 def _around(plan: SamplePlan, command: Array) -> Array:
-    """Number of commands (n, 4) within the window of each grid point, shape (pitches, heights)."""
+    """Number of commands (n, 2) within the window of each grid point, shape (pitches, heights)."""
     height, pitch = plan.recipe.feasible.window
     near_pitch = np.abs(command[:, 1] - plan.pitches[:, None]) <= pitch
     near_height = np.abs(command[:, 0] - plan.heights[:, None]) <= height

@@ -107,7 +107,7 @@ def _percentile(values: object, percent: float) -> float:
 
 STAGE = Stage(
     name="rg-dataset",
-    version=3,
+    version=4,
     slice=(
         "seed",
         "rg.method",

@@ -12,10 +12,9 @@ def run(job: Job) -> None:
     import numpy as np
 
     from iowbc.control.feasible_map import FeasibleMap
-    from iowbc.control.generator import ReferenceNetwork
+    from iowbc.control.generator import ReferenceNetwork, input_names
     from iowbc.reference.fit.fitting import fit
     from iowbc.reference.fit.gates import judge_fit
-    from iowbc.reference.fit.network_inputs import base_columns, input_names
     from iowbc.reference.fit.preparation import prepare
     from iowbc.reference.fit.smoothness import measure_jumps
     from iowbc.reference.labels.dataset import Dataset
@@ -38,7 +37,7 @@ def run(job: Job) -> None:
     fitted = fit(prepared.train, prepared.validation, rg.fit, job.recipe.seed, epoch_done, job.interrupted)
     support = robot.support
     network = ReferenceNetwork(
-        inputs=input_names(robot, rg),
+        inputs=input_names(robot, rg.height),
         outputs=tuple(robot.joints[index] for index in support),
         layers=fitted.layers,
         input_mean=fitted.input_mean,
@@ -53,15 +52,14 @@ def run(job: Job) -> None:
     plan = SamplePlan(robot, rg, job.recipe.seed)
     learnt = prepared.training[dataset.index[prepared.training] < plan.drawn]
     try:
-        region = measure_gentle_region(plan, labelled, network, dataset.arm[learnt], dataset.payload[learnt])
+        region = measure_gentle_region(plan, labelled, network, dataset.arm[learnt])
     except ValueError as error:
         raise StageFailed(f"{error}; or raise rg.feasible.jump") from error
     feasible = region.map
     feasible.save(job.out / "feasible.npz")
 
     held = prepared.held_out
-    base = base_columns(rg, dataset.command[held], dataset.payload[held])
-    predicted = network(dataset.arm[held], base)
+    predicted = network(dataset.arm[held], dataset.command[held])
     errors = prepared.kinematics.errors([prepared.samples[i] for i in held], predicted.astype(np.float64))
     jumps = measure_jumps(network, rg, feasible, dataset.arm[held], job.recipe.seed)
     verdict = judge_fit(rg.fit.gates, dataset, held, predicted, errors, jumps)
@@ -84,7 +82,7 @@ def run(job: Job) -> None:
 
 STAGE = Stage(
     name="rg-fit",
-    version=3,
+    version=4,
     slice=("seed", "rg.fit", "rg.height", "rg.sampling", "rg.problem", "rg.feasible"),
     reads=lambda recipe: ("rg-dataset",),
     run=run,

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.control.generator import ReferenceNetwork
-from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.fit.network_inputs import base_columns, input_names
+from iowbc.control.generator import ReferenceNetwork, input_names
 from iowbc.robot.description import Robot
 
 
@@ -104,24 +102,11 @@ def test_numbers_that_are_not_finite_are_refused(network: ReferenceNetwork, tmp_
         ReferenceNetwork.load(tmp_path)
 
 
-def test_inputs_are_named_as_the_recipe_samples_them(robot: Robot) -> None:
-    plain = input_names(robot, ReferenceGenerator())
-    assert plain[:14] == tuple(robot.joints[index] for index in robot.interaction)
-    assert plain[14:] == ("pelvis_height", "torso_pitch")
-    everything = ReferenceGenerator.model_validate(
-        {
-            "height": "com",
-            "sampling": {
-                "roll": {"low": -0.7, "high": 0.7},
-                "yaw": {"low": -0.7, "high": 0.7},
-                "payload": {"low": 0, "high": 4},
-            },
-        }
-    )
-    names = input_names(robot, everything)[14:]
-    assert names == ("com_height", "torso_pitch", "torso_roll", "torso_yaw", "left_payload", "right_payload")
-    command, payload = np.array([[0.6, 0.1, 0.2, 0.3]]), np.array([[1.0, 2.0]])
-    np.testing.assert_array_equal(base_columns(everything, command, payload), [[0.6, 0.1, 0.2, 0.3, 1.0, 2.0]])
+@pytest.mark.parametrize("height", ["pelvis", "com"])
+def test_inputs_are_the_arms_the_height_and_the_torsos_pitch(robot: Robot, height: str) -> None:
+    names = input_names(robot, height)
+    assert names[:-2] == tuple(robot.joints[index] for index in robot.interaction)
+    assert names[-2:] == (f"{height}_height", "torso_pitch")
 
 
 def test_workers_of_the_simulation_import_nothing_heavy_with_it() -> None:

@@ -39,8 +39,8 @@ def carrying(robot: Robot) -> Any:
 def command(carrying: Any) -> Callable[..., Sample]:
     """Makes a sample with the arms in the carrying posture."""
 
-    def make(height: float, pitch: float, roll: float = 0.0, yaw: float = 0.0, payload: Any = (0.0, 0.0)) -> Sample:
-        return Sample(carrying, np.array([height, pitch, roll, yaw]), np.array(payload))
+    def make(height: float, pitch: float) -> Sample:
+        return Sample(carrying, np.array([height, pitch]))
 
     return make
 

@@ -55,7 +55,7 @@ class Double:
         self.task = task
 
     def draw(self, indices: Any) -> list[Sample]:
-        return [Sample(np.full(14, float(index)), np.zeros(4), np.zeros(2)) for index in indices]
+        return [Sample(np.full(14, float(index)), np.zeros(2)) for index in indices]
 
     def solve(self, index: int, sample: Sample) -> dict[str, Any]:
         assert sample.arm[0] == index

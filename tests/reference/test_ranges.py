@@ -39,7 +39,6 @@ def test_the_straight_legged_g1_is_as_high_as_its_maker_says(robot: Robot) -> No
         ({"height": {"low": 0.5, "high": 1.4}}, "rg.sampling.height", r"0\.5 to 1\.4: .*valid: 0\.24 to 0\.87 m"),
         ({"height": {"low": 0.05, "high": 0.7}}, "rg.sampling.height", r"0\.05 to 0\.7: .*valid: 0\.24 to 0\.87 m"),
         ({"pitch": {"low": -2.0, "high": 0.0}}, "rg.sampling.pitch", r"-2 to 0: valid is within ±1\.57"),
-        ({"payload": {"low": -1.0, "high": 1.0}}, "rg.sampling.payload", "a mass of -1 kg"),
     ],
 )
 def test_a_range_beyond_the_robot_is_named_with_what_is_valid(

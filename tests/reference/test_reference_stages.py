@@ -20,7 +20,7 @@ from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.plan import COMMAND_MIRROR, SamplePlan
+from iowbc.reference.labels.plan import SamplePlan
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 from iowbc.stages import rg_dataset, rg_fit
@@ -205,8 +205,8 @@ def test_the_fitted_network_is_nearly_its_own_mirror_image(fit_job: Job, dataset
     """Trained on mirror images, it differs from its mirror image by no more than from the labels."""
     network, dataset = ReferenceNetwork.load(fit_job.out), Dataset.load(dataset_job.out / "dataset.npz")
     arms, legs = interaction_mirror(robot), support_mirror(robot)
-    plain = network(dataset.arm, dataset.command[:, :2])
-    image = legs(network(arms(dataset.arm), (dataset.command * COMMAND_MIRROR)[:, :2]))
+    plain = network(dataset.arm, dataset.command)
+    image = legs(network(arms(dataset.arm), dataset.command))
     error = np.sqrt(((plain - dataset.support) ** 2).mean())
     assert np.sqrt(((plain - image) ** 2).mean()) < 2.0 * error
     assert error < 0.5 * np.sqrt((dataset.support.std(axis=0) ** 2).mean())

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from iowbc.errors import Interrupted
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.fit.fitting import FitData
-from iowbc.reference.fit.network_inputs import base_columns
 from iowbc.reference.fit.task_error import TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
-from iowbc.reference.labels.plan import COMMAND_MIRROR
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
@@ -42,7 +40,7 @@ def prepare(
 ) -> Prepared:
     """Splits by group and adds mirror images to the training part. Raises `Interrupted`."""
     kinematics = TaskKinematics(SupportModel(robot, recipe.problem), recipe.height)
-    samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, dataset.payload, strict=True)]
+    samples = [Sample(*row) for row in zip(dataset.arm, dataset.command, strict=True)]
     configuration = np.concatenate(
         [dataset.base_position, np.roll(dataset.base_quaternion, -1, axis=1), dataset.support], axis=1
     )
@@ -52,17 +50,12 @@ def prepare(
         if row % 1000 == 0 and interrupted():
             raise Interrupted
     train, validation, held_out = split_by_group(dataset.group, recipe.fit.validation, recipe.fit.held_out, seed)
-    whole = FitData(_inputs(recipe, dataset.arm, dataset.command, dataset.payload), dataset.support, jacobian)
+    whole = FitData(np.concatenate([dataset.arm, dataset.command], axis=1), dataset.support, jacobian)
     learnt = whole.take(train)
     if recipe.fit.mirror:
         arms, legs = interaction_mirror(robot), support_mirror(robot)
         image = FitData(
-            _inputs(
-                recipe,
-                arms(dataset.arm[train]),
-                dataset.command[train] * COMMAND_MIRROR,
-                dataset.payload[train][:, ::-1],
-            ),
+            np.concatenate([arms(dataset.arm[train]), dataset.command[train]], axis=1),
             legs(dataset.support[train]),
             legs(jacobian[train]),
         )
@@ -89,7 +82,3 @@ def split_by_group(
     parts = groups[held + checked :], groups[held : held + checked], groups[:held]
     train, stop, gate = (np.flatnonzero(np.isin(group, part)) for part in parts)
     return train, stop, gate
-
-
-def _inputs(recipe: ReferenceGenerator, arm: Array, command: Array, payload: Array) -> Array:
-    return np.concatenate([arm, base_columns(recipe, command, payload)], axis=1)

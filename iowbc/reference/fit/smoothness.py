@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.fit.network_inputs import base_columns
 
 Array = NDArray[Any]
 
@@ -39,13 +38,13 @@ def measure_jumps(
         height = generator.uniform(low, high)
         steps = abs(np.diff(height)[0]) / smooth.height_step + abs(np.diff(pitch)[0]) / smooth.pitch_step
         along = np.append(np.arange(0.0, steps) / max(steps, 1e-9), 1.0)
-        command = np.zeros((len(along), 4))
+        command = np.empty((len(along), 2))
         command[:, 0] = height[0] + along * (height[1] - height[0])
         command[:, 1] = pitch[0] + along * (pitch[1] - pitch[0])
         inside = feasible.contains(command[:, 0], command[:, 1])
         arms = np.repeat(arm[line % len(arm)][None], len(along), axis=0)
-        reference = network(arms, base_columns(recipe, command, np.zeros((len(along), 2))))
+        reference = network(arms, command)
         moved = np.abs(np.diff(reference, axis=0)).max(axis=1) * (inside[1:] & inside[:-1])
         worst = int(np.argmax(moved))
-        largest[line], where[line] = moved[worst], command[worst + 1, :2]
+        largest[line], where[line] = moved[worst], command[worst + 1]
     return Jumps(largest, where)

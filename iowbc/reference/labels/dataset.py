@@ -24,9 +24,7 @@ class Dataset:
     arm: Array
     """Arm postures, shape (n, 14) [rad]."""
     command: Array
-    """Height [m], torso pitch, roll, yaw [rad], shape (n, 4)."""
-    payload: Array
-    """Mass at each wrist, shape (n, 2) [kg]."""
+    """Height [m] and torso pitch [rad], shape (n, 2)."""
     support: Array
     """The labels: support postures, shape (n, 15) [rad]."""
     base_position: Array
@@ -43,8 +41,7 @@ class Dataset:
     """Height reached, shape (n,) [m]."""
     rejected_arm: Array
     rejected_command: Array
-    rejected_payload: Array
-    """Samples without a label, shapes (r, 14), (r, 4), (r, 2)."""
+    """Samples without a label, shapes (r, 14), (r, 2)."""
     rejected_index: Array
     """Their numbers, shape (r,)."""
     rejected_reason: Array
@@ -87,11 +84,9 @@ def assemble(plan: SamplePlan, result: Shard) -> Dataset:
         group=np.array([plan.group(int(index)) for index in result.kept]),
         arm=np.stack([sample.arm for sample in kept]),
         command=np.stack([sample.command for sample in kept]),
-        payload=np.stack([sample.payload for sample in kept]),
         **result.labels,
         rejected_arm=np.array([sample.arm for sample in rejected]).reshape(-1, len(plan.rest)),
-        rejected_command=np.array([sample.command for sample in rejected]).reshape(-1, 4),
-        rejected_payload=np.array([sample.payload for sample in rejected]).reshape(-1, 2),
+        rejected_command=np.array([sample.command for sample in rejected]).reshape(-1, 2),
         rejected_index=result.rejected,
         rejected_reason=np.array(result.reasons, dtype=np.str_),
     )

@@ -15,9 +15,6 @@ from iowbc.robot.mirror import interaction_mirror
 
 Array = NDArray[Any]
 
-COMMAND_MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
-"""Height and pitch stay, roll and yaw change sign."""
-
 
 class SamplePlan:
     """Sample number i as a function of the recipe and the seed alone.
@@ -44,7 +41,7 @@ class SamplePlan:
         default = float(np.clip(robot.default_height, self.heights[0], self.heights[-1]))
         self.nominal = default, float(np.clip(0.0, self.pitches[0], self.pitches[-1]))
         self.count = self.drawn + int(np.prod(self.grid_shape))
-        dimensions = 6 + 6 + len(arms) + 2
+        dimensions = 2 + 2 + 6 + len(arms)
         self.unit: Array = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random_base2(
             int(np.ceil(np.log2(max(self.original, 2))))
         )
@@ -65,12 +62,12 @@ class SamplePlan:
     def _one(self, index: int, source: int, originals: dict[int, Sample]) -> Sample:
         if index >= self.drawn:
             arms, row, column = np.unravel_index(index - self.drawn, self.grid_shape)
-            command = np.array([self.heights[column], self.pitches[row], 0.0, 0.0])
-            return Sample(self.grid_arms[arms, row], command, np.zeros(2))
+            command = np.array([self.heights[column], self.pitches[row]])
+            return Sample(self.grid_arms[arms, row], command)
         sample = originals[source]
         if index < self.original:
             return sample
-        return Sample(self.mirror(sample.arm), COMMAND_MIRROR * sample.command, sample.payload[::-1].copy())
+        return Sample(self.mirror(sample.arm), sample.command)
 
     def _carrying(self) -> Array:
         """Arms that keep the wrists at their default place in the heading frame, one posture a pitch, (pitches, 14)."""
@@ -84,16 +81,13 @@ class SamplePlan:
 
     def _originals(self, unit: Array) -> list[Sample]:
         command = self._commands(unit)
-        arm = self._arms(unit, command)
-        payload = _scale(unit[:, -2:], self.recipe.sampling.payload)
-        return [Sample(a, c, p) for a, c, p in zip(arm, command, payload, strict=True)]
+        return [Sample(*pair) for pair in zip(self._arms(unit, command), command, strict=True)]
 
     def _commands(self, unit: Array) -> Array:
-        """Height, pitch, roll, yaw, shape (n, 4); some moved onto an edge of height or pitch."""
+        """Height and pitch, shape (n, 2); some moved onto an edge."""
         sampling = self.recipe.sampling
-        ranges = (sampling.height, sampling.pitch, sampling.roll, sampling.yaw)
-        command = np.stack([_scale(unit[:, i], interval) for i, interval in enumerate(ranges)], axis=1)
-        chooser = unit[:, 4]
+        command = np.stack([_scale(unit[:, 0], sampling.height), _scale(unit[:, 1], sampling.pitch)], axis=1)
+        chooser = unit[:, 2]
         if sampling.boundary_share > 0.0:
             edge = np.floor(4.0 * chooser / sampling.boundary_share).astype(int)
             for number, (column, value) in enumerate(
@@ -105,7 +99,7 @@ class SamplePlan:
     def _arms(self, unit: Array, command: Array) -> Array:
         """Arm postures, shape (n, 14): nominal, by wrist positions in the heading or the torso frame, or uniform."""
         sampling, region = self.recipe.sampling, self.recipe.sampling.wrists
-        chooser, place, turn = unit[:, 5], unit[:, 6:12], unit[:, 12:-2]
+        chooser, place, turn = unit[:, 3], unit[:, 4:10], unit[:, 10:]
         arm = self.uniform_lower + turn * (self.uniform_upper - self.uniform_lower)
         nominal = chooser < sampling.nominal_share
         kind = (chooser - sampling.nominal_share) / max(1.0 - sampling.nominal_share, 1e-12)
@@ -136,9 +130,7 @@ def _arm_ranges(robot: Robot, recipe: ReferenceGenerator) -> tuple[Array, Array]
     return lower, upper
 
 
-def _scale(unit: Array, interval: Interval | None) -> Array:
-    """Numbers in [0, 1) spread over an interval; zeros without one."""
-    if interval is None:
-        return np.zeros_like(unit)
+def _scale(unit: Array, interval: Interval) -> Array:
+    """Numbers in [0, 1) spread over an interval."""
     spread: Array = interval.low + unit * (interval.high - interval.low)
     return spread

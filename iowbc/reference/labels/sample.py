@@ -10,9 +10,6 @@ from iowbc.robot import rotations
 
 Array = NDArray[Any]
 
-COMMANDS = ("height", "pitch", "roll", "yaw")
-"""Columns of a full base command: height [m], torso pitch, roll and yaw [rad]."""
-
 
 @dataclass(frozen=True)
 class Sample:
@@ -21,9 +18,7 @@ class Sample:
     arm: Array
     """Positions of the interaction branch, shape (14,) [rad]."""
     command: Array
-    """Height [m], torso pitch, roll, yaw [rad], shape (4,)."""
-    payload: Array
-    """Mass held at each wrist, shape (2,) [kg]."""
+    """Height [m] and torso pitch [rad], shape (2,)."""
 
     @property
     def height(self) -> float:
@@ -31,9 +26,9 @@ class Sample:
         return float(self.command[0])
 
     def torso_rotation(self) -> Array:
-        """Commanded torso orientation against the feet, Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3)."""
-        pitch, roll, yaw = self.command[1:]
-        return rotations.matrix(rotations.from_euler(roll, pitch, yaw))
+        """Commanded torso orientation against the feet: a turn about the lateral axis by the pitch, shape (3, 3)."""
+        level = np.zeros(())
+        return rotations.matrix(rotations.from_euler(level, self.command[1], level))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The robot with its arms locked: base and support branch that carry the inertia of arms and payloads."""
+"""The robot with its arms locked: base and support branch that carry the inertia of the arms."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ Array = NDArray[Any]
 
 
 class SupportModel:
-    """Base and support joints in the robot's order; `lock` sets what arms and payloads add."""
+    """Base and support joints in the robot's order; `lock` sets what the arms add."""
 
     def __init__(self, robot: Robot, problem: Problem) -> None:
         self.robot, self.problem = robot, problem
@@ -34,8 +34,6 @@ class SupportModel:
         self.torso = self.model.getFrameId(robot.torso)
         self.base = self.model.getFrameId(robot.base)
         self._full_torso = self.full.getJointId(self.model.names[self.torso_joint])
-        self._wrists = [self.full.frames[self.full.getFrameId(site)] for site in robot.wrists]
-        self._hands = [self.full.inertias[wrist.parentJoint].copy() for wrist in self._wrists]
         places = mean_stance(problem.stance_width)
         self.stance = [pinocchio.SE3(np.eye(3), place) for place in places]
         margin = problem.limit_margin
@@ -48,10 +46,7 @@ class SupportModel:
         return int(self.model.frames[self.torso].parentJoint)
 
     def lock(self, sample: Sample) -> None:
-        """Hangs the masses on the wrists, and gives the torso the inertia of the arms in their posture."""
-        for wrist, empty, mass in zip(self._wrists, self._hands, sample.payload, strict=True):
-            load = pinocchio.Inertia(float(mass), wrist.placement.translation, np.zeros((3, 3)))
-            self.full.inertias[wrist.parentJoint] = empty + load if mass > 0.0 else empty
+        """Gives the torso the inertia of the arms in their posture."""
         q = self._neutral.copy()
         q[7 + self.robot.interaction] = sample.arm
         pinocchio.forwardKinematics(self.full, self.full_data, q)

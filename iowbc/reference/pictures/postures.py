@@ -47,10 +47,10 @@ def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: Sampl
                 axis, pitch = axes[row, column], plan.pitches[place]
                 axis.axis("off")
                 axis.set_title(f"{height:.2f} m, {pitch:+.2f} rad", fontsize=8)
-                command = np.array([height, pitch, 0.0, 0.0])
+                command = np.array([height, pitch])
                 reason = ""
                 for arms in plan.grid_arms[:, place]:
-                    sample = Sample(arms, command, np.zeros(2))
+                    sample = Sample(arms, command)
                     try:
                         posture = method.solve(sample)
                         judge.label(sample, posture)

@@ -76,28 +76,22 @@ def test_the_com_height_reading_puts_the_centre_of_mass_there(
     assert com[2] == pytest.approx(0.6, abs=2e-3)
 
 
-def test_torso_roll_and_yaw_follow_the_command(
-    method: StaticMethod, support: SupportModel, command: Callable[..., Sample]
-) -> None:
-    sample = command(0.65, 0.2, roll=0.25, yaw=0.3)
-    posture = method.solve(sample)
-    pinocchio.framesForwardKinematics(support.model, support.data, posture.configuration)
-    turned = sample.torso_rotation().T @ support.data.oMf[support.torso].rotation
-    assert np.linalg.norm(pinocchio.log3(turned)) < 0.02
-
-
-def test_a_load_moves_the_body_back(method: StaticMethod, command: Callable[..., Sample]) -> None:
-    empty, loaded = method.solve(command(0.68, 0.2)), method.solve(command(0.68, 0.2, payload=(4.0, 4.0)))
-    assert loaded.configuration[0] < empty.configuration[0] - 0.02
-    assert loaded.wrench[:, 2].sum() - empty.wrench[:, 2].sum() == pytest.approx(8.0 * 9.81, rel=1e-3)
+def test_arms_stretched_forward_move_the_body_back(method: StaticMethod, command: Callable[..., Sample]) -> None:
+    carrying = command(0.68, 0.2)
+    stretched = carrying.arm.copy()
+    stretched[[3, 10]] -= 0.5  # elbows
+    stretched[[0, 7]] -= 0.5  # shoulder pitch
+    posture, far = method.solve(carrying), method.solve(Sample(stretched, carrying.command))
+    assert far.configuration[0] < posture.configuration[0] - 0.005
+    assert far.wrench[:, 2].sum() == pytest.approx(posture.wrench[:, 2].sum(), rel=1e-6)
 
 
 def test_a_mirrored_sample_has_the_mirrored_label(robot: Robot, method: StaticMethod, carrying: Any) -> None:
     arms, legs = interaction_mirror(robot), support_mirror(robot)
     uneven = carrying.copy()
     uneven[:7] += 0.2
-    original = method.solve(Sample(uneven, np.array([0.65, 0.3, 0.0, 0.0]), np.zeros(2)))
-    image = method.solve(Sample(arms(uneven), np.array([0.65, 0.3, 0.0, 0.0]), np.zeros(2)))
+    original = method.solve(Sample(uneven, np.array([0.65, 0.3])))
+    image = method.solve(Sample(arms(uneven), np.array([0.65, 0.3])))
     np.testing.assert_allclose(image.support, legs(original.support), atol=2e-3)
 
 
@@ -143,13 +137,11 @@ def test_no_neighbour_that_is_in_equilibrium_costs_less(
 def test_what_cannot_be_reached_is_rejected(method: StaticMethod, command: Callable[..., Sample]) -> None:
     with pytest.raises(Rejected):
         method.solve(command(0.95, 0.0))
-    with pytest.raises(Rejected):
-        method.solve(command(0.7, 0.0, payload=(60.0, 60.0)))
 
 
 def test_the_label_does_not_depend_on_what_was_solved_before(
     method: StaticMethod, support: SupportModel, recipe: ReferenceGenerator, command: Callable[..., Sample]
 ) -> None:
     fresh = StaticMethod(SupportModel(support.robot, recipe.problem), "pelvis").solve(command(0.6, 0.5))
-    method.solve(command(0.72, -0.2, payload=(3.0, 1.0)))
+    method.solve(command(0.72, -0.2))
     np.testing.assert_array_equal(method.solve(command(0.6, 0.5)).configuration, fresh.configuration)
