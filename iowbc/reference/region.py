@@ -1,17 +1,14 @@
 """Which (height, pitch) can be held: by labels on a grid and around it, and where the fitted network moves gently."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Mask
 from iowbc.control.feasible_map import FeasibleMap, build_map
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
-
-Array = NDArray[Any]
 
 ARMS_COLLIDE = "arms collide"
 """A reason that says nothing of height and pitch."""
@@ -22,7 +19,7 @@ class LabelledRegion:
     """The map of what has labels, and what it was made from, on the grid (pitches, heights)."""
 
     map: FeasibleMap
-    held: NDArray[np.bool_]
+    held: Mask
     """Whether one of the grid's two arm postures has a label."""
     share: Array
     """Share of the samples around a command that have a label; -1 where there were too few."""
@@ -43,7 +40,7 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     on_grid = dataset.index >= plan.drawn
     found = np.zeros(plan.grid_shape, dtype=bool)
     found.ravel()[dataset.index[on_grid] - plan.drawn] = True
-    held: NDArray[np.bool_] = np.any(found, axis=0, keepdims=False)
+    held: Mask = np.any(found, axis=0, keepdims=False)
     told = dataset.rejected_reason != ARMS_COLLIDE
     kept = _around(plan, dataset.command[~on_grid])
     tried = kept + _around(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])

@@ -3,17 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.errors import Interrupted
 from iowbc.recipe.generator import Fit
 from iowbc.reference.fit.task_error import LENGTH_ROWS, ROWS
-
-Array = NDArray[Any]
 
 SMALLEST_SPREAD = 1e-3
 """Least standard deviation by which an input or output is divided: a constant stays constant."""

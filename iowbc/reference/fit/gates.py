@@ -2,17 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.recipe.generator import FitGates
 from iowbc.reference.fit.smoothness import Jumps
 from iowbc.reference.fit.task_error import TaskErrors
 from iowbc.reference.labels.dataset import Dataset
-
-Array = NDArray[Any]
 
 WORST = 10
 
@@ -31,7 +28,7 @@ class Verdict:
 
 
 def judge_fit(
-    gates: FitGates, dataset: Dataset, held: NDArray[np.int64], predicted: Array, errors: TaskErrors, jumps: Jumps
+    gates: FitGates, dataset: Dataset, held: Indices, predicted: Array, errors: TaskErrors, jumps: Jumps
 ) -> Verdict:
     """Compares predictions (n, 15) for the dataset's rows `held` with labels and commands."""
     difference = predicted - dataset.support[held]

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.errors import Interrupted
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.fit.fitting import FitData
@@ -17,8 +16,6 @@ from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 
-Array = NDArray[Any]
-
 
 @dataclass(frozen=True)
 class Prepared:
@@ -26,9 +23,9 @@ class Prepared:
 
     train: FitData
     validation: FitData
-    training: NDArray[np.int64]
+    training: Indices
     """Rows of the dataset that are trained on."""
-    held_out: NDArray[np.int64]
+    held_out: Indices
     """Rows of the dataset kept for the gates."""
     samples: list[Sample]
     """All rows as samples."""
@@ -67,9 +64,7 @@ def prepare(
     return Prepared(learnt, whole.take(validation), train, held_out, samples, kinematics)
 
 
-def split_by_group(
-    group: Array, validation: float, held_out: float, seed: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def split_by_group(group: Array, validation: float, held_out: float, seed: int) -> tuple[Indices, Indices, Indices]:
     """Rows for training, early stopping and the gates; rows of one group stay together, no part is empty."""
     groups = np.random.default_rng(seed).permutation(np.unique(group))
     count = len(groups)

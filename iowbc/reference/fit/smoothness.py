@@ -1,16 +1,13 @@
 """How far the reference jumps for a small step of the command."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.recipe.generator import ReferenceGenerator
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,15 @@
 """What a support posture does to feet, height and torso: errors by forward kinematics, and their Jacobian."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.soles import support_edges, support_margin
 from iowbc.reference.labels.support_model import SupportModel
-
-Array = NDArray[Any]
 
 ROWS = 10
 """Foot position 3, foot rotation 3, height 1, torso rotation 3."""

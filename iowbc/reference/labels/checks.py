@@ -1,19 +1,16 @@
 """Labels held against each other: static ones against optimal control, mirrored samples against their originals."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.shards import Shard
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import support_mirror
-
-Array = NDArray[Any]
 
 WORST = 5
 

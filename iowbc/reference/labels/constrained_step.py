@@ -1,14 +1,10 @@
 """One step of constrained least squares: what every method here solves again and again."""
 
-from typing import Any
-
 import daqp
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.errors import Rejected
-
-Array = NDArray[Any]
 
 REGULARISATION = 1e-9
 """Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""

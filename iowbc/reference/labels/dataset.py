@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.shards import Shard
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,18 @@
 """The physical gates of a label, judged on the whole robot and independent of the method that made it."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.self_collision import SelfCollision
 from iowbc.reference.labels.soles import sole_limits, support_edges, support_margin
 from iowbc.reference.labels.support_model import SupportModel
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,14 @@
 """A posture that meets a command by kinematics alone: where the optimal control problem begins."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.reference.labels.constrained_step import constrained_step
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.support_model import SupportModel, posture_weights
-
-Array = NDArray[Any]
 
 
 class KinematicStart:

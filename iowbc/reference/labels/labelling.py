@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.gates import Judge
 from iowbc.reference.labels.plan import SamplePlan
@@ -14,13 +14,11 @@ from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import load_robot
 
-Array = NDArray[Any]
-
 
 class Solver(Protocol):
     """What a worker process holds: it draws samples and labels them one at a time."""
 
-    def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
+    def draw(self, indices: Indices) -> list[Sample]:
         """The samples of these numbers."""
 
     def solve(self, index: int, sample: Sample) -> dict[str, Array]:
@@ -59,7 +57,7 @@ class Labeller:
         self.judge = Judge(self.support, recipe.gates, recipe.height)
         self.method = make_method(task.method, self.support, recipe)
 
-    def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
+    def draw(self, indices: Indices) -> list[Sample]:
         """The samples of these numbers."""
         return self.plan.draw(indices)
 

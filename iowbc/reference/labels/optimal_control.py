@@ -10,16 +10,14 @@ from typing import Any
 import crocoddyl
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.kinematic_start import KinematicStart
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.soles import distribute, sole_limits
 from iowbc.reference.labels.support_model import SupportModel, posture_weights
-
-Array = NDArray[Any]
 
 STOP = 1e-10
 """Expected improvement at which the solver ends; crocoddyl's own 5e-5 leaves flat postures where they started."""

@@ -1,19 +1,15 @@
 """Which arms and commands are labelled: a scrambled Sobol sequence, with edges, nominal arms and mirror images."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from iowbc.arrays import Array, Indices
 from iowbc.control.arms import ArmKinematics
 from iowbc.recipe.generator import Interval, ReferenceGenerator
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.reference.labels.sample import Sample
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror
-
-Array = NDArray[Any]
 
 
 class SamplePlan:
@@ -50,7 +46,7 @@ class SamplePlan:
         """Samples of one group are mirror images of each other and stay on one side of the held-out split."""
         return index - self.original if self.original <= index < self.drawn else index
 
-    def draw(self, indices: NDArray[np.int64]) -> list[Sample]:
+    def draw(self, indices: Indices) -> list[Sample]:
         """The samples of these numbers; each depends on its own number only."""
         found: dict[int, Sample] = {}
         wanted = np.array([self.group(int(index)) for index in indices], dtype=np.int64)

@@ -1,14 +1,11 @@
 """A point of the dataset: what is asked of the robot."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.robot import rotations
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

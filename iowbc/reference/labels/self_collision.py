@@ -6,12 +6,9 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Capsule
-
-Array = NDArray[Any]
 
 
 class SelfCollision:

@@ -4,25 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array, Indices
 from iowbc.files import newest_checked, write_checked
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)
 class Shard:
     """Labels of some samples and the reasons why others have none."""
 
-    kept: NDArray[np.int64]
+    kept: Indices
     """Numbers of the labelled samples, shape (k,)."""
     labels: Mapping[str, Array]
     """Arrays of the labels, leading dimension k."""
-    rejected: NDArray[np.int64]
+    rejected: Indices
     """Numbers of the samples without a label, shape (r,)."""
     reasons: Sequence[str]
     """Why, one for each of them."""

@@ -1,20 +1,17 @@
 """What two soles on the ground can carry: wrenches, the support polygon, and the wrenches that hold a posture."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from iowbc.arrays import Array
 from iowbc.recipe.generator import Problem
 from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
 from iowbc.reference.labels.sample import mean_stance
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import Problem
 from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
@@ -17,8 +17,6 @@ from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.soles import sole_limits
 from iowbc.reference.labels.support_model import SupportModel, posture_weights
 from iowbc.robot.description import GRAVITY
-
-Array = NDArray[Any]
 
 
 class StaticMethod:

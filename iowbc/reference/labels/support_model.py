@@ -4,14 +4,12 @@ from typing import Any
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.recipe.generator import Problem
 from iowbc.reference.labels.sample import Sample, mean_stance
 from iowbc.robot.description import Robot
 from iowbc.robot.pinocchio_model import build_model
-
-Array = NDArray[Any]
 
 
 class SupportModel:

@@ -1,14 +1,17 @@
 """Figures of the dataset and of the fitted network."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.patches import Patch
 
+from iowbc.arrays import Array
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.recipe.generator import FitGates
 from iowbc.reference.fit.smoothness import Jumps
@@ -18,12 +21,13 @@ from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.region import GentleRegion, LabelledRegion
 
-Array = NDArray[Any]
-
 DOTS = 140
 """Resolution of the pictures [1/inch]."""
 INK, SOFT, WARM = "#1f3b57", "#8fb1cc", "#d1603d"
-BINS = 60
+PALE = "#e4ebf1"
+BINS, FEWEST_BINS = 60, 20
+SHOWN = 99.8
+"""Percentile at which the axis of an error ends, so that a single outlier does not squeeze the rest."""
 
 
 def dataset_figures(
@@ -40,7 +44,8 @@ def dataset_figures(
     _physics(folder / "labels.png", plan, dataset)
     if check is not None:
         figure, (axes,) = _figure(1, 1, 5.0, 3.4)
-        _histogram(axes, check.difference, plan.recipe.crosscheck.p90_limit, "largest joint difference [rad]")
+        limit = Limit(plan.recipe.crosscheck.p90_limit, "limit of the 90th percentile")
+        _histogram(axes, check.difference, "largest joint difference [rad]", limit, everything=True)
         axes.set_title(f"static labels against optimal control, {check.count} samples")
         _write(figure, folder / "crosscheck.png")
 
@@ -57,13 +62,16 @@ def error_figures(
     """Histograms of the held-out errors with their gates, and the error of each joint."""
     figure, axes = _figure(2, 3, 11.0, 6.0)
     per_sample = np.sqrt(((predicted - labels) ** 2).mean(axis=1))
-    _histogram(axes[0], per_sample, gates.joint_rmse, "joint RMSE of a sample [rad]")
-    _histogram(axes[1], 1e3 * np.abs(errors.height), _scaled(gates.height_p95, 1e3), "height error [mm]")
-    _histogram(axes[2], np.abs(errors.pitch), gates.pitch_p95, "torso pitch error [rad]")
-    _histogram(axes[3], 1e3 * errors.foot, _scaled(gates.foot_p95, 1e3), "foot mismatch [mm]")
-    _histogram(axes[4], 1e2 * errors.margin, _scaled(gates.margin_p1, 1e2), "support margin [cm]", top=100.0)
-    _histogram(axes[5], jumps.largest, gates.jump, "largest jump on a line [rad]", top=100.0)
-    figure.suptitle(f"Held-out errors of the reference generator, {len(labels)} samples (dashed: gate)")
+    most, p95, p1 = "gate of the RMSE of all", "gate of the 95th percentile", "gate of the 1st percentile"
+    _histogram(axes[0], per_sample, "joint RMSE of a sample [rad]", _limit(gates.joint_rmse, most))
+    _histogram(axes[1], 1e3 * np.abs(errors.height), "height error [mm]", _limit(gates.height_p95, p95, 1e3))
+    _histogram(axes[2], np.abs(errors.pitch), "torso pitch error [rad]", _limit(gates.pitch_p95, p95))
+    _histogram(axes[3], 1e3 * errors.foot, "foot mismatch [mm]", _limit(gates.foot_p95, p95, 1e3))
+    margin = _limit(gates.margin_p1, p1, 1e2)
+    _histogram(axes[4], 1e2 * errors.margin, "support margin [cm]", margin, everything=True)
+    jump = _limit(gates.jump, "gate of the largest")
+    _histogram(axes[5], jumps.largest, "largest jump on a line [rad]", jump, counted="lines", everything=True)
+    figure.suptitle(f"Held-out errors of the reference generator, {len(labels)} samples")
     _write(figure, folder / "errors.png")
 
     figure, (axis,) = _figure(1, 1, 7.0, 4.2)
@@ -72,6 +80,7 @@ def error_figures(
     axis.set_yticks(np.arange(len(joints)), [name.removesuffix("_joint").replace("_", " ") for name in joints])
     axis.invert_yaxis()
     axis.set_xlabel("held-out RMSE [rad]")
+    axis.set_title(f"Error of each joint, {len(labels)} samples")
     _write(figure, folder / "joints.png")
 
 
@@ -82,8 +91,8 @@ def gentle_figure(folder: Path, plan: SamplePlan, region: GentleRegion, held: Fe
     shown = axes.pcolormesh(
         plan.pitches, plan.heights, region.jump.T, cmap="Blues_r", vmin=0.0, vmax=top, shading="nearest"
     )
-    figure.colorbar(shown, ax=axes, label="largest joint move for one step [rad]")
-    _outline(axes, plan, held, "has labels", "--")
+    figure.colorbar(shown, ax=axes, label="largest joint move for one step [rad]", extend="max")
+    _outline(axes, plan, held, "map of labelled commands", "--")
     _outline(axes, plan, region.map, "feasible map")
     axes.legend(loc="lower left")
     _write(figure, folder / "feasible_map.png")
@@ -103,18 +112,20 @@ def learning_figure(folder: Path, training: Sequence[float], validation: Sequenc
 
 def _labelled_map(path: Path, plan: SamplePlan, region: LabelledRegion) -> None:
     figure, (left, right) = _figure(1, 2, 10.0, 4.2)
-    left.pcolormesh(plan.pitches, plan.heights, region.held.T, cmap="Blues", vmin=-0.6, vmax=1.6, shading="nearest")
-    left.set_title("has a label with one of two arm postures")
+    colours = ListedColormap([PALE, SOFT])
+    left.pcolormesh(plan.pitches, plan.heights, region.held.T, cmap=colours, vmin=0.0, vmax=1.0, shading="nearest")
+    left.set_title("commands with a label for one of two arm postures")
     share = np.ma.masked_array(region.share.T, region.share.T < 0.0)
     shown = right.pcolormesh(plan.pitches, plan.heights, share, cmap="viridis", vmin=0.0, vmax=1.0, shading="nearest")
-    right.set_title("share of all arm postures that have a label")
-    figure.colorbar(shown, ax=right)
+    right.set_title("all arm postures tried nearby (white: too few)")
+    figure.colorbar(shown, ax=right, label="share with a label")
     if share.mask.all():
         text = f"no window of commands was tried {plan.recipe.feasible.enough} times"
         right.text(0.5, 0.5, text, ha="center", va="center", transform=right.transAxes, color=INK)
     for axes in (left, right):
-        _outline(axes, plan, region.map, "has labels")
-    left.legend(loc="lower left")
+        _outline(axes, plan, region.map, "map of labelled commands")
+    cells = [Patch(color=SOFT, label="label"), Patch(color=PALE, label="no label")]
+    left.legend(handles=[*cells, *left.get_lines()], loc="lower left")
     _write(figure, path)
 
 
@@ -144,28 +155,51 @@ def _rejections(path: Path, kept: int, rejected: Mapping[str, int]) -> None:
 def _physics(path: Path, plan: SamplePlan, dataset: Dataset) -> None:
     figure, (left, middle, right) = _figure(1, 3, 11.0, 3.4)
     effort = plan.robot.effort[plan.robot.support]
-    _histogram(left, np.abs(dataset.torque / effort).max(axis=1), None, "largest torque over its limit", top=100.0)
-    _histogram(middle, 1e2 * dataset.margin, plan.recipe.gates.support_margin * 1e2, "support margin [cm]", top=100.0)
-    _histogram(
-        right, 1e3 * (dataset.reached - dataset.command[:, 0]), None, "height error of the labels [mm]", top=100.0
-    )
+    torque = np.abs(dataset.torque / effort).max(axis=1)
+    _histogram(left, torque, "largest torque over its limit", everything=True)
+    least = _limit(plan.recipe.gates.support_margin, "least that is kept", 1e2)
+    _histogram(middle, 1e2 * dataset.margin, "support margin [cm]", least, everything=True)
+    _histogram(right, 1e3 * (dataset.reached - dataset.command[:, 0]), "height error [mm]", everything=True)
+    figure.suptitle(f"What the labels need and how well they do, {len(dataset)} samples")
     _write(figure, path)
 
 
-def _histogram(axes: Any, values: Array, limit: float | None, label: str, top: float = 99.8) -> None:
-    """Counts up to a percentile, with the gate as a dashed line."""
-    low, high = float(values.min()), float(np.percentile(values, top))
-    high = max(high, limit or high)
-    axes.hist(values, bins=np.linspace(low, high + 1e-9, BINS), color=SOFT, edgecolor=INK, linewidth=0.3)
+@dataclass(frozen=True)
+class Limit:
+    """A limit and what it holds for."""
+
+    value: float
+    meaning: str
+
+
+def _limit(value: float | None, meaning: str, factor: float = 1.0) -> Limit | None:
+    return None if value is None else Limit(factor * value, meaning)
+
+
+def _histogram(
+    axes: Any,
+    values: Array,
+    label: str,
+    limit: Limit | None = None,
+    *,
+    counted: str = "samples",
+    everything: bool = False,
+) -> None:
+    """Counts, with the limit as a dashed line; says how many lie beyond the axis where not `everything` is drawn."""
+    low, high = float(values.min()), float(values.max() if everything else np.percentile(values, SHOWN))
     if limit is not None:
-        axes.axvline(limit, color=WARM, linestyle="--")
+        low, high = min(low, limit.value), max(high, limit.value)
+    bins = min(BINS, max(FEWEST_BINS, len(values) // 4))
+    drawn, _, _ = axes.hist(values, np.linspace(low, high + 1e-9, bins), color=SOFT, edgecolor=INK, linewidth=0.3)
+    if beyond := len(values) - int(drawn.sum()):
+        text = f"{beyond} beyond, up to {values.max():.3g}"
+        axes.text(0.98, 0.6, text, ha="right", transform=axes.transAxes, fontsize="small", color=INK)
+    if limit is not None:
+        axes.axvline(limit.value, color=WARM, linestyle="--", label=limit.meaning)
+        axes.legend(fontsize="small")
     axes.locator_params(axis="x", nbins=5)
     axes.set_xlabel(label)
-    axes.set_ylabel("samples")
-
-
-def _scaled(limit: float | None, factor: float) -> float | None:
-    return None if limit is None else factor * limit
+    axes.set_ylabel(counted)
 
 
 def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Any]]:

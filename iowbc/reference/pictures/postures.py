@@ -62,6 +62,9 @@ def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: Sampl
                 else:
                     axis.imshow(np.full((SIZE, SIZE, 3), EMPTY, dtype=np.uint8))
                     axis.text(0.5, 0.5, reason, ha="center", va="center", transform=axis.transAxes, fontsize=8)
+        figure.suptitle(
+            f"Support postures by {recipe.height} height and torso pitch (grey: no label, and why)", fontsize=11
+        )
         figure.savefig(path, dpi=110)
     finally:
         studio.offscreen.close()
