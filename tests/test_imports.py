@@ -16,7 +16,7 @@ SHARED = DESCRIPTIONS | {"control"}
 WORLD = SHARED | {"sim"}
 MAY_IMPORT = {
     "errors": set(),
-    "files": set(),
+    "files": {"errors"},
     "arrays": set(),
     "processes": set(),
     "counter_random": {"recipe", "errors", "arrays"},

@@ -51,7 +51,7 @@ def test_a_label_of_other_arms_is_not_in_equilibrium(
     support: SupportModel, judge: Judge, sample: Sample, label: Posture, carrying: Any
 ) -> None:
     stretched = carrying.copy()
-    stretched[[3, 10]] -= 0.5  # elbows
+    stretched[[0, 7]] -= 0.8  # shoulder pitch
     other = Sample(stretched, sample.command)
     support.lock(other)
     with pytest.raises(Rejected, match="equilibrium"):
