@@ -3,6 +3,7 @@
 The names below are what users' own code imports; each is read from its module when it is first asked for.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from iowbc.recipe.reading.loading import load_recipe
     from iowbc.recipe.recipe import Recipe
     from iowbc.task.vector.vector_env import VectorEnv
+
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
 
 __version__ = "0.1.0"
 __all__ = [

@@ -116,6 +116,9 @@ class Contract(Section):
                 raise ValueError(f"{name}: {len(values)} numbers {values} for {joints} joints")
         if sorted((*self.support, *self.interaction)) != list(range(joints)):
             raise ValueError(f"support {self.support} and interaction {self.interaction} do not cover {joints} joints")
+        outside = [name for name in self.files if ".." in Path(name).parts or Path(name).is_absolute()]
+        if outside:
+            raise ValueError(f"files: {', '.join(outside)} lie outside of the folder")
         if len(self.action_scale) != len(self.support):
             raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
         return self
@@ -138,12 +141,10 @@ def seal(contract: Contract, folder: Path) -> Contract:
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
+    if not (folder / CONTRACT).is_file():
+        raise ContractBroken(f"{folder}: no exported policy, {CONTRACT} missing; give the folder that `export` made")
     try:
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
-    except FileNotFoundError as error:
-        raise ContractBroken(
-            f"{folder}: no exported policy, {CONTRACT} missing; give the folder that `export` made"
-        ) from error
     except ValidationError as error:
         raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 2: {error}; export again") from error
     unsealed = [name for name in (GRAPH, f"{ROBOT}/{DESCRIPTION}") if name not in contract.files]

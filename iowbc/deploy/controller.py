@@ -5,7 +5,7 @@ targets = controller.step(Measured(...), command)     # every 1 / controller.fre
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,13 +13,15 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
 from iowbc.control import gait
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, read_contract
+from iowbc.deploy.guard import TargetGuard
+from iowbc.deploy.session import Values, open_session, run
 from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
@@ -41,6 +43,32 @@ class Targets:
     """The policy's residual action, (n, 15)."""
     support_reference: Array
     """θ_S_ref with the gait prior, (n, 15) [rad]."""
+    held: Mask
+    """Robots whose last good targets are held, because the new ones are no numbers or jump, (n,)."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What the control loop remembers of n robots from one step to the next."""
+
+    command: Array
+    """C in force, (n, 11)."""
+    arms: Array
+    """θ_I_ref, (n, arm joints) [rad]."""
+    posture: Array
+    """θ_S_ref without the gait prior, (n, support joints) [rad]."""
+    heading_reference: Array
+    """Measured heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
+    phase: Array
+    """Gait phase, (n,)."""
+    stepping: Mask
+    """Whether the gait clock runs, (n,)."""
+    starts: Mask
+    """Robots whose next step is their first, (n,)."""
+    action: Array
+    """The action that the motors follow, (n, support joints) float32."""
+    history: Array
+    """H_t, as the graph returned it, float32."""
 
 
 class GraphReferences(ReferenceLayer):
@@ -73,21 +101,26 @@ class Controller:
         self._references = GraphReferences(robot, contract, feasible, self._support_reference)
         self._largest_step = rate_limits(contract.commands.rates) / self.frequency
         self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
-        self._inputs = {port.name: np.zeros((robots, *port.shape), np.float32) for port in contract.inputs}
-        if "object_quaternion" in self._inputs:
-            self._inputs["object_quaternion"][:, 0] = 1.0
-        self.inputs: dict[str, NDArray[np.float32]] = {}
-        self.outputs: dict[str, NDArray[np.float32]] = {}
-        actions = len(contract.support)
-        self._command: Array = np.zeros((robots, len(COMMAND)))
+        self._blank = {port.name: np.zeros((robots, *port.shape), np.float32) for port in contract.inputs}
+        if "object_quaternion" in self._blank:
+            self._blank["object_quaternion"][:, 0] = 1.0
+        self._guard = TargetGuard(robots, np.array(contract.velocity_limit), 1.0 / self.frequency)
+        self.inputs: Values = {}
+        self.outputs: Values = {}
+        support, arms = len(contract.support), len(contract.interaction)
         self._grasp: Array = np.zeros((robots, 2, 3))
         self._load: Array = np.zeros(robots)
-        self._arms: Array = np.zeros((robots, len(contract.interaction)))
-        self._support: Array = np.zeros((robots, actions))
-        self._phase: Array = np.zeros(robots)
-        self._heading_reference: Array = np.zeros(robots)
-        self._stepping = np.zeros(robots, np.bool_)
-        self._starts = np.ones(robots, np.bool_)
+        self._loop = Loop(
+            command=np.zeros((robots, len(COMMAND))),
+            arms=np.zeros((robots, arms)),
+            posture=np.zeros((robots, support)),
+            heading_reference=np.zeros(robots),
+            phase=np.zeros(robots),
+            stepping=np.zeros(robots, np.bool_),
+            starts=np.ones(robots, np.bool_),
+            action=self._blank["last_action"],
+            history=self._blank["history"],
+        )
         self.reset()
 
     @classmethod
@@ -106,13 +139,19 @@ class Controller:
             raise ContractBroken(f"{folder / GRAPH}: inputs are {found}, the contract says {said}; export again")
         map_file = f"{GENERATOR}/{FEASIBLE}"
         feasible = FeasibleMap.load(folder / map_file) if map_file in contract.files else None
-        return cls(contract, robot, session, feasible, robots)
+        controller = cls(contract, robot, session, feasible, robots)
+        broken = [name for name, value in run(session, controller._blank).items() if not np.isfinite(value).all()]
+        if broken:
+            raise ContractBroken(
+                f"{folder / GRAPH}: {', '.join(broken)} not finite: the weights are no numbers; export again"
+            )
+        return controller
 
     def reset(self, which: NDArray[np.bool_] | None = None, *, scene: str | None = None) -> None:
         """Forget the past of the marked robots, (n,), or of all; `scene` chooses base grasp and expected load
         ("lift" at first)."""
         which = np.ones(self.robots, np.bool_) if which is None else which
-        self._starts |= which
+        self._loop = replace(self._loop, starts=self._loop.starts | which)
         if scene is not None or not self._grasp.any():
             self._grasp[which] = both_wrists(base_grasp(self.contract.references.grasps, scene or "lift"))
             self._load[which] = getattr(self.contract.references.loads, scene or "lift")
@@ -121,67 +160,82 @@ class Controller:
         """Joint targets for the next control period.
 
         command: C, (n, 11) or (11,); clamped to the feasible map, and approached at the rates of training unless
-        `limit_rates` is off. Raises ValueError for a shape that does not fit or a value that is not finite.
+        `limit_rates` is off. Targets that are not finite, or further away than joints move in the time, are not passed
+        on: see `Targets.held`. Raises ValueError for a shape that does not fit or a value that is not finite, and is
+        then as before the call.
         """
         wanted = np.asarray(command, np.float64)
         if wanted.ndim == 1:
             wanted = np.tile(wanted, (self.robots, 1))
-        self._check("command", wanted, self._command.shape)
-        starts = self._starts.copy()
-        limited = approach(self._command, wanted, self._largest_step) if limit_rates else wanted
-        self._command = self._references.clamp(np.where(starts[:, None], wanted, limited))
-        self._advance(starts)
-        for name in (field.name for field in fields(measured)):
-            if name in self._inputs:
-                value = getattr(measured, name)
-                self._check(name, value, self._inputs[name].shape)
-                self._inputs[name][:] = value
-        self._heading_reference[starts] = self._inputs["heading"][starts, 0]
-        self.inputs = self._inputs | self._as_inputs(
-            command=self._command,
-            arm_reference=self._arms,
-            heading_reference=self._heading_reference[:, None],
-            gait=np.stack([self._phase, self._stepping], axis=1),
-            restart=starts[:, None],
+        self._check("command", wanted, self._loop.command.shape)
+        given = self._given(measured)
+        loop = self._advanced(wanted, limit_rates)
+        heading = np.where(loop.starts, given["heading"][:, 0], loop.heading_reference)
+        inputs = (
+            self._blank
+            | given
+            | self._as_inputs(
+                command=loop.command,
+                arm_reference=loop.arms,
+                heading_reference=heading[:, None],
+                gait=np.stack([loop.phase, loop.stepping], axis=1),
+                last_action=loop.action,
+                history=loop.history,
+                restart=loop.starts[:, None],
+            )
         )
-        self.outputs = outputs = self._run(self.inputs)
-        self._starts[:] = False
-        self._heading_reference += self._command[:, YAW_RATE] / self.frequency
-        self._inputs["history"], self._inputs["last_action"] = outputs["history_next"], outputs["action"].copy()
+        outputs = run(self._session, inputs)
         position = np.empty((self.robots, len(self.contract.joints)))
         position[:, self.robot.support] = outputs["support_target"]
         position[:, self.robot.interaction] = self._references.arm_target(
-            self._arms, self._support, self._command, self._load
+            loop.arms, loop.posture, loop.command, self._load
         )
-        return Targets(position, self._kp, self._kd, outputs["action"], outputs["support_reference"])
+        passed, held = self._guard.passed(position, loop.starts, given["joint_position"].astype(np.float64))
+        whole: Mask = np.asarray(np.isfinite(outputs["history_next"]).all(axis=(1, 2)))
+        self._loop = replace(
+            loop,
+            starts=np.zeros(self.robots, np.bool_),
+            heading_reference=heading + loop.command[:, YAW_RATE] / self.frequency,
+            action=np.where(held[:, None], loop.action, outputs["action"]),
+            history=np.where(whole[:, None, None], outputs["history_next"], loop.history),
+        )
+        self.inputs, self.outputs = inputs, outputs
+        return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held)
 
-    def _advance(self, starts: NDArray[np.bool_]) -> None:
-        """References and gait clock of this step; robots that start are settled in their grasp."""
+    def _given(self, measured: Measured) -> Values:
+        """The measured inputs of the graph, checked."""
+        names = [field.name for field in fields(measured) if field.name in self._blank]
+        for name in names:
+            self._check(name, getattr(measured, name), self._blank[name].shape)
+        return self._as_inputs(**{name: getattr(measured, name) for name in names})
+
+    def _advanced(self, wanted: Array, limit_rates: bool) -> Loop:
+        """Command, references and gait clock of this step; robots that start are settled in their grasp."""
+        loop, starts = self._loop, self._loop.starts
         settings, dt = self.contract.references.gait, 1.0 / self.frequency
-        moving = gait.wants_to_move(self._command, settings)
-        arms, support = self._references.advance(self._arms, self._support, self._command, self._grasp, dt)
-        phase, stepping = gait.advance(self._phase, self._stepping, moving, settings, dt)
+        limited = approach(loop.command, wanted, self._largest_step) if limit_rates else wanted
+        command = self._references.clamp(np.where(starts[:, None], wanted, limited))
+        moving = gait.wants_to_move(command, settings)
+        arms, posture = self._references.advance(loop.arms, loop.posture, command, self._grasp, dt)
+        phase, stepping = gait.advance(loop.phase, loop.stepping, moving, settings, dt)
+        action = loop.action
         if starts.any():
-            settled = self._references.start(self._command, self._grasp)
-            arms, support = (
-                np.where(starts[:, None], new, old) for new, old in zip(settled, (arms, support), strict=True)
+            settled = self._references.start(command, self._grasp)
+            arms, posture = (
+                np.where(starts[:, None], new, old) for new, old in zip(settled, (arms, posture), strict=True)
             )
             phase, stepping = np.where(starts, 0.0, phase), stepping & ~starts
-            self._inputs["last_action"][starts] = 0.0
-        self._arms, self._support, self._phase, self._stepping = arms, support, phase, stepping
+            action = np.where(starts[:, None], np.float32(0.0), action)
+        return replace(loop, command=command, arms=arms, posture=posture, phase=phase, stepping=stepping, action=action)
 
     def _support_reference(self, arms: Array, command: Array) -> Array:
         """θ_S_ref at rest, without the gait prior, from the generator inside the graph, (n, 15) [rad]."""
-        outputs = self._run(self._inputs | self._as_inputs(command=command, arm_reference=arms))
+        outputs = run(self._session, self._blank | self._as_inputs(command=command, arm_reference=arms))
         return np.asarray(outputs["support_reference"], np.float64)
 
     @staticmethod
     def _as_inputs(**values: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
         return {name: np.array(value, np.float32) for name, value in values.items()}
-
-    def _run(self, inputs: dict[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
-        names = [port.name for port in self.contract.outputs]
-        return dict(zip(names, self._session.run(names, inputs), strict=True))
 
     @staticmethod
     def _check(name: str, value: Array | None, shape: tuple[int, ...]) -> None:
@@ -189,15 +243,10 @@ class Controller:
             raise ValueError(f"{name}: this policy needs it, with shape {shape}; got nothing")
         if np.shape(value) != shape:
             raise ValueError(f"{name}: expected shape {shape}, got {np.shape(value)}")
-        if not np.isfinite(value).all():
+        with np.errstate(over="ignore"):
+            finite = np.isfinite(np.asarray(value, np.float32)).all()
+        if not finite:
             raise ValueError(f"{name}: not finite: {value}")
-
-
-def open_session(path: Path) -> onnxruntime.InferenceSession:
-    """A session on one thread: the graph is small, and a control loop shares its processor."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 
 def base_grasp(grasps: Grasps, scene: str) -> tuple[float, float, float]:

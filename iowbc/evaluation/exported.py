@@ -34,7 +34,8 @@ class ExportedPolicy:
         measured = Measured.of(batch.measured)
         targets = self.controller.step(measured, batch.command, limit_rates=False)
         expected = batch.targets(targets.action)
-        self.largest_difference = max(self.largest_difference, float(np.abs(expected - targets.position).max()))
+        passed = np.abs(expected - targets.position)[~targets.held]
+        self.largest_difference = max(self.largest_difference, float(passed.max(initial=0.0)))
         if len(self.inputs) < self.golden_steps:
             self.inputs.append({name: value[:1].copy() for name, value in self.controller.inputs.items()})
             self.outputs.append({name: value[:1].copy() for name, value in self.controller.outputs.items()})

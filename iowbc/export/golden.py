@@ -8,7 +8,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-Values = dict[str, NDArray[np.float32]]
+from iowbc.deploy.session import Values
 
 INPUT, OUTPUT = "input/", "output/"
 """Prefixes of the names in `golden.npz`."""
@@ -40,12 +40,6 @@ def largest_difference(expected: Values, actual: Values) -> dict[str, float]:
     return {
         name: float(np.nan_to_num(np.abs(value - actual[name]), nan=np.inf).max()) for name, value in expected.items()
     }
-
-
-def run_session(session: onnxruntime.InferenceSession, inputs: Values) -> Values:
-    """Outputs of the session by name."""
-    names = [port.name for port in session.get_outputs()]
-    return dict(zip(names, session.run(names, inputs), strict=True))
 
 
 def inference_seconds(session: onnxruntime.InferenceSession, inputs: Values, repeats: int) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import onnx
 import torch
 
-from iowbc.export.golden import Values
+from iowbc.deploy.session import Values
 from iowbc.export.graph import ControllerGraph
 
 LEADING_AXIS = "robots"

@@ -24,7 +24,8 @@ def run(job: Job) -> None:
     from iowbc.control.generator import ReferenceNetwork
     from iowbc.control.observation import observation_layout
     from iowbc.deploy import contract
-    from iowbc.deploy.controller import open_session
+    from iowbc.deploy.session import open_session
+    from iowbc.deploy.session import run as run_graph
     from iowbc.evaluation.acceptance import try_out
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
@@ -64,7 +65,7 @@ def run(job: Job) -> None:
     inputs = golden.stacked(policy.inputs)
     expected = run_torch(graph, inputs)
     session = open_session(job.out / contract.GRAPH)
-    differences = golden.largest_difference(expected, golden.run_session(session, inputs))
+    differences = golden.largest_difference(expected, run_graph(session, inputs))
     golden.write_golden(inputs, expected, job.out / contract.GOLDEN)
     seconds = golden.inference_seconds(session, inputs, settings.timing_steps)
 

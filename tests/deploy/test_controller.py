@@ -1,17 +1,23 @@
 """The exported controller: what it refuses, what it keeps, and that it needs no torch."""
 
+import contextlib
 import json
+import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 
-from iowbc.deploy.contract import CONTRACT, GRAPH, read_contract
+from iowbc.deploy import controller as controller_module
+from iowbc.deploy.contract import CONTRACT, GRAPH, Contract, read_contract, seal
 from iowbc.deploy.controller import Controller, Measured
 from iowbc.errors import ContractBroken
 from iowbc.recipe.recipe import Recipe
@@ -213,3 +219,80 @@ def test_the_controller_runs_without_torch_and_mujoco(exported: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_refused_step_leaves_the_controller_as_it_was(exported: Path, robot: Robot) -> None:
+    tried, other = Controller.load(exported), Controller.load(exported)
+    moving = NOMINAL + np.array([0.3, *[0.0] * 10])
+    for controller in (tried, other):
+        controller.step(measured(robot), moving)
+    refused = {"joint_velocity": np.full((1, 29), 1e300), "object_position": None, "joint_position": np.zeros(3)}
+    for name, value in refused.items():
+        with pytest.raises(ValueError, match=name):
+            tried.step(replace(measured(robot), **{name: value}), moving)
+    with pytest.raises(ValueError, match="command"):
+        tried.step(measured(robot), np.full(11, np.nan))
+    for _ in range(3):
+        ours, theirs = (controller.step(measured(robot), moving) for controller in (tried, other))
+        assert np.array_equal(ours.position, theirs.position)
+
+
+def test_targets_that_are_no_numbers_are_not_passed_on(
+    exported: Path, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller, graph = Controller.load(exported, robots=2), controller_module.run
+    good = controller.step(measured(robot, 2), NOMINAL)
+
+    def broken(session: Any, inputs: Any) -> Any:
+        outputs = graph(session, inputs)
+        for name in ("support_target", "action", "history_next"):
+            outputs[name][1] = np.nan
+        return outputs
+
+    monkeypatch.setattr(controller_module, "run", broken)
+    bad = controller.step(measured(robot, 2), NOMINAL)
+    assert bad.held.tolist() == [False, True]
+    assert np.array_equal(bad.position[1], good.position[1])
+    monkeypatch.setattr(controller_module, "run", graph)
+    again = controller.step(measured(robot, 2), NOMINAL)
+    assert not again.held.any()
+    assert np.isfinite(again.position).all()
+
+
+def test_weights_that_are_no_numbers_are_refused(exported: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(exported, tmp_path / "weights")
+    model = onnx.load(folder / GRAPH)
+    weights = next(tensor for tensor in model.graph.initializer if tensor.data_type == onnx.TensorProto.FLOAT)
+    for tensor in model.graph.initializer:
+        if tensor.data_type == onnx.TensorProto.FLOAT and len(tensor.raw_data) > len(weights.raw_data):
+            weights = tensor
+    weights.raw_data = np.full(len(weights.raw_data) // 4, np.nan, np.float32).tobytes()
+    onnx.save(model, folder / GRAPH)
+    seal(Contract.model_validate_json((folder / CONTRACT).read_text()), folder)
+    with pytest.raises(ContractBroken, match="not finite: the weights are no numbers"):
+        Controller.load(folder)
+
+
+@pytest.mark.parametrize("name", ["../policy.onnx", "/etc/passwd"])
+def test_a_contract_that_names_files_outside_of_its_folder_is_refused(
+    name: str, exported: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(ContractBroken, match="outside of the folder"):
+        read_contract(changed(exported, tmp_path / "outside", files={name: "0"}))
+
+
+def test_loading_a_controller_tells_nobody(exported: Path, tmp_path: Path) -> None:
+    program = f"import iowbc, time\niowbc.Controller.load({str(exported)!r})\ntime.sleep(1.0)\n"
+    asked: list[str] = []
+    with socket.create_server(("127.0.0.1", 0)) as proxy:
+        proxy.settimeout(0.1)
+        address = f"http://127.0.0.1:{proxy.getsockname()[1]}"
+        places = {"http_proxy": address, "https_proxy": address, "HTTPS_PROXY": address, "TMPDIR": str(tmp_path)}
+        environment = {name: value for name, value in os.environ.items() if name != "ORT_DISABLE_TELEMETRY"} | places
+        running = subprocess.Popen([sys.executable, "-c", program], env=environment)
+        while running.poll() is None:
+            with contextlib.suppress(TimeoutError):
+                asked.append(str(proxy.accept()[1]))
+    assert running.returncode == 0
+    assert asked == []
+    assert list(tmp_path.iterdir()) == [], "the library's uploader keeps its session in TMPDIR"

@@ -9,7 +9,7 @@ import pytest
 from stage_jobs import make_job
 
 from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
-from iowbc.deploy.controller import open_session
+from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.play import exported_source, play
 from iowbc.evaluation.play_request import PlayRequest
@@ -88,7 +88,7 @@ def test_parity_size_and_time_are_in_the_summary(done: Job) -> None:
 def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
     inputs, outputs = golden.read_golden(done.out / GOLDEN)
     assert len(inputs["command"]) == 10
-    found = golden.run_session(open_session(done.out / GRAPH), inputs)
+    found = run(open_session(done.out / GRAPH), inputs)
     assert max(golden.largest_difference(outputs, found).values()) < 1e-5
 
 

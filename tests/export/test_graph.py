@@ -17,9 +17,9 @@ from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured, quantities
 from iowbc.control.stride import Stride
 from iowbc.deploy.contract import GRAPH
-from iowbc.deploy.controller import open_session
+from iowbc.deploy.session import open_session, run
 from iowbc.export.folder import write_folder
-from iowbc.export.golden import Values, largest_difference, read_golden, run_session, stacked, write_golden
+from iowbc.export.golden import Values, largest_difference, read_golden, stacked, write_golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.export.onnx_graph import run_torch, write_onnx
 from iowbc.recipe.recipe import Recipe
@@ -110,7 +110,7 @@ def test_onnxruntime_agrees_with_torch_for_any_number_of_robots(graph: Controlle
     session = open_session(exported / GRAPH)
     for rows in (1, 2, 33):
         inputs = random_inputs(graph, rows, seed=rows)
-        differences = largest_difference(run_torch(graph, inputs), run_session(session, inputs))
+        differences = largest_difference(run_torch(graph, inputs), run(session, inputs))
         assert max(differences.values()) < TOLERANCE
 
 
@@ -148,7 +148,7 @@ def test_golden_vectors_come_back_as_they_were(graph: ControllerGraph, tmp_path:
 def test_opsets_differ_in_form_only(graph: ControllerGraph, tmp_path: Path) -> None:
     inputs = random_inputs(graph, 2)
     write_onnx(graph, tmp_path / "graph.onnx", 20, {})
-    outputs = run_session(open_session(tmp_path / "graph.onnx"), inputs)
+    outputs = run(open_session(tmp_path / "graph.onnx"), inputs)
     assert max(largest_difference(run_torch(graph, inputs), outputs).values()) < TOLERANCE
 
 
@@ -169,6 +169,6 @@ def test_a_part_that_is_added_to_the_list_is_in_graph_file_and_contract(
     contract = write_folder(tmp_path, graph, recipe, None, {})
     assert [part.name for part in contract.observation][-1] == "knees"
     inputs = random_inputs(graph, 3)
-    found = run_session(open_session(tmp_path / GRAPH), inputs)["history_next"]
+    found = run(open_session(tmp_path / GRAPH), inputs)["history_next"]
     assert found[:, -1] == pytest.approx(expected_frame(graph, None, robot, inputs), abs=TOLERANCE)
     assert found[:, -1, -1] == pytest.approx(inputs["joint_position"][:, 3] * inputs["joint_position"][:, 9])
