@@ -113,6 +113,12 @@ class Simulation:
         """Everything that is random in the current episodes, by name, (n,) or (n, k)."""
         return self._draws.values
 
+    @property
+    def disturbed(self) -> NDArray[np.bool_]:
+        """Where an impulse or a push acts in this control period, (n,)."""
+        acting: NDArray[np.bool_] = np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
+        return acting
+
     def hold(self, fixed: Mapping[str, Array]) -> None:
         """Holds quantities at values (n,) from the next reset on; NaN draws. Keeps what is held and not named here."""
         unknown = [name for name in fixed if name not in self._draws.names]

@@ -67,15 +67,23 @@ class Batch:
             control_frequency=task.control_frequency,
         )
         self._holding = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
+        pushing = np.array([getattr(recipe.simulation.scenes, name).kind == "push" for name in scenes])
         self.guidance = Guidance(
             specification,
             self.robot,
             scenes=scenes,
             holding=self._holding,
+            pushing=pushing,
             scripts=schedule.scripts,
             period=period,
         )
-        self.judge = Judge(recipe, as_slice(self.robot.support), self._holding, period)
+        self.judge = Judge(
+            recipe,
+            as_slice(self.robot.support),
+            holding=self._holding,
+            followable=~pushing & (episodes is None),
+            period=period,
+        )
         self._pushes = PlannedPushes(schedule.pushes, period)
         self.observer = Observer(self.robot, self.layout, n)
         self._bound, self._divergences = task.action.bound, divergences
@@ -121,7 +129,9 @@ class Batch:
         simulation.step()
         memory.steps += 1
         self.guidance.turn(memory)
-        judgement = self.judge.judge(simulation.state, memory, action, self.guidance.object_place(memory))
+        judgement = self.judge.judge(
+            simulation.state, memory, action, self.guidance.object_place(memory), simulation.disturbed
+        )
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
         if self._schedule.repeats:
             write_trial_signals(self.buffers, simulation.state)
@@ -139,14 +149,14 @@ class Batch:
         buffers["done"][:] = done
         buffers["truncated"][:] = ending.truncated
         self._observe(judgement.motion)
-        count_step(buffers, scored)
+        count_step(buffers, judgement, memory)
         if not done.any():
             return
         which = np.flatnonzero(done)
         buffers["terminal_observation"][which] = buffers["observation"][which]
         buffers["episode_return"][which] = memory.total[which]
         buffers["episode_length"][which] = memory.steps[which]
-        count_endings(buffers, ending, which)
+        count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
         keep_divergences(self.simulation.divergences, self._divergences)
         self.begin(which)
@@ -181,11 +191,11 @@ class Batch:
         return {name: values.copy() for name, values in self.simulation.drawn.items()}
 
     def levels(self) -> Array:
-        """Curriculum levels, (n,)."""
+        """Curriculum levels, (n, axes)."""
         return self.memory.level.copy()
 
     def set_levels(self, levels: Array) -> None:
-        """Sets the curriculum levels (n,), from the next episodes on."""
+        """Sets the curriculum levels (n, axes), from the next episodes on."""
         self._schedule.set_levels(levels)
 
     def snapshot(self) -> dict[str, Array]:

@@ -1,50 +1,131 @@
-"""The curriculum: how hard the world is at a level, and how an environment's level moves."""
+"""The curriculum: how hard the world is at the levels of its axes, and how an environment's levels move."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.curriculum import Curriculum
+from iowbc.recipe.task.curriculum import Ceilings, Curriculum, Scale
+
+AXES = ("posture", "locomotion", "load", "disturbance")
+"""Columns of the levels."""
+POSTURE, LOCOMOTION, LOAD, DISTURBANCE = range(len(AXES))
+OWN_RANGES = 1.0
+"""Level at which the recipe's ranges are used in full; above it commands and loads may be infeasible."""
+ROUNDING = 1e-9
+"""Sums of rises reach a ceiling to within this."""
 
 
 @dataclass(frozen=True)
 class Difficulty:
-    """The scales of n environments, each (n,); see `iowbc.recipe.task.curriculum.Phase`."""
+    """The scales of n environments, each (n,); see `iowbc.recipe.task.curriculum.Curriculum`."""
 
     velocity: Array
+    turning: Array
     posture: Array
     load: Array
     disturbance: Array
 
 
-def difficulty(curriculum: Curriculum, level: Array) -> Difficulty:
-    """Scales at levels (n,) in [0, 3], interpolated between the ends of the phases."""
-    stops = (curriculum.start, curriculum.balance, curriculum.locomotion, curriculum.extreme)
-    knots = np.arange(len(stops))
+@dataclass(frozen=True)
+class Course:
+    """How the episodes of n environments went, each (n,)."""
+
+    survived: Mask
+    """Reached the time limit."""
+    progress_in_time: Array
+    """Part of the time limit that was reached."""
+    posture: Array
+    """The worse of the mean scores of height and pitch, 0 to 1."""
+    walked: Array
+    """Time with a commanded velocity [s]."""
+    covered: Array
+    """Part of the commanded displacement that was covered; 1 without any."""
+    heading: Array
+    """Mean heading error [rad]."""
+    stepping: Mask
+    """Was to walk at the end."""
+    lagged: Mask
+    """Ended because it lagged behind the command."""
+    disturbed: Mask
+    """An impulse or a push had just acted at the end."""
+
+
+def initial_levels(curriculum: Curriculum, n: int) -> Array:
+    """Levels at the start, (n, axes)."""
+    return np.full((n, len(AXES)), 0.0 if curriculum.enabled else curriculum.fixed_level)
+
+
+def played_levels(curriculum: Curriculum, levels: Array, walking: Mask) -> Array:
+    """Levels that an episode is played at, (n, axes): where it walks, nothing runs far ahead of locomotion."""
+    most = levels[:, LOCOMOTION] + curriculum.lead
+    held_back: Array = np.where(walking[:, None], np.minimum(levels, most[:, None]), levels)
+    held_back[:, LOCOMOTION] = levels[:, LOCOMOTION]
+    return held_back if curriculum.enabled else levels.copy()
+
+
+def difficulty(curriculum: Curriculum, played: Array) -> Difficulty:
+    """Scales at levels (n, axes)."""
     return Difficulty(
-        **{
-            name: np.interp(level, knots, [getattr(stop, name) for stop in stops])
-            for name in ("velocity", "posture", "load", "disturbance")
-        }
+        velocity=_scaled(curriculum.velocity, played[:, LOCOMOTION]),
+        turning=_scaled(curriculum.turning, played[:, LOCOMOTION]),
+        posture=_scaled(curriculum.posture, played[:, POSTURE]),
+        load=_scaled(curriculum.load, played[:, LOAD]),
+        disturbance=_scaled(curriculum.disturbance, played[:, DISTURBANCE]),
     )
 
 
-def initial_level(curriculum: Curriculum, n: int) -> Array:
-    """Levels at the start, (n,)."""
-    return np.full(n, 0.0 if curriculum.enabled else curriculum.fixed_level)
+def _scaled(scale: Scale, level: Array) -> Array:
+    factor: Array = np.interp(level, (0.0, 1.0, 2.0), (scale.start, scale.full, scale.extreme))
+    return factor
 
 
-def next_level(curriculum: Curriculum, level: Array, survived: Mask, progress: Array, tracking: Array) -> Array:
-    """Levels after an episode, (n,).
+def phase(curriculum: Curriculum, levels: Array) -> Array:
+    """Phase 1, 2 or 3 that each environment is in, (n,): it has reached all ceilings of those before."""
+    first = _reached(curriculum.balance, levels, curriculum.limit)
+    second = first & _reached(curriculum.locomotion, levels, curriculum.limit)
+    return 1 + first.astype(np.int64) + second
 
-    survived: reached its time limit; progress: part of the time limit reached; tracking: the worst of the
-    tracked quantities' mean scores.
-    """
+
+def next_levels(curriculum: Curriculum, levels: Array, played: Array, course: Course) -> Array:
+    """Levels after an episode, (n, axes). An axis that was held back below its own level says nothing, and stays."""
     if not curriculum.enabled:
-        return level
-    success = survived & (tracking >= curriculum.tracking)
-    failure = ~survived & (progress < curriculum.early)
-    moved = level + curriculum.rise * success - curriculum.fall * failure
-    clipped: Array = np.clip(moved, 0.0, curriculum.limit)
-    return clipped
+        return levels
+    own = played >= levels - ROUNDING
+    moved = levels + curriculum.rise * (_success(curriculum, played, course) & own)
+    moved -= curriculum.fall * (_failure(curriculum, played, course) & own)
+    ceilings = np.stack([_row(each) for each in (curriculum.balance, curriculum.locomotion, curriculum.extreme)])
+    ceiling = np.minimum(ceilings[phase(curriculum, levels) - 1], curriculum.limit)
+    bounded: Array = np.clip(moved, 0.0, np.maximum(ceiling, levels))
+    return bounded
+
+
+def _success(curriculum: Curriculum, played: Array, course: Course) -> Mask:
+    steady = course.survived & (course.posture >= curriculum.tracking)
+    walked = course.walked >= curriculum.least_walk
+    there = (course.covered >= curriculum.progress) & (course.heading <= curriculum.heading)
+    beyond = played[:, LOCOMOTION] > OWN_RANGES + ROUNDING
+    success = np.repeat(steady[:, None], len(AXES), axis=1)
+    success[:, LOCOMOTION] = walked & course.survived & np.where(beyond, steady, there)
+    return success
+
+
+def _failure(curriculum: Curriculum, played: Array, course: Course) -> Mask:
+    ended = ~course.survived & (course.progress_in_time < curriculum.early)
+    walking = course.stepping | course.lagged
+    pushed = course.disturbed & (played[:, DISTURBANCE] > 0.0) & ~course.lagged
+    statue = course.survived & (course.walked >= curriculum.least_walk) & (course.covered < curriculum.lagging)
+    failure = np.zeros(played.shape, np.bool_)
+    failure[:, DISTURBANCE] = ended & pushed
+    failure[:, LOCOMOTION] = (ended & walking & ~pushed) | (statue & (played[:, LOCOMOTION] <= OWN_RANGES))
+    failure[:, POSTURE] = failure[:, LOAD] = ended & ~walking & ~pushed
+    return failure
+
+
+def _row(ceilings: Ceilings) -> Array:
+    return np.array([getattr(ceilings, axis) for axis in AXES])
+
+
+def _reached(ceilings: Ceilings, levels: Array, limit: float) -> Mask:
+    reached: Mask = np.all(levels >= np.minimum(_row(ceilings), limit) - ROUNDING, axis=1)
+    return reached

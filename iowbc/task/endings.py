@@ -16,34 +16,36 @@ class Ending:
 
     fallen: Mask
     dropped: Mask
+    lagging: Mask
     time_limit: Mask
     diverged: Mask
 
     @classmethod
     def none(cls, n: int) -> Self:
         """Nothing ends."""
-        return cls(*np.zeros((4, n), np.bool_))
+        return cls(*np.zeros((5, n), np.bool_))
 
     @property
     def failed(self) -> Mask:
-        """Fell or dropped the object."""
-        return self.fallen | self.dropped
+        """Fell, dropped the object, or did not follow the command."""
+        return self.fallen | self.dropped | self.lagging
 
     @property
     def done(self) -> Mask:
         """Ended for whatever reason."""
-        return self.fallen | self.dropped | self.time_limit | self.diverged
+        return self.failed | self.time_limit | self.diverged
 
     @property
     def truncated(self) -> Mask:
         """Reached the time limit, and nothing worse."""
-        return self.time_limit & ~(self.fallen | self.dropped | self.diverged)
+        return self.time_limit & ~(self.failed | self.diverged)
 
     def reasons(self) -> dict[str, Mask]:
         """Exactly one reason for each that ended."""
         return {
             "fallen": self.fallen,
             "dropped": self.dropped & ~self.fallen,
+            "lagging": self.lagging & ~(self.fallen | self.dropped),
             "time_limit": self.truncated,
             "diverged": self.diverged,
         }
@@ -58,6 +60,17 @@ def fallen(motion: Motion, pitch_command: Array, termination: Termination) -> Ma
         | (np.abs(motion.torso_pitch - pitch_command) > termination.torso_pitch_error)
     )
     return fell
+
+
+def lagging(lag: Array, heading_error: Array, followable: Mask, termination: Termination) -> Mask:
+    """Too far behind the command, (n,): lag (n,) [m], heading error (n,) [rad], where the command can be followed."""
+    late = np.zeros(len(lag), np.bool_)
+    if termination.lag is not None:
+        late |= lag > termination.lag
+    if termination.heading_error is not None:
+        late |= np.abs(heading_error) > termination.heading_error
+    too_late: Mask = late & followable
+    return too_late
 
 
 def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination: Termination) -> Mask:

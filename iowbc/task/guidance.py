@@ -27,14 +27,18 @@ class Guidance:
         *,
         scenes: Sequence[str],
         holding: Mask,
+        pushing: Mask,
         scripts: Sequence[CommandScript | None],
         period: float,
     ) -> None:
-        """`scenes`: name of each environment's; `holding`: those that begin with an object in the hands, (n,)."""
+        """`scenes`: name of each environment's.
+
+        `holding`: those that begin with an object in the hands, `pushing`: those with a crate before them, (n,).
+        """
         task = specification.recipe.task
         self._settings, self._period = task.references.gait, period
         self.references = ReferenceLayer(robot, task.references, specification.rg)
-        self.commander = Commander(task, self.references, scripts, holding, period)
+        self.commander = Commander(task, self.references, scripts, holding, pushing, period)
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)

@@ -10,9 +10,11 @@ from iowbc.control import gait
 from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
 from iowbc.sim.state import SimulationState
-from iowbc.task.endings import Ending, dropped, fallen
+from iowbc.task.curriculum import LOCOMOTION, OWN_RANGES
+from iowbc.task.endings import Ending, dropped, fallen, lagging
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion, low_pass, motion
+from iowbc.task.progress import follow, heading_error
 from iowbc.task.rewards.reward import RewardFunction, Scored
 from iowbc.task.rewards.table import Step
 
@@ -24,15 +26,22 @@ class Judgement:
     motion: Motion
     ending: Ending
     scored: Scored
+    command: Array
+    """C that was in force, (n, 11)."""
+    heading_error: Array
+    """Heading less its reference, (n,) [rad]."""
 
 
 class Judge:
     """Judges the control steps of n environments by a recipe."""
 
-    def __init__(self, recipe: Recipe, support: slice | NDArray[np.intp], holding: Mask, period: float) -> None:
-        """`support`: places of the support joints; `holding`: environments that begin with an object in the hands."""
+    def __init__(
+        self, recipe: Recipe, support: slice | NDArray[np.intp], *, holding: Mask, followable: Mask, period: float
+    ) -> None:
+        """`support`: places of the support joints; `holding`: environments that begin with an object in the hands;
+        `followable`: those whose command can be followed, at least in the recipe's own ranges; (n,) each."""
         self._task, self._height = recipe.task, recipe.rg.height
-        self._support, self._holding, self._period = support, holding, period
+        self._support, self._holding, self._followable, self._period = support, holding, followable, period
         self._reward = RewardFunction(recipe.task.reward, period)
         self._velocity = np.zeros((len(holding), 3))
 
@@ -40,11 +49,16 @@ class Judge:
         """The motion in a simulation state."""
         return motion(state, self._height)
 
-    def judge(self, state: SimulationState, memory: Memory, action: Array, place: Array) -> Judgement:
-        """The step just made with an action (n, 15); `place`: where a held object belongs, (n, 3) [m]."""
+    def judge(self, state: SimulationState, memory: Memory, action: Array, place: Array, disturbed: Mask) -> Judgement:
+        """The step just made with an action (n, 15).
+
+        `place`: where a held object belongs, (n, 3) [m]; `disturbed`: where an impulse or a push acted, (n,).
+        """
         moved = self.motion(state)
         self._filter(memory, moved)
-        ending = self._ending(state, memory, moved, place)
+        error = heading_error(moved, memory)
+        follow(memory, error, disturbed, self._task.termination, self._period)
+        ending = self._ending(state, memory, moved, place, error)
         foot_phase, stance = gait.foot_phase(np, memory.phase), self._task.references.gait.stance
         step = Step(
             state=state,
@@ -55,15 +69,17 @@ class Judge:
             height_rate=memory.height_rate,
             support_reference=memory.support,
             filtered_velocity=memory.filtered_velocity,
+            heading_error=error,
             action=action,
             previous_action=memory.action,
             swing_profile=gait.swing_height(np, foot_phase, self._task.references.gait),
+            stepping=memory.stepping,
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),
             object_place=place,
             ended=ending.failed,
         )
-        return Judgement(moved, ending, self._reward(step).without(ending.diverged))
+        return Judgement(moved, ending, self._reward(step, ending.diverged), memory.command.copy(), error)
 
     def _filter(self, memory: Memory, moved: Motion) -> None:
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
@@ -71,11 +87,15 @@ class Judge:
         time_constant = self._task.reward.sync.filter_time
         memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
 
-    def _ending(self, state: SimulationState, memory: Memory, moved: Motion, place: Array) -> Ending:
+    def _ending(
+        self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array
+    ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
+        followable = self._followable & (memory.played[:, LOCOMOTION] <= OWN_RANGES)
         return Ending(
             fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
             dropped=dropped(moved, place, self._holding, state.grasped, termination) & ~diverged,
+            lagging=lagging(memory.lag, heading_error, followable, termination) & ~diverged,
             time_limit=memory.steps >= memory.limit,
             diverged=diverged,
         )

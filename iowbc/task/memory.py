@@ -7,7 +7,22 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.control.command import COMMAND
+from iowbc.task.curriculum import AXES
 from iowbc.task.rewards.table import TRACKED
+
+COUNTERS = ("episode", "draws", "steps", "limit", "goal_until", "undisturbed", "walked")
+"""Integers."""
+SCALARS = (
+    *("height_rate", "phase", "heading_offset", "heading_reference", "lag", "commanded", "covered", "heading_error"),
+    "total",
+)
+"""Real numbers, one an environment."""
+OF_EPISODE = (
+    *("action", "filtered_velocity", "lag", "tracking", "walked", "commanded", "covered", "heading_error", "total"),
+)
+"""What begins at zero with every episode."""
+LONG_AGO = 1_000_000
+"""Control steps since something that has not happened yet."""
 
 
 @dataclass
@@ -25,7 +40,11 @@ class Memory:
     goal_until: Array
     """Control step at which the next goal is drawn, (n,) int64."""
     level: Array
-    """Curriculum level, (n,)."""
+    """Curriculum levels, (n, axes); see `iowbc.task.curriculum.AXES`."""
+    played: Array
+    """Levels that the episode is played at, (n, axes)."""
+    walking: Array
+    """Whether the episode has commands to walk, (n,) bool."""
     command: Array
     """C in force, rate-limited and clamped, (n, 11)."""
     goal: Array
@@ -52,21 +71,35 @@ class Memory:
     """Heading at the start plus the integrated commanded yaw rate, (n,) [rad]."""
     object_place: Array
     """A held object from the middle of the wrist targets at the start of the episode, heading frame, (n, 3) [m]."""
+    lag: Array
+    """How far robot and object are behind the command, forgotten in time, (n,) [m]."""
+    undisturbed: Array
+    """Control steps since an impulse or a push last acted, (n,) int64."""
     tracking: Array
-    """Sums of the tracking scores over the episode, (n, 4)."""
+    """Sums of the scores of height and torso pitch over the episode, (n, tracked)."""
+    walked: Array
+    """Control steps of the episode with a commanded planar velocity or yaw rate, (n,) int64."""
+    commanded: Array
+    """Displacement that the episode commanded, (n,) [m]."""
+    covered: Array
+    """Displacement along the command, no faster than it, (n,) [m]."""
+    heading_error: Array
+    """Sum of the absolute heading errors of the episode, (n,) [rad]."""
     total: Array
     """Sum of the rewards of the episode, (n,)."""
 
     @classmethod
     def blank(cls, n: int, arms: int, support: int) -> Self:
         """All zero."""
-        counters = {name: np.zeros(n, np.int64) for name in ("episode", "draws", "steps", "limit", "goal_until")}
-        scalars = ("level", "height_rate", "phase", "heading_offset", "heading_reference", "total")
+        counters = {name: np.zeros(n, np.int64) for name in COUNTERS}
         return cls(
             **counters,
-            **{name: np.zeros(n) for name in scalars},
+            **{name: np.zeros(n) for name in SCALARS},
             tracking=np.zeros((n, len(TRACKED))),
             stepping=np.zeros(n, np.bool_),
+            walking=np.zeros(n, np.bool_),
+            level=np.zeros((n, len(AXES))),
+            played=np.zeros((n, len(AXES))),
             command=np.zeros((n, len(COMMAND))),
             goal=np.zeros((n, len(COMMAND))),
             arms=np.zeros((n, arms)),
@@ -79,8 +112,9 @@ class Memory:
 
     def clear(self, which: Indices) -> None:
         """Forgets what belongs to the episode that has ended in some environments, (k,)."""
-        for values in (self.action, self.filtered_velocity, self.tracking, self.total):
-            values[which] = 0.0
+        for name in OF_EPISODE:
+            getattr(self, name)[which] = 0
+        self.undisturbed[which] = LONG_AGO
 
     def arrays(self) -> dict[str, Array]:
         """Copies of all arrays, by name."""

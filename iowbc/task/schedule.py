@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
-from iowbc.arrays import Array, Indices, Keys
+from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.recipe.task.task import Task
 from iowbc.task.commands.script import CommandScript
-from iowbc.task.curriculum import difficulty, initial_level, next_level
+from iowbc.task.curriculum import difficulty, initial_levels, next_levels, played_levels
 from iowbc.task.endings import Ending
 from iowbc.task.episodes import Episode, PlannedPush
 from iowbc.task.memory import Memory
+from iowbc.task.progress import course
 
 
 class Schedule:
@@ -39,7 +40,7 @@ class Schedule:
         """Key of all that is random in each environment, (n,)."""
         self.episode_key = self.key.copy()
         """Key of all that is random in each environment's episode, (n,)."""
-        memory.level[:] = initial_level(task.curriculum, n) if trials is None else task.curriculum.fixed_level
+        memory.level[:] = initial_levels(task.curriculum, n) if trials is None else task.curriculum.fixed_level
         self._scales = {name: np.ones(n) for name in ("load_scale", "impulse_scale", "push_scale")}
 
     @property
@@ -76,13 +77,16 @@ class Schedule:
         self.episode_key[which] = key
         memory.steps[which] = 0
         memory.limit[which] = self._time_limits(which, key)
+        standing = random.uniform(key, "episode/standing", 1)[:, 0] < self._task.commands.standing_episodes
+        memory.walking[which] = ~standing
+        memory.played[which] = played_levels(self._task.curriculum, memory.level[which], ~standing)
         return key
 
     def scales(self, which: Indices) -> dict[str, Array]:
         """How hard the simulation is to make new episodes, by name, (n,); trials say it themselves."""
         if self._trials is not None:
             return {}
-        hardness = difficulty(self._task.curriculum, self._memory.level[which])
+        hardness = difficulty(self._task.curriculum, self._memory.played[which])
         self._scales["load_scale"][which] = hardness.load
         self._scales["impulse_scale"][which] = self._scales["push_scale"][which] = hardness.disturbance
         return self._scales
@@ -95,21 +99,23 @@ class Schedule:
             seconds = np.array([self._trials[index].duration for index in which])
         return np.maximum(np.round(seconds / self._period), 1).astype(np.int64)
 
+    def causes(self, ending: Ending) -> dict[str, Mask]:
+        """What robots were doing that fall in this step, by name, (n,)."""
+        memory = self._memory
+        pushed = ending.fallen & (memory.undisturbed * self._period <= self._task.curriculum.blame)
+        walking = ending.fallen & memory.stepping & ~pushed
+        return {"disturbed": pushed, "walking": walking, "standing": ending.fallen & ~walking & ~pushed}
+
     def promote(self, ending: Ending, which: Indices) -> None:
-        """Moves the level of environments whose episode ended by itself, (k,); trials keep theirs."""
+        """Moves the levels of environments whose episode ended by itself, (k,); trials keep theirs."""
         if self._trials is not None:
             return
-        memory = self._memory
-        moved = next_level(
-            self._task.curriculum,
-            memory.level,
-            survived=ending.truncated,
-            progress=memory.steps / memory.limit,
-            tracking=memory.tracking.min(axis=1) / np.maximum(memory.steps, 1),
-        )
+        memory, curriculum = self._memory, self._task.curriculum
+        went = course(memory, ending, self._period, curriculum.blame)
+        moved = next_levels(curriculum, memory.level, memory.played, went)
         chosen = which[~ending.diverged[which]]
         memory.level[chosen] = moved[chosen]
 
     def set_levels(self, levels: Array) -> None:
-        """Sets the curriculum levels (n,), from the next episodes on."""
+        """Sets the curriculum levels (n, axes), from the next episodes on."""
         self._memory.level[:] = np.clip(levels, 0.0, self._task.curriculum.limit)

@@ -20,13 +20,14 @@ Make = Callable[..., VectorEnv]
 COMMANDS = Commands()
 
 
-def goals(level: float, count: int = 4000) -> Any:
+def goals(level: float, count: int = 4000, *, pushing: bool = False, commands: Commands = COMMANDS) -> Any:
     key = random.environment_key(0, np.arange(count))
-    return draw_goals(COMMANDS, key, difficulty(Curriculum(), np.full(count, level)))
+    hardness = difficulty(Curriculum(), np.full((count, 4), level))
+    return draw_goals(commands, key, hardness, pushing=np.full(count, pushing), walking=np.ones(count, bool))
 
 
-def test_goals_at_level_two_fill_the_recipes_ranges_and_do_not_leave_them() -> None:
-    drawn = goals(2.0)
+def test_goals_at_level_one_fill_the_recipes_ranges_and_do_not_leave_them() -> None:
+    drawn = goals(1.0, commands=COMMANDS.model_copy(update={"deep_share": 0.0}))
     ranges = (COMMANDS.velocity_x, COMMANDS.velocity_y, COMMANDS.yaw_rate, COMMANDS.height, COMMANDS.pitch)
     for column, (low, high) in enumerate(ranges):
         values = drawn[:, column]
@@ -37,14 +38,17 @@ def test_goals_at_level_two_fill_the_recipes_ranges_and_do_not_leave_them() -> N
 
 
 def test_the_shares_of_standing_straight_and_nominal_commands_are_the_recipes() -> None:
-    drawn = goals(2.0)
+    drawn = goals(1.0)
     standing = ~drawn[:, VELOCITY].any(axis=1)
     walking = drawn[~standing]
     straight = ~walking[:, 1:3].any(axis=1)
+    turning = ~walking[~straight, :2].any(axis=1)
+    drawn = goals(1.0, commands=COMMANDS.model_copy(update={"deep_share": 0.0}))
     nominal = (drawn[:, HEIGHT:] == nominal_command(COMMANDS)[HEIGHT:]).all(axis=1)
     for found, share in (
         (standing, COMMANDS.standing_share),
         (straight, COMMANDS.straight_share),
+        (turning, COMMANDS.turning_share),
         (nominal, COMMANDS.nominal_share),
     ):
         assert found.mean() == pytest.approx(share, abs=0.03)
@@ -56,9 +60,32 @@ def test_walking_goals_are_worth_a_step() -> None:
     assert speed[speed > 0].min() >= COMMANDS.smallest_speed - 1e-9
 
 
-def test_at_the_start_of_the_curriculum_nothing_walks_and_postures_are_near_nominal() -> None:
+def test_behind_a_crate_nobody_walks_backward_or_to_the_side_and_turns_are_slow() -> None:
+    drawn = goals(1.0, pushing=True)
+    assert drawn[:, 0].min() >= 0.0
+    assert not drawn[:, 1].any()
+    assert np.abs(drawn[:, 2]).max() <= COMMANDS.pushing.yaw_rate[1]
+
+
+def test_deep_leans_reach_the_papers_range_and_stand() -> None:
+    drawn = goals(1.0)
+    low, high = COMMANDS.pitch
+    deep = (drawn[:, PITCH] < low) | (drawn[:, PITCH] > high)
+    assert 0.01 < deep.mean() < COMMANDS.deep_share
+    assert drawn[deep, PITCH].max() > 1.3
+    assert not drawn[deep][:, VELOCITY].any()
+
+
+def test_turns_on_the_spot_are_worth_a_step() -> None:
     drawn = goals(0.0)
-    assert not drawn[:, VELOCITY].any()
+    turns = drawn[~drawn[:, :2].any(axis=1), 2]
+    assert np.abs(turns[turns != 0.0]).min() >= COMMANDS.smallest_yaw_rate
+
+
+def test_at_the_start_of_the_curriculum_some_walk_slowly_and_postures_are_near_nominal() -> None:
+    drawn = goals(0.0)
+    assert 0.6 < drawn[:, VELOCITY].any(axis=1).mean() < 0.8
+    assert drawn[:, 0].max() <= 0.6 * COMMANDS.velocity_x[1] + 1e-9
     nominal = nominal_command(COMMANDS)
     reach = 0.2 * max(nominal[HEIGHT] - COMMANDS.height[0], COMMANDS.height[1] - nominal[HEIGHT])
     assert np.abs(drawn[:, HEIGHT] - nominal[HEIGHT]).max() <= reach + 1e-9

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from task_worlds import QUIET, changed, rollout
+from changes import changed
+from task_worlds import QUIET, rollout
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.reward import Kernel, Reward, Smoothness
@@ -62,6 +63,26 @@ def test_an_object_that_only_turns_about_the_vertical_is_level() -> None:
     assert equilibrium.orientation(turned, np.array([True]))[0] == pytest.approx(0.0)
 
 
+def test_progress_counts_along_the_command_and_no_faster_than_it() -> None:
+    command = np.array([[0.3, 0.4]] * 4 + [[0.0, 0.0]])
+    velocity = np.array([[0.0, 0.0], [0.15, 0.2], [0.6, 0.8], [0.8, -0.6], [1.0, 1.0]])
+    assert sync.progress(velocity, command) == pytest.approx([0.0, 0.25, 0.5, 0.0, 0.0])
+    assert sync.progress(-velocity, command)[2] == pytest.approx(-0.5)
+    assert sync.turning(np.array([0.1, 0.9, -0.1]), np.array([0.4, 0.4, -0.4])) == pytest.approx([0.1, 0.4, 0.1])
+
+
+def test_the_reward_of_progress_has_the_same_slope_from_standing_to_the_command() -> None:
+    command, slow, fast = np.array([[0.4, 0.0]]), np.array([[0.05, 0.0]]), np.array([[0.35, 0.0]])
+    step = np.array([[0.01, 0.0]])
+    slopes = [(sync.progress(v + step, command) - sync.progress(v, command))[0] for v in (0 * slow, slow, fast)]
+    assert slopes == pytest.approx([0.01] * 3)
+
+
+def test_feet_off_the_ground_count_only_while_the_command_is_to_stand() -> None:
+    contact = np.array([[True, False], [False, False], [True, False]])
+    assert gait.standing(contact, np.array([False, False, True])).tolist() == [1.0, 2.0, 0.0]
+
+
 def test_contact_timing_counts_from_minus_one_to_one() -> None:
     contact = np.array([[True, True], [True, True], [False, False]])
     expected = np.array([[True, True], [True, False], [True, True]])
@@ -101,7 +122,7 @@ def test_a_fall_costs_its_price_once_and_is_not_scaled_by_the_period(make: Make)
     env = make(num_envs=4)
     env.reset()
     seen = rollout(env, 100, size=2.0)
-    falls = seen["fallen"].sum() + (seen["dropped"] * (1 - seen["fallen"])).sum()
+    falls = ((seen["fallen"] + seen["dropped"] + seen["lagging"]) > 0).sum()
     figures = env.statistics()
     assert falls > 0
     assert figures["reward/termination"] * 400 * 0.02 == pytest.approx(falls * Reward().termination)
@@ -133,7 +154,7 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
     recipe = recipe.model_copy(
         update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
     )
-    RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))))  # type: ignore[arg-type]
+    RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]))  # type: ignore[arg-type]
     assert set(TERMS) - set(called) == {"alive", "sync.support_reference"}
 
 

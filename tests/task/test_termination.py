@@ -1,14 +1,18 @@
-"""Falls and drops."""
+"""Falls, drops and lagging behind."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from task_worlds import QUIET
 
 from iowbc.recipe.task.termination import Termination
-from iowbc.task.endings import dropped, fallen
+from iowbc.task.endings import dropped, fallen, lagging
+from iowbc.task.vector.vector_env import VectorEnv
 
+Make = Callable[..., VectorEnv]
 RECIPE = Termination()
 
 
@@ -50,3 +54,23 @@ def test_a_drop_is_an_object_out_of_both_hands_or_far_from_its_place(
     motion: Any = SimpleNamespace(object_offset=np.array([[0.3 + offset, 0.0, 0.0]]))
     place = np.array([[0.3, 0.0, 0.0]])
     assert dropped(motion, place, np.array([held]), np.array([grasped]), RECIPE)[0] == lost
+
+
+def test_lagging_ends_an_episode_only_where_the_command_can_be_followed() -> None:
+    lag, error = np.array([0.6, 0.4, 0.0, 0.6]), np.array([0.0, 0.0, -1.3, 0.0])
+    followable = np.array([True, True, True, False])
+    assert lagging(lag, error, followable, RECIPE).tolist() == [True, False, True, False]
+    off = Termination(lag=None, heading_error=None)
+    assert not lagging(lag, error, followable, off).any()
+
+
+def test_a_robot_that_stays_where_it_is_to_walk_ends_its_episode_by_lagging(make: Make) -> None:
+    changes = {"task.scenes.lift": 0.0, "task.commands.standing_episodes": 0.0, "task.commands.standing_share": 0.0}
+    env = make(changes=QUIET | changes | {"task.episode_duration": (9.0, 9.0), "task.termination.lag": 0.01})
+    env.reset()
+    for _ in range(40):
+        _, _, done, infos = env.step(np.zeros((4, 15), np.float32))
+        if done.any():
+            break
+    assert [infos[index]["end"] for index in np.flatnonzero(done)] == ["lagging"] * done.sum()
+    assert done.any()

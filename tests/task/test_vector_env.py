@@ -9,8 +9,9 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from task_worlds import actions, rollout
 
 from iowbc.recipe.recipe import Recipe
+from iowbc.task.curriculum import AXES
 from iowbc.task.gym.environment import Environment
-from iowbc.task.record.signals import REASONS, SIGNALS
+from iowbc.task.record.signals import CAUSES, ERRORS, KINDS, REASONS, SIGNALS
 from iowbc.task.rewards.table import TERMS
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -43,9 +44,9 @@ def test_an_episode_that_only_ran_out_of_time_is_truncated_and_a_fall_is_not(mak
     for step in range(120):
         _, _, done, infos = env.step(actions(step, 8))
         for index in np.flatnonzero(done):
-            fell = bool(env.signals["fallen"][index, 0] or env.signals["dropped"][index, 0])
-            assert infos[index]["TimeLimit.truncated"] == (not fell)
-            assert infos[index]["end"] == ("fallen" if fell else "time_limit")
+            failures = [name for name in ("fallen", "dropped", "lagging") if env.signals[name][index, 0]]
+            assert infos[index]["TimeLimit.truncated"] == (not failures)
+            assert infos[index]["end"] == (failures[0] if failures else "time_limit")
         assert not any(infos[index] for index in np.flatnonzero(~done))
 
 
@@ -100,6 +101,8 @@ def test_statistics_are_complete_and_finite_from_the_first_call(make: Make) -> N
     env.reset()
     expected = {"reward", "episode_seconds", "episode_return", "curriculum_level", "tracking", "divergences"}
     expected |= {f"reward/{term}" for term in TERMS} | {f"terminations/{name}" for name in REASONS}
+    expected |= {f"falls/{cause}" for cause in CAUSES} | {f"level/{axis}" for axis in AXES}
+    expected |= {f"error/{s}/{kind}/{e}" for s in ("free", "lift") for kind in KINDS for e in ERRORS}
     for _ in range(2):
         figures = env.statistics()
         assert figures.keys() == expected
@@ -174,8 +177,9 @@ def test_attributes_of_single_environments_can_be_read_and_levels_set(make: Make
     env.reset()
     assert env.get_attr("scene") == ["free", "free", "lift", "lift"]
     env.set_attr("level", 1.5, indices=[1, 2])
-    assert env.get_attr("level") == [0.0, 1.5, 1.5, 0.0]
-    assert env.get_attr("level", indices=2) == [1.5]
+    assert env.get_attr("level") == [dict.fromkeys(AXES, value) for value in (0.0, 1.5, 1.5, 0.0)]
+    env.set_attr("level", {"load": 0.5}, indices=2)
+    assert env.get_attr("level", indices=2) == [dict.fromkeys(AXES, 1.5) | {"load": 0.5}]
     assert env.env_method("drawn", indices=[3])[0]["object_mass"] == env.drawn()["object_mass"][3]
     assert env.env_is_wrapped(VecNormalize) == [False] * 4
     with pytest.raises(AttributeError, match="there are scene, level"):
@@ -186,13 +190,15 @@ def test_attributes_of_single_environments_can_be_read_and_levels_set(make: Make
 
 def test_levels_carry_over_to_another_number_of_environments(make: Make) -> None:
     source, target = make(num_envs=4), make(num_envs=6)
-    for index, level in enumerate((0.0, 1.0, 2.0, 3.0)):
+    for index, level in enumerate((0.0, 0.5, 1.0, 2.0)):
         source.set_attr("level", level, indices=index)
-    assert source.curriculum() == {"levels": {"free": [0.0, 1.0], "lift": [2.0, 3.0]}}
+    known = source.curriculum()["levels"]
+    assert known == {"free": {axis: [0.0, 0.5] for axis in AXES}, "lift": {axis: [1.0, 2.0] for axis in AXES}}
     target.set_curriculum(source.curriculum())
-    levels = np.array(target.get_attr("level"))
-    assert levels[:3].mean() == pytest.approx(0.5)
-    assert levels[3:].mean() == pytest.approx(2.5)
+    for axis in AXES:
+        levels = [level[axis] for level in target.get_attr("level")]
+        assert np.mean(levels[:3]) == pytest.approx(0.25)
+        assert np.mean(levels[3:]) == pytest.approx(1.5)
 
 
 def test_scenes_are_played_in_the_recipes_shares(make: Make) -> None:

@@ -11,8 +11,9 @@ class Randomization(Section):
 
     enabled: bool = True
     """Off gives every entry its nominal value."""
-    object_mass_scale: Distribution = Distribution(low=0.5, high=1.5, nominal=1.0)
-    """Object mass as a part of the nominal one (Table I: 50 to 150 %)."""
+    object_mass_scale: Distribution = Distribution(low=0.07, high=1.5, nominal=1.0)
+    """Object mass as a part of the nominal one: from 0.5 kg in the hands and a crate of 5 kg, the lightest loads of the
+    trials, to 150 %. Table I has 50 to 150 %."""
     inertia_scale: Distribution = Distribution(low=0.8, high=1.2, nominal=1.0)
     """Object inertia as a part of that of a uniform body of its mass."""
     object_com_offset: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)

@@ -25,11 +25,22 @@ class CommandRates(Section):
     """Change of a wrist offset, per axis [m/s]."""
 
 
+class PushingVelocities(Section):
+    """Velocities behind a crate, which is not held: neither backward nor to the side."""
+
+    velocity_x: Range = (0.0, 0.5)
+    """Forward velocity, heading frame [m/s]."""
+    velocity_y: Range = (0.0, 0.0)
+    """Velocity to the left, heading frame [m/s]."""
+    yaw_rate: Range = (-0.1, 0.1)
+    """Yaw rate [rad/s]; two palms turn a crate slowly."""
+
+
 class Commands(Section):
     """Ranges, resampling and limits of the command [v_x, v_y, ω_yaw, H, α_pitch, Δp_left, Δp_right]."""
 
-    velocity_x: Range = (-0.3, 0.5)
-    """Forward velocity, heading frame [m/s]."""
+    velocity_x: Range = (-0.3, 0.6)
+    """Forward velocity, heading frame [m/s]; a little beyond the 0.5 m/s that trials ask for."""
     velocity_y: Range = (-0.2, 0.2)
     """Velocity to the left, heading frame [m/s]."""
     yaw_rate: Range = (-0.4, 0.4)
@@ -38,6 +49,12 @@ class Commands(Section):
     """Height H [m]; 0.78 m is where the legs are nearly straight. The feasible map clamps further."""
     pitch: Range = (-0.25, 0.75)
     """Torso pitch against gravity, positive leaning forward [rad]. The feasible map clamps further."""
+    deep_pitch: Range = (-0.5, 1.5)
+    """Torso pitch of the deep leans, the paper's whole range [rad]; while standing, clamped by the feasible map."""
+    deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
+    """Part of the commands that lean deeply; few, for trials stay within `pitch`."""
+    pushing: PushingVelocities = PushingVelocities()
+    """Velocities in a scene with a crate to push."""
     common_offset: Vector = (0.05, 0.05, 0.08)
     """Largest offset that both wrists share, per axis of the heading frame [m]."""
     single_offset: Vector = (0.02, 0.0, 0.02)
@@ -46,17 +63,24 @@ class Commands(Section):
     """Height of the nominal posture [m], taken when a command leaves the posture alone."""
     nominal_pitch: float = 0.0
     """Torso pitch of the nominal posture [rad]."""
+    standing_episodes: float = Field(default=0.3, ge=0.0, le=1.0)
+    """Part of the episodes that never walk: there balance, posture and loads are practised while walking is not learnt
+    yet; 1 trains standing alone."""
     standing_share: float = Field(default=0.3, ge=0.0, le=1.0)
-    """Part of the commands that ask for standing still."""
+    """Part of the commands of the other episodes that ask for standing still, so that about half of all walk."""
     straight_share: float = Field(default=0.4, ge=0.0, le=1.0)
     """Part of the walking commands without yaw rate and lateral velocity."""
+    turning_share: float = Field(default=0.2, ge=0.0, le=1.0)
+    """Part of the commands with a yaw rate that turn on the spot."""
     nominal_share: float = Field(default=0.4, ge=0.0, le=1.0)
     """Part of the commands with nominal height, pitch and wrists."""
     holding_start: float = Field(default=0.3, ge=0.0, le=1.0)
     """Part of a drawn posture's distance from the nominal one at which an episode with a held object begins; at 1 a
     third of the objects would begin inside thighs or torso. The command then approaches the drawn posture."""
-    smallest_speed: float = Field(default=0.15, ge=0.0)
+    smallest_speed: float = Field(default=0.2, ge=0.0)
     """Planar speed [m/s] under which a drawn walking velocity is lengthened, so that walking is worth a step."""
+    smallest_yaw_rate: float = Field(default=0.2, ge=0.0)
+    """Yaw rate [rad/s] under which a turn on the spot is quickened, for the same reason."""
     resampling: Range = (3.0, 7.0)
     """Time from one command to the next [s]."""
     rates: CommandRates = CommandRates()
@@ -64,7 +88,7 @@ class Commands(Section):
 
     @model_validator(mode="after")
     def _ranges_ascend(self) -> Self:
-        for name in ("velocity_x", "velocity_y", "yaw_rate", "height", "pitch", "resampling"):
+        for name in ("velocity_x", "velocity_y", "yaw_rate", "height", "pitch", "deep_pitch", "resampling"):
             low, high = getattr(self, name)
             if low > high:
                 raise ValueError(f"{name}: the lower end {low} is above the upper end {high}")

@@ -1,4 +1,4 @@
-"""The three phases of training."""
+"""How training grows harder: four axes, each with a level of its own, in the order of the paper's three phases."""
 
 from typing import Self
 
@@ -7,52 +7,89 @@ from pydantic import Field, model_validator
 from iowbc.recipe.section import Section
 
 
-class Phase(Section):
-    """How hard the world is at the end of a phase; between two phases the values are interpolated."""
+class Scale(Section):
+    """A factor at the levels 0, 1 and 2 of an axis; between two levels it is interpolated."""
 
-    velocity: float = Field(ge=0.0)
-    """Factor on the range of velocity and yaw rate commands; 0 stands still, above 1 goes beyond the recipe's range."""
-    posture: float = Field(ge=0.0, le=1.0)
-    """Part of the range of height, pitch and wrist offsets that is used, around the nominal posture."""
-    load: float = Field(ge=0.0)
-    """Upper end of the load range, as a part of the scene's own; the lower end stays."""
-    disturbance: float = Field(ge=0.0)
-    """Factor on impulses and pushes."""
+    start: float = Field(ge=0.0)
+    """At level 0."""
+    full: float = Field(ge=0.0)
+    """At level 1, the recipe's own ranges."""
+    extreme: float = Field(ge=0.0)
+    """At level 2, which is partly infeasible."""
+
+
+class Ceilings(Section):
+    """How high each axis may rise during a phase."""
+
+    posture: float = Field(ge=0.0, le=2.0)
+    """Heights, torso pitches and wrist offsets."""
+    locomotion: float = Field(ge=0.0, le=2.0)
+    """Velocities and yaw rates."""
+    load: float = Field(ge=0.0, le=2.0)
+    """Masses, and what resists a push."""
+    disturbance: float = Field(ge=0.0, le=2.0)
+    """Impulses on the object and pushes on the base."""
 
 
 class Curriculum(Section):
-    """Static balance under varied loads, then locomotion with impulses, then partly infeasible commands.
+    """Static balance under varied loads, then locomotion with impulses, then partly infeasible commands (paper III-D).
 
-    Each environment has its own level in [0, 3]: 0 is the start of phase 1, 1 its end. It rises after an episode that
-    survived *and* tracked, and falls after one that ended early.
+    Each environment has a level between 0 and 2 on each of four axes: posture, locomotion, load, disturbance. An axis
+    rises after an episode that survived and did well by the axis' own measure, and falls after one that ended early
+    while that axis was to blame. With one level for everything, training that could not walk yet met heavier loads and
+    harder pushes before it practised a step.
     """
 
     enabled: bool = True
     """Off trains every environment at `fixed_level`."""
-    fixed_level: float = Field(default=2.0, ge=0.0, le=3.0)
-    """Level without a curriculum; also that of evaluation and of single environments. 2 is the recipe's own ranges."""
-    start: Phase = Phase(velocity=0.0, posture=0.2, load=0.5, disturbance=0.0)
-    """Level 0."""
-    balance: Phase = Phase(velocity=0.0, posture=1.0, load=1.0, disturbance=0.3)
-    """Level 1, the end of phase 1: static balance under varied loads."""
-    locomotion: Phase = Phase(velocity=1.0, posture=1.0, load=1.0, disturbance=1.0)
-    """Level 2, the end of phase 2: locomotion with impulses."""
-    extreme: Phase = Phase(velocity=1.6, posture=1.0, load=1.3, disturbance=1.5)
-    """Level 3, the end of phase 3: commands and loads that are partly infeasible."""
-    rise: float = Field(default=0.05, ge=0.0)
-    """Added to the level after a success."""
+    fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
+    """Level of every axis without a curriculum; also that of evaluation and of single environments. 1 is the recipe's
+    own ranges."""
+    velocity: Scale = Scale(start=0.6, full=1.0, extreme=1.3)
+    """Factor on the range of v_x, by the level of locomotion: even at the start walking is fast enough for a step."""
+    turning: Scale = Scale(start=0.2, full=1.0, extreme=1.3)
+    """Factor on the ranges of v_y and yaw rate, by the level of locomotion: walking is learnt straight ahead first."""
+    posture: Scale = Scale(start=0.2, full=1.0, extreme=1.0)
+    """Part of the range of height, pitch and wrist offsets that is used, around the nominal posture."""
+    load: Scale = Scale(start=0.15, full=1.0, extreme=1.3)
+    """Upper end of the range of masses, as a part of the scene's own; the lower end stays. At 1.3 the box weighs up to
+    13.5 kg, and shoulders hold 12 to 16."""
+    disturbance: Scale = Scale(start=0.0, full=1.0, extreme=1.5)
+    """Factor on impulses and pushes."""
+    balance: Ceilings = Ceilings(posture=1.0, locomotion=0.5, load=1.0, disturbance=0.3)
+    """Phase 1: static balance under varied loads. Slow walking is practised from the first episode on, for it takes
+    longest to learn."""
+    locomotion: Ceilings = Ceilings(posture=1.0, locomotion=1.0, load=1.0, disturbance=1.0)
+    """Phase 2: locomotion with impulses; an environment enters it when it has reached all ceilings of phase 1."""
+    extreme: Ceilings = Ceilings(posture=2.0, locomotion=2.0, load=2.0, disturbance=2.0)
+    """Phase 3: commands, loads and resistance to what is infeasible."""
+    lead: float = Field(default=0.25, ge=0.0)
+    """In an episode with walking, posture, load and disturbance are at most so far above the level of locomotion: new
+    steps are practised with what is light, and heavy loads first while standing."""
+    rise: float = Field(default=0.08, ge=0.0)
+    """Added to an axis' level after a success."""
     fall: float = Field(default=0.1, ge=0.0)
-    """Taken from the level after an episode that ended before `early` of its time. More than `rise`: the level comes to
-    rest where two of three episodes succeed. With half of `rise` it ran ahead until nearly all episodes ended in a
-    fall, and walking was never practised."""
+    """Taken from it after an episode that ended before `early` of its time for which the axis is to blame. More than
+    `rise`: an axis comes to rest where five of nine of its episodes succeed."""
     early: float = Field(default=0.7, gt=0.0, le=1.0)
     """Part of the time limit before which an end counts as a failure."""
     tracking: float = Field(default=0.65, ge=0.0, le=1.0)
-    """Tracking that a success needs: velocity, yaw rate, height and pitch are scored between 0 and 1 by their terms of
-    the reward, averaged over the episode, and the worst counts. The mean of the four would let a robot pass that stands
-    where it should walk at 0.3 m/s: it scores 0.24 for velocity and 0.7 on the whole."""
-    limit: float = Field(default=3.0, ge=0.0, le=3.0)
-    """Highest level."""
+    """Mean scores of height and pitch, by the kernels of their terms of the reward, that a success of posture, load and
+    disturbance needs."""
+    progress: float = Field(default=0.6, ge=0.0, le=1.0)
+    """Part of the commanded displacement that a success of locomotion covers, counted along the command and no faster
+    than it; 1 is the command itself. Above level 1, where a command may be infeasible, posture counts in its place."""
+    heading: float = Field(default=0.5, gt=0.0)
+    """Mean heading error [rad] that a success of locomotion may have; above level 1 it does not count."""
+    lagging: float = Field(default=0.2, ge=0.0, le=1.0)
+    """Part of the commanded displacement below which an episode with walking lowers the level of locomotion, although
+    the robot stood: a stepping statue."""
+    least_walk: float = Field(default=2.0, ge=0.0)
+    """Time with a commanded velocity from which on an episode says something about locomotion [s]."""
+    blame: float = Field(default=1.0, ge=0.0)
+    """Time after an impulse or a push within which a fall is put down to it [s]."""
+    limit: float = Field(default=2.0, ge=0.0, le=2.0)
+    """Highest level of any axis."""
 
     @model_validator(mode="after")
     def _level_within_limit(self) -> Self:

@@ -24,12 +24,14 @@ class Commander:
         references: ReferenceLayer,
         scripts: Sequence[CommandScript | None],
         holding: Mask,
+        pushing: Mask,
         period: float,
     ) -> None:
-        """`holding`: environments that begin with an object in the hands, (n,)."""
+        """`holding`: environments that begin with an object in the hands, `pushing`: with a crate before them, (n,)."""
         commands = task.commands
         self._nominal, self._start = nominal_command(commands), np.where(holding, commands.holding_start, 1.0)[:, None]
         self._commands, self._curriculum, self._references, self._period = commands, task.curriculum, references, period
+        self._pushing = pushing
         self._largest_step = rate_limits(commands.rates) * period
         self.scripted = np.array([script is not None for script in scripts])
         self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
@@ -59,8 +61,10 @@ class Commander:
 
     def _draw(self, which: Indices, memory: Memory, key: Keys) -> None:
         drawn = random.absorb(key, memory.draws[which])
-        hardness = difficulty(self._curriculum, memory.level[which])
-        memory.goal[which] = draw_goals(self._commands, drawn, hardness)
+        hardness = difficulty(self._curriculum, memory.played[which])
+        memory.goal[which] = draw_goals(
+            self._commands, drawn, hardness, pushing=self._pushing[which], walking=memory.walking[which]
+        )
         held = draw_holding_time(self._commands, drawn)
         memory.goal_until[which] = memory.steps[which] + np.ceil(held / self._period).astype(np.int64)
         memory.draws[which] += 1

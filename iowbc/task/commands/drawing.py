@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc import counter_random as random
-from iowbc.arrays import Array, Keys
+from iowbc.arrays import Array, Keys, Mask
 from iowbc.control.command import COMMAND, HEIGHT, PITCH
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.curriculum import Difficulty
@@ -16,11 +16,16 @@ def nominal_command(commands: Commands) -> Array:
     return command
 
 
-def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty) -> Array:
-    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty."""
+def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty, *, pushing: Mask, walking: Mask) -> Array:
+    """Goals (n, 11), a pure function of the keys (n,); ranges scaled by the difficulty.
+
+    pushing: environments with a crate before them, (n,); walking: those whose episode has commands to walk, (n,).
+    """
     goals = np.empty((len(key), len(COMMAND)))
-    goals[:, :3] = _velocities(commands, key, difficulty)
+    goals[:, :3] = _velocities(commands, key, difficulty, pushing) * walking[:, None]
     goals[:, 3:] = _posture(commands, key, difficulty.posture)
+    deep = _deep_pitch(commands, key, difficulty.posture) * ~goals[:, :3].any(axis=1)
+    goals[:, PITCH] = np.where(deep != 0.0, deep, goals[:, PITCH])
     return goals
 
 
@@ -31,18 +36,33 @@ def draw_holding_time(commands: Commands, key: Keys) -> Array:
     return held
 
 
-def _velocities(commands: Commands, key: Keys, difficulty: Difficulty) -> Array:
-    """v_x, v_y, ω ~ U(range)·scale; a share stands, a share walks straight, short velocities are lengthened."""
-    u = random.uniform(key, "command/velocity", 5)
-    low, high = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate]).T
-    velocity = (low + (high - low) * u[:, :3]) * difficulty.velocity[:, None]
+def _velocities(commands: Commands, key: Keys, difficulty: Difficulty, pushing: Mask) -> Array:
+    """v_x, v_y, ω ~ U(range)·scale: some stand, go straight or turn on the spot; short ones are lengthened."""
+    u = random.uniform(key, "command/velocity", 6)
+    ranges = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate])
+    behind = np.array([commands.pushing.velocity_x, commands.pushing.velocity_y, commands.pushing.yaw_rate])
+    low, high = np.moveaxis(np.where(pushing[:, None, None], behind, ranges), -1, 0)
+    velocity = low + (high - low) * u[:, :3]
+    velocity[:, 0] *= difficulty.velocity
+    velocity[:, 1:] *= difficulty.turning[:, None]
     velocity[:, 1:] *= (u[:, 3] >= commands.straight_share)[:, None]
+    on_the_spot = (u[:, 4] < commands.turning_share) & (u[:, 3] >= commands.straight_share) & ~pushing
+    velocity[on_the_spot, :2] = 0.0
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     short = (speed > 0.0) & (speed < commands.smallest_speed)
     velocity[:, :2] *= np.where(short, commands.smallest_speed / np.where(short, speed, 1.0), 1.0)[:, None]
-    walking_share = (1.0 - commands.standing_share) * np.minimum(difficulty.velocity, 1.0)
-    moving: Array = velocity * (u[:, 4] < walking_share)[:, None]
+    slow = on_the_spot & (np.abs(velocity[:, 2]) < commands.smallest_yaw_rate)
+    velocity[slow, 2] = np.copysign(commands.smallest_yaw_rate, velocity[slow, 2])
+    moving: Array = velocity * (u[:, 5] >= commands.standing_share)[:, None]
     return moving
+
+
+def _deep_pitch(commands: Commands, key: Keys, scale: Array) -> Array:
+    """α ~ U(deep_pitch)·scale in a share of the commands, zero in the others, (n,) [rad]."""
+    u = random.uniform(key, "command/deep", 2)
+    low, high = commands.deep_pitch
+    deep: Array = (low + (high - low) * u[:, 0]) * scale * (u[:, 1] < commands.deep_share)
+    return deep
 
 
 def _posture(commands: Commands, key: Keys, scale: Array) -> Array:

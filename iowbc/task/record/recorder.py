@@ -3,19 +3,22 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.control.command import HEIGHT, PITCH, VELOCITY
+from iowbc.arrays import Mask
+from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.sim.state import SimulationState
 from iowbc.task.endings import Ending
+from iowbc.task.judge import Judgement
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
-from iowbc.task.record.signals import COUNTERS, REASONS
+from iowbc.task.record.signals import COUNTERS, ERRORS, KINDS, REASONS
 from iowbc.task.rewards import smooth
-from iowbc.task.rewards.reward import Scored
 from iowbc.task.vector.shared import Buffers
 
 TORSO_CENTRE = 0.25
 """Height of the point whose motion is recorded as the torso's, above the pelvis along the torso [m]."""
 COLUMN = {name: index for index, name in enumerate(COUNTERS)}
+STANDING, WALKING = (slice(COLUMN[f"{kind}/steps"], COLUMN[f"{kind}/{ERRORS[-1]}"] + 1) for kind in KINDS)
+"""Columns of steps and errors."""
 
 
 def write_signals(
@@ -34,10 +37,10 @@ def write_signals(
         "slipped": (state.has_object[:, None] & ~state.grasped).any(axis=1),
         "fallen": ending.fallen,
         "dropped": ending.dropped,
+        "lagging": ending.lagging,
         "diverged": ending.diverged,
         "power": smooth.power(state.joint_torque, state.joint_velocity),
         "phase": memory.phase,
-        "level": memory.level,
         "time": memory.steps * period,
     }
     for name, values in columns.items():
@@ -47,6 +50,7 @@ def write_signals(
     buffers["signal/grip_force"][:] = state.grip_force.reshape(-1, 6)
     buffers["signal/partner_force"][:] = state.partner_force
     buffers["signal/base_position"][:] = state.base_position
+    buffers["signal/level"][:] = memory.level
     buffers["signal/foot_contact"][:] = state.foot_contact
 
 
@@ -66,20 +70,33 @@ def write_trial_signals(buffers: Buffers, state: SimulationState) -> None:
         buffers[f"signal/{name}"][:] = columns
 
 
-def count_step(buffers: Buffers, scored: Scored) -> None:
+def count_step(buffers: Buffers, judgement: Judgement, memory: Memory) -> None:
     """Adds a step to the counters."""
-    counters = buffers["counters"]
+    counters, scored = buffers["counters"], judgement.scored
     buffers["terms"][:] += scored.terms
     counters[:, COLUMN["steps"]] += 1.0
     counters[:, COLUMN["tracking"]] += scored.tracking.mean(axis=1)
+    moved, command = judgement.motion, judgement.command
+    errors = np.empty((len(command), 1 + len(ERRORS)))
+    errors[:, 0] = 1.0
+    errors[:, 1] = np.linalg.norm(memory.filtered_velocity[:, :YAW_RATE] - command[:, :YAW_RATE], axis=1)
+    errors[:, 2] = judgement.heading_error
+    errors[:, 3] = moved.height - command[:, HEIGHT]
+    errors[:, 4] = moved.torso_pitch - command[:, PITCH]
+    np.abs(errors, out=errors)
+    walking = np.any(command[:, VELOCITY], axis=1, keepdims=True)
+    counters[:, STANDING] += errors * ~walking
+    counters[:, WALKING] += errors * walking
 
 
-def count_endings(buffers: Buffers, ending: Ending, which: NDArray[np.intp]) -> None:
-    """Adds the episodes that ended, (k,), to the counters."""
+def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], which: NDArray[np.intp]) -> None:
+    """Adds the episodes that ended, (k,), to the counters; `causes` of falls by name, (n,)."""
     counters = buffers["counters"]
     counters[which, COLUMN["episodes"]] += 1.0
     counters[which, COLUMN["length"]] += buffers["episode_length"][which]
     counters[which, COLUMN["return"]] += buffers["episode_return"][which]
+    for cause, found in causes.items():
+        counters[which, COLUMN[f"fell/{cause}"]] += found[which]
     reasons = ending.reasons()
     for name in REASONS:
         counters[which, COLUMN[name]] += reasons[name][which]

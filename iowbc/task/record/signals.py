@@ -22,18 +22,20 @@ SIGNALS = {
     "slipped": 1,
     "fallen": 1,
     "dropped": 1,
+    "lagging": 1,
     "diverged": 1,
     "base_position": 3,
     "power": 1,
     "phase": 1,
     "foot_contact": 2,
-    "level": 1,
+    "level": 4,
     "time": 1,
 }
 """Signals with their sizes: values of the step just made, before an automatic reset. v_sys and the commanded velocity
 (v_x, v_y, ω) in the heading frame [m/s, rad/s], heading and its reference [rad], torso pitch [rad], height that H
 speaks of [m], saturated fraction of all joints, forces of left and right grip and of the partner in the world frame
-[N], flags, base position in the world frame [m], power [W], gait phase in [0, 1), feet in contact, curriculum level,
+[N], flags, base position in the world frame [m], power [W], gait phase in [0, 1), feet in contact, curriculum
+levels,
 time in the episode [s]."""
 
 TRIAL_SIGNALS = {
@@ -48,10 +50,20 @@ sole centre [m], their velocities [m/s], the ground's vertical force on each foo
 JOINT_SIGNALS = ("joint_torque", "joint_saturation")
 """Signals of planned episodes with a value a joint: torque [N·m], whether it is at its limit."""
 
-REASONS = ("fallen", "dropped", "time_limit", "diverged")
+REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")
 """Why an episode ended."""
-COUNTERS = ("steps", "tracking", "episodes", "length", "return", *REASONS)
-"""Columns of the statistics: sums since they were last read. Length in steps."""
+CAUSES = ("walking", "standing", "disturbed")
+"""What a robot was doing that fell: walking or standing, or it had just been disturbed."""
+KINDS = ("standing", "walking")
+"""What a command asks for."""
+ERRORS = ("velocity", "heading", "height", "pitch")
+"""What is tracked: the size of v_sys - v_coll in the plane, filtered [m/s], heading [rad], height [m], pitch [rad]."""
+COUNTERS = (
+    *("steps", "tracking", "episodes", "length", "return", *REASONS),
+    *(f"fell/{cause}" for cause in CAUSES),
+    *(f"{kind}/{name}" for kind in KINDS for name in ("steps", *ERRORS)),
+)
+"""Columns of the statistics: sums since they were last read. Length in steps, errors absolute."""
 
 
 def trial_signals(joints: int) -> dict[str, int]:

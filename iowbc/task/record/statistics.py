@@ -1,43 +1,69 @@
 """From the counters of the environments to the figures of a stretch of training."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.task.record.signals import COUNTERS, REASONS
+from iowbc.task.curriculum import AXES
+from iowbc.task.record.signals import CAUSES, COUNTERS, ERRORS, KINDS, REASONS
 from iowbc.task.rewards.table import TERMS
 
-EPISODIC = ("episode_seconds", "episode_return", *(f"terminations/{reason}" for reason in REASONS))
+EPISODIC = (
+    *("episode_seconds", "episode_return"),
+    *(f"terminations/{reason}" for reason in REASONS),
+    *(f"falls/{cause}" for cause in CAUSES),
+)
 """Figures of episodes that ended; where none did, the last value is carried on."""
 
 
 class Statistics:
     """Figures since they were last read; all of them are always there, and finite."""
 
-    def __init__(self, period: float) -> None:
-        """`period`: control period [s]."""
+    def __init__(self, period: float, scenes: Sequence[str]) -> None:
+        """`period`: control period [s]; `scenes`: name of each environment's."""
         self._period = period
-        self.carried = np.zeros(len(EPISODIC))
-        """The last values of `EPISODIC`."""
+        names = np.array(scenes)
+        self._scenes = {name: names == name for name in dict.fromkeys(scenes)}
+        self._kept = len(EPISODIC)
+        self._errors = [f"error/{s}/{kind}/{error}" for s in self._scenes for kind in KINDS for error in ERRORS]
+        self.carried = np.zeros(self._kept + len(self._errors))
+        """The last values of what not every stretch has: `EPISODIC`, and the errors."""
 
-    def read(self, counters: Array, terms: Array, level: Array) -> dict[str, float]:
-        """Figures from counters (n, len(COUNTERS)), sums of the reward's terms (n, len(TERMS)) and levels (n,); sets
-        counters and sums back.
+    def read(self, counters: Array, terms: Array, levels: Array) -> dict[str, float]:
+        """Figures from counters (n, len(COUNTERS)), sums of the reward's terms (n, len(TERMS)) and levels (n, axes);
+        sets counters and sums back.
 
-        Rewards are means per second, terminations parts of the episodes that ended, divergences a number.
+        Rewards are means per second, terminations and falls parts of the episodes that ended, divergences a number,
+        errors means of absolute values by scene and by what the command asks for.
         """
         total = dict(zip(COUNTERS, counters.sum(axis=0).tolist(), strict=True))
         rewards = dict(
             zip(TERMS, (terms.sum(axis=0) / (max(total["steps"], 1.0) * self._period)).tolist(), strict=True)
         )
+        self._carry_errors(counters)
         counters[:], terms[:] = 0.0, 0.0
         if ended := total["episodes"]:
-            ways = [total[reason] / ended for reason in REASONS]
-            self.carried[:] = [total["length"] / ended * self._period, total["return"] / ended, *ways]
+            ways = [total[reason] / ended for reason in (*REASONS, *(f"fell/{cause}" for cause in CAUSES))]
+            self.carried[: self._kept] = [total["length"] / ended * self._period, total["return"] / ended, *ways]
         return {
             "reward": sum(rewards.values()),
-            **dict(zip(EPISODIC, self.carried.tolist(), strict=True)),
+            **dict(zip((*EPISODIC, *self._errors), self.carried.tolist(), strict=True)),
             "tracking": total["tracking"] / max(total["steps"], 1.0),
-            "curriculum_level": float(level.mean()),
+            "curriculum_level": float(levels.mean()),
+            **dict(zip((f"level/{axis}" for axis in AXES), levels.mean(axis=0).tolist(), strict=True)),
             "divergences": total["diverged"],
             **{f"reward/{path}": value for path, value in rewards.items()},
         }
+
+    def _carry_errors(self, counters: Array) -> None:
+        """Means of the errors of each scene, standing and walking; the last ones where there was no such step."""
+        place = self._kept
+        for rows in self._scenes.values():
+            sums = counters[rows].sum(axis=0)
+            for kind in KINDS:
+                steps = sums[COUNTERS.index(f"{kind}/steps")]
+                first = COUNTERS.index(f"{kind}/{ERRORS[0]}")
+                if steps:
+                    self.carried[place : place + len(ERRORS)] = sums[first : first + len(ERRORS)] / steps
+                place += len(ERRORS)

@@ -22,6 +22,12 @@ def foot_slip(foot_velocity: Array, contact: Mask) -> Array:
     return squared_norm(foot_velocity[:, :, :2] * contact[:, :, None])
 
 
+def standing(contact: Mask, stepping: Mask) -> Array:
+    """Feet off the ground while the clock rests, (n,); feet (n, 2), clock (n,)."""
+    lifted: Array = (~contact).sum(axis=1) * ~stepping
+    return lifted
+
+
 def foot_distance(foot_position: Array, smallest: float) -> Array:
     """max(0, d_min − (y_left − y_right))², (n,) [m²]; soles in the heading frame (n, 2, 3) [m]."""
     lack = np.maximum(smallest - (foot_position[:, 0, 1] - foot_position[:, 1, 1]), 0.0)

@@ -23,15 +23,6 @@ class Scored:
     tracking: Array
     """The scores of the terms `TRACKED`, between 0 and 1, (n, tracked)."""
 
-    def without(self, which: Mask) -> "Scored":
-        """The same with nothing for some environments, (n,): what they did cannot be judged."""
-        if not which.any():
-            return self
-        kept = ~which
-        terms = np.where(kept[:, None], self.terms, 0.0)
-        tracking = np.where(kept[:, None], self.tracking, 0.0)
-        return Scored(reward=np.where(kept, self.reward, 0.0), terms=terms, tracking=tracking)
-
 
 @dataclass(frozen=True)
 class WeightedTerm:
@@ -66,13 +57,17 @@ class RewardFunction:
         }
         self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
         self._tracked = [weighted[path].column for path in TRACKED]
+        self._once = [weighted[path].column for path in ONCE]
         self._weights = np.array([term.weight for term in weighted.values()])
 
-    def __call__(self, step: Step) -> Scored:
-        """Reward of one control step."""
+    def __call__(self, step: Step, diverged: Mask) -> Scored:
+        """Reward of one control step. What diverged, (n,), cannot be judged: it costs like a fall, and no more."""
         terms = np.zeros((len(step.command), self._columns))
         for term in self._terms:
             terms[:, term.column] = term.value(step)
+        if diverged.any():
+            terms[diverged] = 0.0
+            terms[diverged, self._once] = 1.0
         tracking = terms[:, self._tracked]
         terms *= self._weights
         return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)

@@ -1,12 +1,15 @@
 """r_sync: coupled motion consistency (eq. 7), and the tracking of the rest of the command.
 
-Squared errors; all but the roll are scored by `kernel`.
+Squared errors; progress, turning and roll count as they are, the others are scored by `kernel`.
 """
 
 import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.task.rewards.kernel import squared_norm
+
+SLOW = 1e-6
+"""Keeps a command to stand from dividing by zero [m/s]."""
 
 
 def support_reference(support_position: Array, support_reference: Array) -> Array:
@@ -22,6 +25,30 @@ def system_velocity(velocity: Array, command: Array) -> Array:
 def yaw_rate(rate: Array, command: Array) -> Array:
     """(ω − ω_yaw)², (n,) [rad²/s²]; filtered rate (n,)."""
     squared: Array = np.square(rate - command)
+    return squared
+
+
+def progress(velocity: Array, command: Array) -> Array:
+    """v_sys along the commanded velocity, no more than commanded, (n,) [m/s]; (n, 2), heading frame. Zero without one.
+
+    Its slope is the same wherever the robot is too slow, unlike that of a kernel, which is flat far from the command.
+    """
+    speed = np.hypot(command[:, 0], command[:, 1])
+    along = np.vecdot(velocity, command) / np.maximum(speed, SLOW)
+    clipped: Array = np.clip(along, -speed, speed)
+    return clipped
+
+
+def turning(rate: Array, command: Array) -> Array:
+    """Yaw rate towards the commanded one, no more than commanded, (n,) [rad/s]."""
+    limit = np.abs(command)
+    clipped: Array = np.clip(rate * np.sign(command), -limit, limit)
+    return clipped
+
+
+def heading(error: Array) -> Array:
+    """(ψ − ψ_ref)², (n,) [rad²]; the reference integrates the commanded yaw rate."""
+    squared: Array = np.square(error)
     return squared
 
 

@@ -36,12 +36,16 @@ class Step:
     """θ_S_ref in force during the step, gait prior included, (n, 15) [rad]."""
     filtered_velocity: Array
     """Low-passed v_sys, heading frame [m/s], and yaw rate [rad/s], (n, 3)."""
+    heading_error: Array
+    """Heading less its reference, (n,) [rad]."""
     action: Array
     """a_t, (n, 15)."""
     previous_action: Array
     """a_{t−1}, (n, 15)."""
     swing_profile: Array
     """Height at which the gait prior has the soles, (n, 2) [m]."""
+    stepping: Mask
+    """Whether the gait clock runs, (n,)."""
     stance: Mask
     """Feet that should be on the ground, (n, 2)."""
     held: Mask
@@ -60,6 +64,9 @@ TERMS: dict[str, Term] = {
     ),
     "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
     "sync.yaw_rate": lambda s: sync.yaw_rate(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
+    "sync.progress": lambda s: sync.progress(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
+    "sync.turning": lambda s: sync.turning(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
+    "sync.heading": lambda s: sync.heading(s.heading_error),
     "sync.height": lambda s: sync.height(s.motion.height, s.command[:, HEIGHT]),
     "sync.torso_pitch": lambda s: sync.torso_pitch(s.motion.torso_pitch, s.command[:, PITCH]),
     "sync.torso_roll": lambda s: sync.torso_roll(s.motion.torso_roll),
@@ -77,6 +84,7 @@ TERMS: dict[str, Term] = {
     "gait.contact_timing": lambda s: gait.contact_timing(s.state.foot_contact, s.stance),
     "gait.swing_height": lambda s: gait.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
     "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_contact),
+    "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
     "alive": lambda s: np.ones(len(s.command)),
     "termination": lambda s: s.ended,
@@ -84,5 +92,5 @@ TERMS: dict[str, Term] = {
 """The terms; each counts once a second, times its weight."""
 ONCE = ("termination",)
 """Terms that count once when they are due, and not by the second."""
-TRACKED = ("sync.system_velocity", "sync.yaw_rate", "sync.height", "sync.torso_pitch")
-"""Terms with a kernel whose scores say how well an environment tracks its command."""
+TRACKED = ("sync.height", "sync.torso_pitch")
+"""Terms with a kernel whose scores say how well an environment keeps its posture."""

@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
 from iowbc.task.batch import Batch
+from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import REASONS, SIGNALS
@@ -64,7 +65,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """Values of the last step, before an automatic reset, (num_envs, k); see `iowbc.task.record.signals`."""
         self.period = 1.0 / recipe.task.control_frequency
         """Time of a control step [s]."""
-        self._statistics = Statistics(self.period)
+        self._statistics = Statistics(self.period, self._scenes)
         self._began = time.monotonic()
         bound, actions = recipe.task.action.bound, self._buffers["action"].shape[1]
         super().__init__(
@@ -135,19 +136,25 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return join(self._call("drawn"))
 
     def curriculum(self) -> dict[str, Any]:
-        """How far the curriculum is, for JSON: the levels in each scene, ascending."""
-        levels = self._levels()
-        scenes = np.array(self._scenes)
-        return {"levels": {name: sorted(levels[scenes == name].tolist()) for name in dict.fromkeys(self._scenes)}}
+        """How far the curriculum is, for JSON: the levels of each axis in each scene, ascending."""
+        levels, scenes = self._levels(), np.array(self._scenes)
+        return {
+            "levels": {
+                name: {axis: sorted(levels[scenes == name, place].tolist()) for place, axis in enumerate(AXES)}
+                for name in dict.fromkeys(self._scenes)
+            }
+        }
 
     def set_curriculum(self, curriculum: Mapping[str, Any]) -> None:
         """Spreads the levels of another vector environment's `curriculum` over the environments of each scene."""
-        known: Mapping[str, Sequence[float]] = curriculum["levels"]
-        every = sorted(level for levels in known.values() for level in levels)
-        scenes, levels = np.array(self._scenes), np.empty(self.num_envs)
+        known: Mapping[str, Mapping[str, Sequence[float]]] = curriculum["levels"]
+        every = {axis: [level for levels in known.values() for level in levels[axis]] for axis in AXES}
+        scenes, levels = np.array(self._scenes), np.empty((self.num_envs, len(AXES)))
         for name in dict.fromkeys(self._scenes):
             rows = np.flatnonzero(scenes == name)
-            levels[rows] = np.quantile(known.get(name) or every, (np.arange(len(rows)) + 0.5) / len(rows))
+            for place, axis in enumerate(AXES):
+                quantiles = (np.arange(len(rows)) + 0.5) / len(rows)
+                levels[rows, place] = np.quantile(known.get(name, every)[axis], quantiles)
         self._call("set_levels", [(levels[first:last],) for first, last in self.workers.groups])
 
     def state(self) -> dict[str, Array]:
@@ -175,7 +182,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             return [self._scenes[row] for row in rows]
         if attr_name == "level":
             levels = self._levels()
-            return [float(levels[row]) for row in rows]
+            return [dict(zip(AXES, levels[row].tolist(), strict=True)) for row in rows]
         if attr_name in ("observation_space", "action_space", "layout"):
             return [getattr(self, attr_name) for _ in rows]
         raise AttributeError(
@@ -183,11 +190,15 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         )
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Sets the curriculum `level` of environments, from their next episode on."""
+        """Sets the curriculum `level` of environments, from their next episode on: a number for all, or a mapping of
+        axes to numbers that leaves the others."""
         if attr_name != "level":
             raise AttributeError(f"{attr_name!r} of an environment cannot be set; `level` can")
         levels = self._levels()
-        levels[list(self._get_indices(indices))] = value
+        rows = list(self._get_indices(indices))
+        axes = value if isinstance(value, Mapping) else dict.fromkeys(AXES, value)
+        for axis, level in axes.items():
+            levels[rows, AXES.index(axis)] = level
         self._call("set_levels", [(levels[first:last],) for first, last in self.workers.groups])
 
     def env_method(

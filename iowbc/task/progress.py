@@ -1,0 +1,52 @@
+"""How an episode goes: what was commanded and what came of it, summed for the curriculum."""
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.control.command import VELOCITY, YAW_RATE
+from iowbc.recipe.task.termination import Termination
+from iowbc.task.curriculum import Course
+from iowbc.task.endings import Ending
+from iowbc.task.memory import Memory
+from iowbc.task.motion import Motion
+from iowbc.task.rewards.sync import progress
+
+LEAST = 1e-9
+"""Keeps an episode that commanded nothing from dividing by zero [m]."""
+
+
+def heading_error(moved: Motion, memory: Memory) -> Array:
+    """Heading less its reference, in [-π, π), (n,) [rad]."""
+    error: Array = np.mod(moved.heading - memory.heading_reference + np.pi, 2.0 * np.pi) - np.pi
+    return error
+
+
+def follow(memory: Memory, error: Array, disturbed: Mask, termination: Termination, period: float) -> None:
+    """Takes the step just made, of `period` [s], into the sums; `error`: of the heading, (n,) [rad]."""
+    command = memory.command[:, :YAW_RATE]
+    speed = np.hypot(command[:, 0], command[:, 1])
+    along = progress(memory.filtered_velocity[:, :YAW_RATE], command)
+    memory.walked += memory.command[:, VELOCITY].any(axis=1)
+    memory.commanded += speed * period
+    memory.covered += along * period
+    memory.heading_error += np.abs(error)
+    forgotten = memory.lag * (1.0 - period / termination.lag_time) + (speed - along) * period
+    memory.lag[:] = np.where(speed > 0.0, np.maximum(forgotten, 0.0), 0.0)
+    memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
+
+
+def course(memory: Memory, ending: Ending, period: float, blame: float) -> Course:
+    """How the episodes went that end in this step; `blame`: time after a disturbance within which it counts [s]."""
+    steps = np.maximum(memory.steps, 1)
+    moved = memory.commanded > LEAST
+    return Course(
+        survived=ending.truncated,
+        progress_in_time=memory.steps / memory.limit,
+        posture=memory.tracking.min(axis=1) / steps,
+        walked=memory.walked * period,
+        covered=np.where(moved, memory.covered / np.maximum(memory.commanded, LEAST), 1.0),
+        heading=memory.heading_error / steps,
+        stepping=memory.stepping.copy(),
+        lagged=ending.lagging,
+        disturbed=memory.undisturbed * period <= blame,
+    )
