@@ -56,7 +56,7 @@ def main(
         mirrors = environments.layout.mirror, action_mirror(load_robot(folder))
         other = _plain(specification, scene, count, samples) if count else None
         try:
-            training = TeacherTraining(settings, environments, mirrors, recipe.seed, cores)
+            training = TeacherTraining(settings, environments, mirrors, recipe.seed, cores=cores)
             rows, rates, other_rates = [], [], []
             for turn in range(turns + 1):  # the first warms up
                 begin = time.perf_counter()

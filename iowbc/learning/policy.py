@@ -71,6 +71,10 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         """Logarithm of the standard deviation, (A,)."""
         return self.log_stds[self.std_place]
 
+    def finite(self) -> bool:
+        """Whether every parameter is a number."""
+        return all(bool(torch.isfinite(parameter).all()) for parameter in self.parameters())
+
     def prepared(self, observations: Tensor) -> Tensor:
         """Observations (n, S) as both networks take them in training: normalised, in their mirror basis."""
         return self.actor.prepare(self.normalizer(observations))

@@ -47,11 +47,11 @@ class Learner(PPO):  # type: ignore[misc]
         self.mirrored = MirroredSamples(mirrors, teacher.mirror_gap) if teacher.symmetry == "augment" else None
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
         """Time spent since they were last set back [s]."""
-        self.kl = 0.0
-        """Of the last update's last epoch."""
+        self.caution = 1.0
+        """What the desired KL divergence is multiplied by."""
 
     def _excluded_save_params(self) -> list[str]:
-        own = ["settings", "normalization", "mirrored", "seconds", "side_by_side", "kl", "rollout_buffer"]
+        own = ["settings", "normalization", "mirrored", "seconds", "side_by_side", "rollout_buffer"]
         return [*super()._excluded_save_params(), *own]
 
     @contextmanager
@@ -137,12 +137,11 @@ class Learner(PPO):  # type: ignore[misc]
         every = torch.stack(found).view(self.n_epochs, -1, len(FIGURES))
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
         last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
-        self.kl = last["kl"]
         values = means | {"kl": last["kl"], "approx_kl": last["approx_kl"], "explained_variance": self.explained}
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         for name, value in values.items():
             self.logger.record(f"train/{name}", value)
-        self.learning_rate = adapted(rate, self.kl, settings)
+        self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
 
     def _gradient_step(self, batch: Tensor, before: Tensor) -> Tensor:
         """One step of the optimiser on a minibatch of rows; returns `FIGURES`. `before`: log std before the update."""
@@ -198,13 +197,17 @@ def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
     return teacher.std_floor, max(ceiling, teacher.std_end)
 
 
-def adapted(rate: float, kl: float, teacher: Teacher) -> float:
-    """The next update's step size: a fifth less or more where the KL divergence was far from the desired one."""
+def adapted(rate: float, kl: float, teacher: Teacher, caution: float = 1.0) -> float:
+    """The next update's step size: a fifth less or more where the KL divergence was far from the desired one.
+
+    `caution`: what the desired divergence is multiplied by.
+    """
     if teacher.desired_kl is None:
         return rate
-    if kl > 1.5 * teacher.desired_kl:
+    desired = caution * teacher.desired_kl
+    if kl > 1.5 * desired:
         rate *= 0.8
-    elif kl < teacher.desired_kl / 1.5:
+    elif kl < desired / 1.5:
         rate *= 1.2
     low, high = teacher.learning_rate_range
     return min(max(rate, low), high)

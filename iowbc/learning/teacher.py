@@ -1,8 +1,7 @@
 """The teacher's training, one PPO update at a time (paper III-C)."""
 
-import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,8 +9,8 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
-from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
+from iowbc.learning.best import Best
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors, TeacherNetwork
@@ -19,19 +18,36 @@ from iowbc.learning.ppo import make_learner
 from iowbc.processes import keep_freed_memory
 from iowbc.recipe.teacher import Teacher
 
+FLOOR_REACHED = 1.01
+"""Standard deviations within this factor of their floor count as having arrived there."""
+
+Score = Callable[[TeacherNetwork], Mapping[str, float]]
+"""Figures of a policy, `score` among them: the greater the better."""
+
 
 class TeacherTraining:
     """PPO with privileged information. Between two updates `arrays` holds all that the rest of it depends on."""
 
     def __init__(
-        self, settings: Teacher, environments: Environments, mirrors: Mirrors, seed: int, cores: int = 1
+        self,
+        settings: Teacher,
+        environments: Environments,
+        mirrors: Mirrors,
+        seed: int,
+        *,
+        cores: int = 1,
+        score: Score | None = None,
+        say: Callable[[str], None] = print,
     ) -> None:
-        """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest."""
+        """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest;
+        `score`: a fixed evaluation, by which the best policy is kept; `say`: is told when the training goes back."""
         torch.set_num_threads(1)
         keep_freed_memory()
-        self.settings = settings
-        self.environments = environments
+        self.settings, self.environments = settings, environments
+        self.score = score if settings.check.every is not None else None
+        self.say = say
         self.model = make_learner(settings, environments, seed, mirrors, cores)
+        self.best = Best(settings.check, self._learnt())
         self._callback: BaseCallback | None = None
 
     @property
@@ -45,28 +61,77 @@ class TeacherTraining:
         return self.settings.steps
 
     def update(self) -> dict[str, float]:
-        """One rollout and its gradient steps; returns the figures of both. Raises StageFailed where they diverge."""
+        """One rollout and its gradient steps, and every so often a check; returns their figures.
+
+        Where the networks are lost it goes back to the best policy. Raises StageFailed where that does not help.
+        """
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
         if self._callback is None:
             _, self._callback = model._setup_learn(self.planned - self.steps, None, reset_num_timesteps=False)
+        model.caution = self.best.caution
         model.collect_rollouts(self.environments, self._callback, model.rollout_buffer, model.n_steps)
         model.train()
         training = {name: float(value) for name, value in model.logger.name_to_value.items()}
-        if not all(map(math.isfinite, training.values())):
-            raise StageFailed(f"the networks diverged at {self.steps:,} steps; lower teacher.learning_rate")
+        figures = self.environments.statistics() | self._judged(training)
         seconds = {f"seconds/{part}": spent for part, spent in model.seconds.items()}
         rest = time.perf_counter() - begin - sum(seconds.values())
-        return {**self.environments.statistics(), **training, **seconds, "seconds/rest": rest}
+        return figures | seconds | {"seconds/rest": rest}
+
+    def _judged(self, training: Mapping[str, float]) -> dict[str, float]:
+        """The finite figures of an update and of its check; goes back where they say so."""
+        figures = {name: value for name, value in training.items() if np.isfinite(value)}
+        deviation = self.model.policy.log_std.detach().exp()
+        why = ""
+        if len(figures) < len(training) or not self.model.policy.finite():
+            why = "the networks diverged"
+        elif float(deviation.mean()) <= FLOOR_REACHED * self.settings.std_floor:
+            why = "exploration died out"
+        elif self.score is not None and self._updates % (self.settings.check.every or 1) == 0:
+            found = {f"check/{name}": float(value) for name, value in self.score(self.network()[0]).items()}
+            figures |= found
+            if self.best.collapsed(found["check/score"]):
+                why = f"the score fell from {self.best.score:.3f} to {found['check/score']:.3f}"
+            else:
+                self.best.offer(found["check/score"], self._learnt())
+        if why:
+            self._learn_again(self.best.go_back(f"{why} at {self.steps:,} steps"))
+            low, _ = self.settings.learning_rate_range
+            self.model.learning_rate = max(low, self.settings.check.caution * self.model.learning_rate)
+            self.say(f"{why} at {self.steps:,} steps: goes back to the best policy, with smaller steps")
+        return figures | {"rollbacks": float(self.best.rollbacks)}
+
+    @property
+    def _updates(self) -> int:
+        return self.steps // (self.settings.environments * self.settings.rollout)
+
+    def keep_best(self) -> None:
+        """Ends the training: what it has learnt is from now on what scored best, the last policy being scored, too."""
+        if self.score is not None:
+            self.best.offer(float(self.score(self.network()[0])["score"]), self._learnt())
+            self._learn_again(self.best.learner)
+
+    def _learnt(self) -> Arrays:
+        """What the learner has learnt: networks, optimiser, statistics."""
+        return {
+            **prefixed("policy", checkpoint.module_arrays(self.model.policy)),
+            **prefixed("optimizer", checkpoint.optimizer_arrays(self.model.policy.optimizer)),
+            **prefixed("normalization", self.model.normalization.arrays()),
+        }
+
+    def _learn_again(self, learnt: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `_learnt`."""
+        checkpoint.restore_module(self.model.policy, under("policy", learnt))
+        checkpoint.restore_optimizer(self.model.policy.optimizer, under("optimizer", learnt))
+        self.model.normalization.restore(under("normalization", learnt))
 
     def arrays(self) -> Arrays:
         """Everything that a resumed training needs, between two updates."""
         model = self.model
         assert model._last_obs is not None, "arrays() comes after an update"
         return {
-            **prefixed("policy", checkpoint.module_arrays(model.policy)),
-            **prefixed("optimizer", checkpoint.optimizer_arrays(model.policy.optimizer)),
-            **prefixed("normalization", model.normalization.arrays()),
+            **self._learnt(),
+            **prefixed("best", self.best.arrays()),
             **prefixed("random", checkpoint.random_arrays()),
             **prefixed("environment", self.environments.state()),
             "observation": np.array(model._last_obs),
@@ -77,9 +142,8 @@ class TeacherTraining:
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `arrays`, on a training made from the same recipe."""
         model = self.model
-        checkpoint.restore_module(model.policy, under("policy", arrays))
-        checkpoint.restore_optimizer(model.policy.optimizer, under("optimizer", arrays))
-        model.normalization.restore(under("normalization", arrays))
+        self._learn_again(arrays)
+        self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
         model._last_obs = np.array(arrays["observation"])
         model.num_timesteps, model._n_updates = (int(value) for value in arrays["counters"])
@@ -92,7 +156,8 @@ class TeacherTraining:
         (inputs,), (actions,) = self.model.observation_space.shape, self.model.action_space.shape
         shared = {name: own[name] for name in ("hidden", "activation", "clip", "mirrors")}
         architecture = {"inputs": int(inputs), "actions": int(actions), **shared}
-        network = TeacherNetwork(**architecture)
+        with torch.random.fork_rng(devices=()):
+            network = TeacherNetwork(**architecture)
         network.normalizer.load_state_dict(policy.normalizer.state_dict())
         network.body.load_state_dict(policy.actor.state_dict())
         network.log_std.copy_(policy.log_std.detach())

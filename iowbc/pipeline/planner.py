@@ -47,6 +47,8 @@ class Step:
     expected: float | None = None
     """Time that it took with the same values, the seed aside [s]; None where it never ran with them."""
     code: Mapping[str, str] = field(default_factory=dict)
+    predecessor: Artifact | None = None
+    """The stored artifact that it would go on from."""
 
     @property
     def cached(self) -> bool:
@@ -155,9 +157,33 @@ class Planner:
                 text = f"code changed since it was made: {', '.join(changed)}"
                 (found if self.options.on_code_change == "rerun" else notes).append(text)
             notes.extend(self._looks(stage, artifact))
+        predecessor = None
         if found:
             notes.extend(self._checkpoint(stage, key))
-        return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code)
+            predecessor = None if stage.name in self.options.force else self._predecessor(stage, ingredients)
+            if predecessor is not None:
+                notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
+        return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code, predecessor)
+
+    def _predecessor(self, stage: Stage, ingredients: Mapping[str, Any]) -> Artifact | None:
+        """The whole artifact of a stage that differs in nothing but an earlier end, the latest of several."""
+        if stage.extends is None:
+            return None
+        aim = slice_value(self.deciding, stage.extends, stage)
+        ends: dict[float, Artifact] = {}
+        for artifact in self.store.artifacts(stage.name):
+            old = artifact.ingredients
+            changes = list(differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])))
+            alike = all(old.get(name) == ingredients[name] for name in ("version", "inputs", "robot"))
+            if alike and artifact.whole and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
+                ends[changes[0][1]] = artifact
+        for end in sorted(ends, reverse=True):
+            try:
+                ends[end].verify()
+            except Damaged:
+                continue
+            return ends[end]
+        return None
 
     def _looks(self, stage: Stage, artifact: Artifact) -> Iterator[str]:
         """Cosmetic values of a stage that an artifact was made with otherwise: it is used, and looks as it did."""

@@ -138,6 +138,7 @@ class Runner:
             workers=workers,
             report=StageReport(view, self.display, self.tracker, workspace),
             interrupted=self.interrupted,
+            predecessor=None if step.predecessor is None else step.predecessor.folder,
         )
         try:
             stage.run(job)

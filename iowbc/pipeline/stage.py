@@ -45,6 +45,8 @@ class Job:
     report: Report
     interrupted: Callable[[], bool]
     """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
+    predecessor: Path | None = None
+    """Artifact folder of the same stage that this one goes on from; see `Stage.extends`."""
 
     def summarize(self, metrics: Mapping[str, float], **details: Any) -> None:
         """Leave `summary.json`: the figures that tell how it went, shown wherever the artifact is, and details."""
@@ -75,3 +77,6 @@ class Stage:
     """What a recipe asks that this stage cannot do, known before it runs: dotted paths, and what is wrong there."""
     packages: tuple[str, ...] = ()
     """Subpackages whose code digest is recorded with the artifact, e.g. ("reference", "robot")."""
+    extends: str | None = None
+    """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
+    differs in nothing but a smaller one, as if it had never stopped."""

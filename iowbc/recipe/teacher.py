@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
+from iowbc.recipe.check import Check
 from iowbc.recipe.section import COSMETIC, Section
 
 
@@ -11,7 +12,8 @@ class Teacher(Section):
     """PPO with privileged information."""
 
     steps: int = Field(default=30_000_000, ge=1)
-    """Environment steps of the whole training, summed over the environments."""
+    """Environment steps of the whole training, summed over the environments. Nothing in it depends on this number but
+    where it ends: a training that differs only by a greater one goes on from the finished one."""
     environments: int = Field(default=96, ge=1)
     """Parallel environments (paper: 2048). Few environments with many updates learn from fewer samples."""
     rollout: int = Field(default=48, ge=2)
@@ -74,6 +76,8 @@ class Teacher(Section):
     parts: int = Field(default=2, ge=1)
     """Parts of a minibatch that cores work on side by side while the environments rest; where there are fewer cores,
     one after another, with the same result."""
+    check: Check = Check()
+    """A small fixed evaluation that keeps the best policy and brings a lost training back to it."""
     checkpoint_every: int = Field(default=20, ge=1, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 

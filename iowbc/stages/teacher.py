@@ -1,25 +1,41 @@
 """Stage `teacher`: PPO with privileged information on the vector environment, resumable at every checkpoint."""
 
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
+from typing import TYPE_CHECKING
+
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
-from iowbc.stages.training import train
+from iowbc.stages.training import leave_extendable, train
+
+if TYPE_CHECKING:
+    from iowbc.evaluation.trials.quick import QuickEvaluation
+    from iowbc.task.specification import Specification
 
 PANELS = (
     "episode_seconds",
+    "terminations/fallen",
+    "terminations/dropped",
     "reward",
     "curriculum_level",
+    "check/score",
+    "check/survived",
+    "check/E_v",
+    "check/transport",
     "train/kl",
     "train/clip_share",
     "train/learning_rate",
     "train/std",
     "train/explained_variance",
+    "steps_per_second",
 )
 """Shown in the figure of the learning curves, before the reward's terms."""
 
 
 def run(job: Job) -> None:
-    """Train the teacher; leave its network, normalisation, curves, and an SB3 zip for users' own code."""
+    """Train the teacher; leave its best network, normalisation, curves, and an SB3 zip for users' own code."""
     from iowbc.control.action import action_mirror
+    from iowbc.learning.acting import TeacherPolicy
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
@@ -27,25 +43,36 @@ def run(job: Job) -> None:
     from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
 
-    recipe, settings, robot = job.recipe, job.recipe.teacher, load_robot(job.robot)
-    environments = VectorEnv(
-        Specification(recipe, job.robot, job.inputs.get("rg-fit")),
-        num_envs=settings.environments,
-        workers=job.workers,
-        seed=recipe.seed,
-        divergences=job.work / "divergences",
-    )
-    try:
-        mirrors = environments.layout.mirror, action_mirror(robot)
-        training = TeacherTraining(settings, environments, mirrors, recipe.seed, available_cores())
-        curves = train(
-            job, training, settings.checkpoint_every, lambda values: f"{values['episode_seconds']:.1f} s an episode"
+    recipe, settings = job.recipe, job.recipe.teacher
+    world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
+    with ExitStack() as open_ones:
+        environments = VectorEnv(
+            world,
+            num_envs=settings.environments,
+            workers=job.workers,
+            seed=recipe.seed,
+            divergences=job.work / "divergences",
         )
-        network, architecture = training.network()
+        open_ones.enter_context(closing(environments))
+        score = None
+        if settings.check.every is not None:
+            check = open_ones.enter_context(_check(world, job.workers))
+            score = lambda network: check.play(TeacherPolicy(network))  # noqa: E731
+        training = TeacherTraining(
+            settings,
+            environments,
+            (environments.layout.mirror, action_mirror(load_robot(job.robot))),
+            recipe.seed,
+            cores=available_cores(),
+            score=score,
+            say=job.report.say,
+        )
+        curves = train(job, training, settings.checkpoint_every, _note)
+        leave_extendable(job, training)
+        training.keep_best()
         about = {"layout": environments.layout.describe(), "curriculum": environments.curriculum()}
-    finally:
-        environments.close()
 
+    network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
     training.model.save(job.out / "teacher_sb3.zip")
     if (job.work / "divergences").is_dir():
@@ -54,12 +81,44 @@ def run(job: Job) -> None:
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms))
 
 
+def _check(world: "Specification", workers: int) -> "QuickEvaluation":
+    """The recipe's check. What it plays follows from `teacher.check` and the task; `eval` has no part in it."""
+    from iowbc.evaluation.trials.quick import QuickEvaluation, quick_trials
+    from iowbc.recipe.evaluation.evaluation import Evaluation
+    from iowbc.task.specification import Specification
+
+    check, shares = world.recipe.teacher.check, world.recipe.task.scenes
+    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence)})
+    own = Specification(recipe, world.robot, world.rg)
+    played = {"lift": check.lifting, "push": check.pushing}
+    trials = [
+        trial
+        for scene, masses in played.items()
+        if getattr(shares, scene) > 0.0
+        for trial in quick_trials(own, scene, masses, check.trials, check.seed)
+    ]
+    trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
+    return QuickEvaluation(own, trials, workers=min(workers, len(trials)))
+
+
+def _note(values: Mapping[str, float]) -> str:
+    parts = (
+        f"{values['episode_seconds']:.1f} s an episode",
+        f"{100 * values['terminations/fallen']:.0f} % fall",
+        f"level {values['curriculum_level']:.2f}",
+        f"KL {values.get('train/kl', float('nan')):.3f}",
+        f"{values['steps_per_second']:,.0f} steps/s",
+    )
+    return ", ".join(parts)
+
+
 STAGE = Stage(
     name="teacher",
-    version=2,
+    version=3,
     slice=("seed", "rg.height", "simulation", "task", "teacher"),
     reads=generator_stage,
     run=run,
     results=("teacher.safetensors", "teacher.json"),
-    packages=("stages.teacher", "stages.training", "learning", *ENVIRONMENTS),
+    packages=("stages.teacher", "stages.training", "learning", "evaluation.trials", *ENVIRONMENTS),
+    extends="teacher.steps",
 )

@@ -1,5 +1,6 @@
 """What the stages that train share: updates until the budget is spent, curves, checkpoints, stopping and going on."""
 
+import shutil
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
@@ -34,21 +35,30 @@ class Training(Protocol):
         """Inverse of `arrays`."""
 
 
+STATE, CURVES = "state.safetensors", "curves.jsonl"
+"""Files of an artifact that a longer training goes on from."""
+
+
 def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[Mapping[str, float]], str]) -> "Curves":
-    """Goes on from the job's checkpoint, if there is one, to the end of the training; returns its curves.
+    """Goes on from the job's checkpoint, or from its predecessor's end, to the end of the training; returns its curves.
 
     `checkpoint_every`: updates between two checkpoints; `note`: what to say beside the progress, from the figures of an
     update. Raises Interrupted, with a checkpoint written, once the job is asked to stop.
     """
+    from safetensors.numpy import load_file
+
     from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
     from iowbc.learning.curves import Curves
 
     path = job.work / "training.checkpoint"
-    found = load_checkpoint(path, job.key, job.report.say)
+    found, origin = load_checkpoint(path, job.key, job.report.say), "resumed from its checkpoint"
+    if found is None and job.predecessor is not None:
+        found, origin = load_file(job.predecessor / STATE), "goes on from a finished training"
+        shutil.copyfile(job.predecessor / CURVES, job.work / CURVES)
     if found is not None:
         training.restore(found)
-        job.report.say(f"resumed from its checkpoint at {training.steps:,} of {training.planned:,} steps")
-    curves = Curves(job.work / "curves.jsonl", training.steps)
+        job.report.say(f"{origin} at {training.steps:,} of {training.planned:,} steps")
+    curves = Curves(job.work / CURVES, training.steps)
     updates = 0
     while (before := training.steps) < training.planned:
         began = time.monotonic()
@@ -64,3 +74,13 @@ def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[M
         if stop:
             raise Interrupted(f"stopped at {training.steps:,} of {training.planned:,} steps, checkpoint written")
     return curves
+
+
+def leave_extendable(job: Job, training: Training) -> None:
+    """Leaves the state in which a training ended, and its curves, so that a longer one can go on from them."""
+    import numpy as np
+    from safetensors.numpy import save_file
+
+    arrays = {name: np.ascontiguousarray(value) for name, value in training.arrays().items()}
+    save_file(arrays, job.out / STATE)
+    shutil.copyfile(job.work / CURVES, job.out / CURVES)

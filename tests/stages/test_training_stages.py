@@ -1,5 +1,6 @@
 """The stages that train, whole: what they leave, and that stopping and going on changes nothing."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -29,6 +30,21 @@ def test_a_teacher_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(
     for name in ("teacher.safetensors", "teacher.json"):
         assert (tmp_path / "out" / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
     assert rows(tmp_path / "work") == rows(trained / "teacher" / "work")
+
+
+def test_a_longer_training_goes_on_from_the_finished_one_as_if_it_had_never_stopped(
+    trained: Path, tmp_path: Path
+) -> None:
+    longer = small_recipe(steps=ENVIRONMENTS * 16 * 3)
+    teacher.STAGE.run(make_job(tmp_path / "unbroken", longer, workers=0))
+    job = make_job(tmp_path / "extended", longer, workers=0, key="longer")
+    job = dataclasses.replace(job, predecessor=trained / "teacher" / "out")
+    teacher.STAGE.run(job)
+    assert job.report.lines == ["goes on from a finished training at 128 of 192 steps"]  # type: ignore[attr-defined]
+    for name in ("teacher.safetensors", "teacher.json"):
+        paths = [tmp_path / which / "out" / name for which in ("unbroken", "extended")]
+        assert paths[0].read_bytes() == paths[1].read_bytes(), name
+    assert rows(tmp_path / "unbroken" / "work") == rows(tmp_path / "extended" / "work")
 
 
 def test_a_student_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(trained: Path, tmp_path: Path) -> None:

@@ -1,0 +1,41 @@
+"""The small fixed evaluation by which a training keeps its best policy and notices that it got lost."""
+
+from pydantic import Field, NonNegativeFloat
+
+from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.section import Section
+
+STAND_WALK_TURN = (
+    Segment(duration=1.0, ramp=0.0),
+    Segment(duration=3.0, velocity=(0.4, 0.0, 0.0)),
+    Segment(duration=2.0, velocity=(0.3, 0.0, 0.3)),
+    Segment(duration=2.0, height=0.66, pitch=0.2, ramp=0.8),
+    Segment(duration=2.0, ramp=0.5),
+)
+"""Stand, walk, turn, crouch and lean, stand: 10 s."""
+
+
+class Check(Section):
+    """A few trials, always the same, played with the policy's mean action every so often."""
+
+    every: int | None = Field(default=50, ge=1)
+    """Updates between two checks; a check takes about as long as one update. Empty never checks: the last policy is
+    kept, whatever became of it."""
+    lifting: tuple[NonNegativeFloat, ...] = (0.0, 4.0, 8.0)
+    """Masses in the scene `lift` [kg], where the task plays it; 0 is the scene without an object."""
+    pushing: tuple[NonNegativeFloat, ...] = (30.0,)
+    """Masses in the scene `push` [kg], where the task plays it."""
+    trials: int = Field(default=2, ge=1)
+    """Trials at each mass."""
+    seed: int = Field(default=5000, ge=0)
+    """Seed of the first trial: apart from those of training, evaluation and export."""
+    sequence: tuple[Segment, ...] = Field(default=STAND_WALK_TURN, min_length=1)
+    """Commands of a trial, in order."""
+    collapse: float = Field(default=1 / 3, gt=0, lt=1)
+    """Part of the best score whose loss counts as a collapse: the training goes back to its best policy."""
+    notable: float = Field(default=0.2, ge=0, lt=1)
+    """Best score from which a fall of it can be a collapse; below, scores are mostly chance."""
+    caution: float = Field(default=0.5, gt=0, lt=1)
+    """What the desired KL divergence and the step size are multiplied by after each collapse."""
+    rollbacks: int = Field(default=6, ge=0)
+    """Collapses without a better policy between them after which the stage gives up."""
