@@ -36,6 +36,9 @@ class Robot:
     """Places of the joints from base to torso, in that order, among the support joints."""
     waist_pitch: Indices
     """Those of them that turn about y."""
+    lateral: Indices
+    """Places of joints that do not turn about the lateral axis, among the support joints: height and torso pitch are
+    reached without them."""
     kp: Array
     """Position gains [N·m/rad]."""
     kd: Array
@@ -138,6 +141,7 @@ def load_robot(folder: Path) -> Robot:
         interaction=np.array([index for index in range(len(joints)) if index not in set(support.tolist())]),
         waist=_places(waist, support, joints, source),
         waist_pitch=_places([hinge for hinge in waist if _is_pitch(hinge)], support, joints, source),
+        lateral=np.flatnonzero([not _is_pitch(hinges[index]) for index in support]),
         kp=np.array([float(row["kp"]) for row in rows]),
         kd=np.array([float(row["kd"]) for row in rows]),
         effort=np.array([hinge.effort for hinge in hinges]),

@@ -80,6 +80,7 @@ class Batch:
         self.judge = Judge(
             recipe,
             as_slice(self.robot.support),
+            lateral=self.robot.lateral,
             holding=self._holding,
             followable=~pushing & (episodes is None),
             period=period,

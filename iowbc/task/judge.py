@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Indices, Mask
 from iowbc.control import gait
 from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
@@ -36,12 +36,21 @@ class Judge:
     """Judges the control steps of n environments by a recipe."""
 
     def __init__(
-        self, recipe: Recipe, support: slice | NDArray[np.intp], *, holding: Mask, followable: Mask, period: float
+        self,
+        recipe: Recipe,
+        support: slice | NDArray[np.intp],
+        *,
+        lateral: Indices,
+        holding: Mask,
+        followable: Mask,
+        period: float,
     ) -> None:
-        """`support`: places of the support joints; `holding`: environments that begin with an object in the hands;
-        `followable`: those whose command can be followed, at least in the recipe's own ranges; (n,) each."""
+        """`support`: places of the support joints; `lateral`: places among them, see `Robot.lateral`; `holding`:
+        environments that begin with an object in the hands; `followable`: those whose command can be followed, at least
+        in the recipe's own ranges; (n,) each."""
         self._task, self._height = recipe.task, recipe.rg.height
-        self._support, self._holding, self._followable, self._period = support, holding, followable, period
+        self._support, self._lateral = support, lateral
+        self._holding, self._followable, self._period = holding, followable, period
         self._reward = RewardFunction(recipe.task.reward, period)
         self._velocity = np.zeros((len(holding), 3))
 
@@ -65,6 +74,7 @@ class Judge:
             motion=moved,
             recipe=self._task.reward,
             support=self._support,
+            lateral=self._lateral,
             command=memory.command,
             height_rate=memory.height_rate,
             support_reference=memory.support,

@@ -155,7 +155,7 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
         update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
     )
     RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]))  # type: ignore[arg-type]
-    assert set(TERMS) - set(called) == {"alive", "sync.support_reference"}
+    assert set(TERMS) - set(called) == {"alive", "sync.support_reference", "sync.lateral_reference"}
 
 
 def test_every_number_of_the_recipes_reward_that_is_a_weight_has_its_term() -> None:

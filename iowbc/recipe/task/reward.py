@@ -19,6 +19,9 @@ class Synchronisation(Section):
 
     support_reference: Kernel = Kernel(weight=1.0, width=0.8)
     """‖θ_S − θ_S_ref‖ [rad]."""
+    lateral_reference: Kernel = Kernel(weight=0.0, width=0.5)
+    """The same over the support joints that do not turn about the lateral axis. It takes the place of the term above
+    where θ_S_ref is a constant posture: the other joints have to leave that for the height and pitch commanded."""
     system_velocity: Kernel = Kernel(weight=1.5, width=0.25)
     """‖v_sys − v_coll‖ in the plane, filtered [m/s]; narrow, because at 0.5 m/s standing still would score well."""
     yaw_rate: Kernel = Kernel(weight=0.5, width=0.4)

@@ -193,7 +193,9 @@ def _histogram(
     drawn, _, _ = axes.hist(values, np.linspace(low, high + 1e-9, bins), color=SOFT, edgecolor=INK, linewidth=0.3)
     if beyond := len(values) - int(drawn.sum()):
         text = f"{beyond} beyond, up to {values.max():.3g}"
-        axes.text(0.98, 0.6, text, ha="right", transform=axes.transAxes, fontsize="small", color=INK)
+        axes.text(
+            0.98, 0.6, text, ha="right", transform=axes.transAxes, fontsize="small", color=INK, backgroundcolor="white"
+        )
     if limit is not None:
         axes.axvline(limit.value, color=WARM, linestyle="--", label=limit.meaning)
         axes.legend(fontsize="small")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Indices, Mask
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.recipe.task.reward import Reward
 from iowbc.sim.state import SimulationState
@@ -28,6 +28,8 @@ class Step:
     recipe: Reward
     support: slice | NDArray[np.intp]
     """Places of the support joints among all joints."""
+    lateral: Indices
+    """Support joints that do not turn about the lateral axis, among the support joints."""
     command: Array
     """C in force during the step, (n, 11)."""
     height_rate: Array
@@ -61,6 +63,9 @@ Term = Callable[[Step], Array | Mask]
 TERMS: dict[str, Term] = {
     "sync.support_reference": lambda s: sync.support_reference(
         s.state.joint_position[:, s.support], s.support_reference
+    ),
+    "sync.lateral_reference": lambda s: sync.support_reference(
+        s.state.joint_position[:, s.support][:, s.lateral], s.support_reference[:, s.lateral]
     ),
     "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
     "sync.yaw_rate": lambda s: sync.yaw_rate(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),

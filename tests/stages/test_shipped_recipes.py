@@ -1,0 +1,87 @@
+"""The recipes that come with the package: they can be run, and variants differ from IO-WBC in what they say alone."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iowbc.pipeline.planner import slice_value
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.reading.study import load_study
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.section import deciding
+from iowbc.stages.registry import STAGES
+
+RECIPES = Path(__file__).parents[2] / "recipes"
+VARIANTS = {
+    "wbc": {
+        "simulation.randomization.enabled",
+        "simulation.partner.enabled",
+        "simulation.impulses.enabled",
+        "task.scenes.free",
+        "task.scenes.lift",
+        "task.scenes.push",
+        "task.scenes.tyre",
+        "task.observation.observe_object",
+        "task.reward.object.position",
+        "task.reward.object.orientation",
+        "task.reward.object.vertical_velocity",
+        "eval.simulation",
+    },
+    "wo_rg": {
+        "task.references.use_rg",
+        "task.reward.sync.support_reference.weight",
+        "task.reward.sync.lateral_reference.weight",
+    },
+    "blind": {"task.observation.observe_object"},
+}
+"""What each variant changes, beside its name, description and label."""
+NAMES = {"name", "description", "eval.label"}
+
+
+def recipe(name: str) -> Recipe:
+    return load_recipe(RECIPES / f"{name}.yaml").recipe
+
+
+def leaves(value: Any, path: str = "") -> dict[str, Any]:
+    if not isinstance(value, dict):
+        return {path: value}
+    return {name: leaf for key, inner in value.items() for name, leaf in leaves(inner, f"{path}.{key}").items()}
+
+
+def differences(one: Recipe, other: Recipe) -> set[str]:
+    """Dotted paths of the values that differ; a whole world pinned for the evaluation counts as one."""
+    a, b = leaves(one.model_dump()), leaves(other.model_dump())
+    found = {name.removeprefix(".") for name in a.keys() | b.keys() if a.get(name) != b.get(name)}
+    return {"eval.simulation" if name.startswith("eval.simulation.") else name for name in found}
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in RECIPES.glob("*.yaml") if path.stem != "paper"))
+def test_each_recipe_loads_and_no_stage_objects(name: str) -> None:
+    asked = recipe(name)
+    assert [problem for stage in asked.stages for problem in STAGES[stage].problems(asked)] == []
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_variant_changes_what_it_says_and_nothing_else(name: str) -> None:
+    assert differences(recipe(name), recipe("full")) - NAMES == VARIANTS[name]
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_variant_shares_the_reference_generator(name: str) -> None:
+    own, full = deciding(recipe(name)), deciding(recipe("full"))
+    for stage in (STAGES["rg-dataset"], STAGES["rg-fit"]):
+        for path in stage.slice:
+            assert slice_value(own, path, stage) == slice_value(full, path, stage), path
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_variant_is_evaluated_in_the_world_where_iowbc_was_trained(name: str) -> None:
+    variant, full = recipe(name), recipe("full")
+    assert (variant.eval.simulation or variant.simulation) == (full.eval.simulation or full.simulation)
+
+
+def test_the_papers_recipe_compares_them() -> None:
+    study = load_study(RECIPES / "paper.yaml")
+    assert study is not None
+    assert [variant.recipe.eval.label for variant in study.variants] == ["IO-WBC", "WBC", "w/o RG"]
