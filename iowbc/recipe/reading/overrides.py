@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel
 
-from iowbc.errors import Problem, RecipeError
-from iowbc.recipe.reading.document import Located, located, merged, read_value
+from iowbc.errors import Problem, RecipeError, shown
+from iowbc.recipe.reading.document import MAXIMUM_DEPTH, Located, located, merged, read_value
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.section import Section
 
 
 def overridden(tree: Located, overrides: Sequence[str]) -> Located:
@@ -20,6 +21,8 @@ def overridden(tree: Located, overrides: Sequence[str]) -> Located:
         path = tuple(part.strip() for part in dotted.split("."))
         if not equals or not all(path):
             raise RecipeError([Problem(place, "should read a.b.c=value, for example --set eval.trials=5")])
+        if len(path) > MAXIMUM_DEPTH:
+            raise RecipeError([Problem(shown(place), f"names {len(path)} levels; no recipe has more than a few")])
         if path[0] == "extends":
             raise RecipeError([Problem(place, "'extends' cannot be set here; name the recipe that extends instead")])
         tree = _replaced(tree, path, read_value(text, place), place, ())
@@ -48,7 +51,7 @@ def _default(path: tuple[str, ...], place: str) -> Located:
     """The list that a recipe has at a path when it says nothing there; anything else starts empty."""
     value: object = Recipe(name="default")
     for name in path:
-        value = getattr(value, name, None)
+        value = getattr(value, name) if isinstance(value, Section) and name in type(value).model_fields else None
     if not isinstance(value, (list, tuple)):
         return Located({}, place)
     items = [item.model_dump(mode="json") if isinstance(item, BaseModel) else item for item in value]

@@ -1,5 +1,6 @@
 """From a tree of values to a `Recipe`, with pydantic's errors told in the words of the file."""
 
+import functools
 import re
 import types
 from collections.abc import Iterator, Sequence
@@ -9,16 +10,20 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from iowbc.errors import Problem, RecipeError, nearest, shown
-from iowbc.recipe.reading.document import Located, leaves, plain
+from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
 
 
 def validate(tree: Located) -> Recipe:
-    """The recipe that a tree describes. Raises `RecipeError` with all problems."""
+    """The recipe that a tree describes, laid upon the defaults: a section may hold any part of its keys.
+
+    Raises `RecipeError` with all problems.
+    """
+    whole = merged(_defaults(), tree)
     try:
-        recipe = Recipe.model_validate(plain(tree))
+        recipe = Recipe.model_validate(plain(whole))
     except ValidationError as error:
-        raise RecipeError(_problems(tree, error.errors(include_url=False))) from None
+        raise RecipeError(_problems(whole, error.errors(include_url=False))) from None
     booleans = [
         Problem(found.place, f"key '{'.'.join(path)}' = {found.value}: should be a number, not true or false")
         for path, found in leaves(tree)
@@ -27,6 +32,12 @@ def validate(tree: Located) -> Recipe:
     if booleans:
         raise RecipeError(booleans)
     return recipe
+
+
+@functools.cache
+def _defaults() -> Located:
+    """What a recipe says that says nothing; only its name has to be given."""
+    return located(Recipe(name="default").model_dump(mode="json", exclude={"name"}), "default")
 
 
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
