@@ -11,6 +11,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import Robot
+from iowbc.sim.period import Period
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
 
@@ -47,6 +48,5 @@ def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing)
     world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
     world.recall(0, arrays)
     diverged = np.zeros(1, bool)
-    given = [arrays[name][None] for name in ("target", "effort", "wrench", "push", "resistance")]
-    world.step(given[0], given[1], given[2], given[3], given[4], diverged)
+    world.step(Period.alone(arrays), diverged)
     return bool(diverged[0])

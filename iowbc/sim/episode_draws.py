@@ -16,9 +16,12 @@ PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
 
 
+TINY = 1e-9
+"""Keeps a partner that bears all from dividing by zero."""
 WITH_OBJECT = (
     *("object_mass_scale", "inertia_scale", "object_com_offset", "surface_friction", "object_latency"),
     *("partner_share", "partner_stiffness", "partner_damping", "partner_delay", "partner_pace", "partner_noise"),
+    "partner_share_drift",
 )
 """Quantities that are zero in a scene without an object."""
 WITH_WHEELS = ("object_ground_friction",)
@@ -85,6 +88,9 @@ class Draws:
         self.values["object_mass"] = self._nominal_mass.copy()
         self.values["slip_force"] = self._strength.copy()
         self.values["rolling_resistance"] = np.zeros(n)
+        self.values["grip_shift"] = np.zeros(n)
+        self._far = np.array([0.5 * scene.object.size[0] if scene.object else 0.0 for scene in scenes])
+        self._near = self._far * [scene.grasp.near_end * (scene.kind == "lift") for scene in scenes]
         self._lightest = recipe.randomization.object_mass_scale.low
 
     @property
@@ -118,6 +124,8 @@ class Draws:
         values["object_mass"][which] = mass * self._with_object[which]
         friction = values["object_ground_friction"][which] * values["resistance_scale"][which]
         values["rolling_resistance"][which] = friction * values["object_mass"][which] * GRAVITY
+        borne = values["partner_share"][which].clip(0.0, 1.0 - TINY)
+        values["grip_shift"][which] = np.minimum(borne / (1.0 - borne) * self._far[which], self._near[which])
         values["slip_force"][which] = values["surface_friction"][which] * self._strength[which]
 
     def _hold(self, name: str, which: Indices, values: Array) -> None:
@@ -139,7 +147,7 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
         entries = {name: (_off(value), width) for name, (value, width) in entries.items()}
     shares = {"partner_share": partner.share, PUSH_SHARE: partner.push_share}
     entries |= {name: (value if partner.enabled else _off(value), 1) for name, value in shares.items()}
-    for name in ("stiffness", "damping", "delay", "pace", "noise"):
+    for name in ("share_drift", "stiffness", "damping", "delay", "pace", "noise"):
         entries[f"partner_{name}"] = (getattr(partner, name), 1)
     return entries
 

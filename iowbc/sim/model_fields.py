@@ -67,15 +67,12 @@ class ModelFields:
             self._yielding[ids] = 1.0 / self.body_mass[ids, self._layout.object][:, None]
 
     def _write_object(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
-        fields, thing, speed = self._fields, self._layout.object, self._layout.object_velocity
+        fields, thing = self._fields, self._layout.object
         mass = drawn["object_mass"]
         inertia = self._object_inertia * (mass * drawn["inertia_scale"])[:, None]
         fields["body_mass"][ids, thing] = mass
         fields["body_inertia"][ids, thing] = inertia
         fields["body_ipos"][ids, thing] = drawn["object_com_offset"]
-        if self._scene.kind == "lift" and speed is not None:
-            turning = slice(speed.start + 3, speed.stop)
-            fields["dof_damping"][ids, turning] = self._scene.grasp.swing_damping * inertia
         if self._layout.palms is not None:
             friction = drawn["surface_friction"][:, None]
             fields["geom_friction"][ids[:, None], self._layout.palms, 0] = friction

@@ -32,6 +32,8 @@ class Layout:
     """Bodies of the feet, (2,)."""
     hands: slice | Indices
     """Bodies of the hands, (2,); without an object those of the wrists."""
+    wrists: slice | Indices
+    """Bodies of the wrists, (2,)."""
     object: int | None
     """Body of the object."""
     links: slice | Indices
@@ -81,6 +83,7 @@ class Layout:
             torso=bodies[robot.torso],
             feet=as_slice(feet),
             hands=as_slice(np.array([bodies[name] for name in (robot.wrist_bodies if thing is None else HANDS)])),
+            wrists=as_slice(np.array([bodies[name] for name in robot.wrist_bodies])),
             object=thing,
             links=as_slice(np.array([bodies[name] for name in robot.tree.bodies])),
             soles=as_slice(np.array([sites[name] for name in robot.soles])),

@@ -1,7 +1,8 @@
-"""The second carrier: spring and damper at the object's far handle that follow the command; a share of the load.
+"""The second carrier: a spring, a damper and a preload at the object's far handle, on a path of its own.
 
-Planar vectors are rows x and y of arrays (2, n). All is real sums, products and roots, which round alike however many
-environments there are; NumPy's complex products do not.
+The path is that of the command, integrated from where the episode began: it knows neither where the robot is nor where
+it heads. All is real sums, products and roots, which round alike however many environments there are; NumPy's complex
+products do not.
 """
 
 import numpy as np
@@ -9,137 +10,179 @@ import numpy as np
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.partner import Partner as Recipe
 from iowbc.recipe.simulation.scene import Scene
+from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.delay import DelayLine
+from iowbc.sim.objects import inertia_per_mass
 from iowbc.sim.state import SimulationState
 
-NOISE_WIDTH = 2
-"""Columns of noise that the partner takes each step."""
-
-
+NOISE_WIDTH = 3
+"""Columns of noise that the partner takes each step: two of its unsteady force, one of its share."""
+FEED = 4
+"""What the partner hears of the command: v_x, v_y, yaw rate, height."""
 TINY = 1e-9
 """Keeps a division by a length from dividing by zero."""
 REMEMBERED = (
-    *("stiffness", "damping", "present", "weight", "resistance", "pace", "gust"),
-    *("height", "force", "energy"),
+    *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
+    *("present", "height", "heading", "offset", "aim", "unsteady", "centre", "at", "speed", "arm", "force", "energy"),
 )
-PLANAR = ("aim", "unsteady", "at", "speed", "arm")
-"""What partners remember; planar vectors are (2, n) here and (n, 2) to others."""
 
 
 class Partner:
-    """Partners of n environments. Its forces are held over a control period."""
+    """Partners of n environments. Their forces are held over a control period."""
 
     def __init__(self, recipe: Recipe, scenes: list[Scene], period: float) -> None:
         n = len(scenes)
         self._recipe, self._period = recipe, period
-        self._double_handle = np.array([scene.object.size[0] if scene.object else 0.0 for scene in scenes])
+        things = [scene.object for scene in scenes]
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
-        self._line = DelayLine(n, 3, recipe.delay.high / period)
-        self._stiffness, self._damping, self._present = np.zeros(n), np.zeros(n), np.zeros(n)
-        self._weight, self._resistance, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
-        self._aim, self._unsteady = np.zeros((2, n)), np.zeros((2, n))
-        self._at, self._speed = np.zeros((2, n)), np.zeros((2, n))
-        self._arm, self._height = np.zeros((2, n)), np.zeros(n)
+        ahead = np.array([0.5 * thing.size[0] if thing else 0.0 for thing in things])
+        above = np.array([scene.grasp.height if scene.kind == "lift" else 0.0 for scene in scenes])
+        self._handle = np.stack([ahead, np.zeros(n), above], axis=1)
+        slowest = np.array([inertia_per_mass(thing)[1:].min() if thing else 1.0 for thing in things])
+        self._felt = 1.0 / (1.0 + (ahead * ahead + above * above) / slowest)
+        self._line = DelayLine(n, FEED, recipe.delay.high / period)
+        self._stiffness, self._damping, self._weight = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._resistance, self._bound, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
+        self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._present, self._height = np.zeros(n), np.full(n, np.nan)
+        self._heading, self._offset = np.zeros((n, 2)), np.zeros((n, 2))
+        self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 3))
+        self._at, self._speed, self._arm = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._force, self._energy = np.zeros((n, 3)), np.zeros(n)
         self._keep = float(np.exp(-period / recipe.noise_time))
+        self._keep_share = float(np.exp(-period / recipe.drift_time))
         self._any = False
 
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """New partners for some environments, at rest at the handle."""
         share, mass = drawn["partner_share"][which], drawn["object_mass"][which]
-        pushing = self._pushing[which]
+        resistance, pushing = drawn["rolling_resistance"][which], self._pushing[which]
         present = (share != 0.0) & (mass > 0.0)
-        stable = self._recipe.stability * mass / self._period
-        held = (present & ~pushing).astype(float)
-        self._stiffness[which] = held * np.minimum(drawn["partner_stiffness"][which], stable / self._period)
-        self._damping[which] = held * np.minimum(drawn["partner_damping"][which], stable)
-        self._weight[which] = held * share * mass * GRAVITY
-        self._resistance[which] = (present & pushing) * share * drawn["object_ground_friction"][which] * mass * GRAVITY
+        stable = self._recipe.stability * mass * self._felt[which] / self._period
+        self._stiffness[which] = present * np.minimum(drawn["partner_stiffness"][which], stable / self._period)
+        self._damping[which] = present * np.minimum(drawn["partner_damping"][which], stable)
+        self._weight[which] = (present & ~pushing) * mass * GRAVITY
+        self._resistance[which] = (present & pushing) * resistance
+        strongest = self._recipe.strongest
+        self._bound[which] = np.where(
+            pushing, np.minimum(self._recipe.push_yielding * np.abs(share) * resistance, strongest), strongest
+        )
         self._pace[which] = drawn["partner_pace"][which]
-        self._present[which] = present
-        self._gust[which] = present * drawn["partner_noise"][which] * np.sqrt(1.0 - self._keep**2)
+        self._present[which], self._share[which] = present, share
+        unsteady = np.where(pushing, resistance / self._recipe.noise_resistance, 1.0) * drawn["partner_noise"][which]
+        self._gust[which] = present * unsteady * np.sqrt(1.0 - self._keep**2)
+        self._drift[which] = present * drawn["partner_share_drift"][which] * np.sqrt(1.0 - self._keep_share**2)
+        self._centre[which] = drawn["object_com_offset"][which]
         self._line.set_latency(which, drawn["partner_delay"][which] / self._period)
-        self._line.fill(which, np.zeros((len(which), 3)))
-        self._unsteady[:, which] = 0.0
-        self._energy[which] = 0.0
-        self._force[which] = 0.0
+        self._line.fill(which, np.zeros((len(which), FEED)))
+        for values in (self._unsteady, self._wandering, self._energy, self._force):
+            values[which] = 0.0
+        self._height[which] = np.nan
         self._observe(state)
-        self._aim[:, which] = self._at[:, which]
+        self._aim[which] = self._at[which]
+        forward = state.base_rotation[which][:, :2, 0]
+        forward = forward / (_length(forward) + TINY)[:, None]
+        self._heading[which] = forward
+        away = (self._at - state.base_position)[which]
+        self._offset[which, 0] = forward[:, 0] * away[:, 0] + forward[:, 1] * away[:, 1]
+        self._offset[which, 1] = forward[:, 0] * away[:, 1] - forward[:, 1] * away[:, 0]
         self._any = bool(self._present.any())
 
     def wrench(self, commanded: Array, gust: Array, state: SimulationState, out: Array) -> None:
         """Force and torque about the object's centre of mass, written to `out` (n, 6), of the period to come.
 
-        `commanded` (n, 3): v_x, v_y and yaw rate in the heading frame; `gust` (n, 2) standard normal.
-        F = k (aim - handle) + c (v_aim - v_handle), bounded, plus unsteady force and the share of weight or resistance.
+        `commanded` (n, 4): v_x, v_y and yaw rate in the heading frame, height of the hands [m]; `gust` (n, 3) standard
+        normal. F = k (aim - handle) + c (v_aim - v_handle), bounded, plus the share of the weight upward or of the
+        rolling resistance along the path, plus an unsteady force; torque = (handle - centre of mass) × F.
         """
         out[:] = 0.0
+        state.partner_share[:] = self._share * self._present
         if not self._any:
             return
-        recipe = self._recipe
-        self._line.push(commanded)
-        wanted = self._line.read()
-        wanted *= self._pace[:, None]
-        velocity = _turned(_heading(state.base_rotation), _planar(wanted))
-        push = velocity * (self._resistance / (_length(velocity) + TINY))
-        around = self._at - _planar(state.base_position)
-        around *= wanted[:, 2]
-        velocity[0] -= around[1]
-        velocity[1] += around[0]
-        lead = velocity * self._period
-        lead += self._aim
-        lead -= self._at
-        lead *= np.minimum(1.0, recipe.leash / (_length(lead) + TINY))
+        self._share_now(gust[:, 2], state)
+        velocity = self._path(commanded)
+        along = velocity[:, :2] / (_length(velocity) + TINY)[:, None]
+        lead = self._aim + velocity * self._period - self._at
+        lead[:, :2] *= np.minimum(1.0, self._recipe.leash / (_length(lead) + TINY))[:, None]
+        lead[:, 2] = lead[:, 2].clip(-self._recipe.leash, self._recipe.leash)
         np.add(self._at, lead, out=self._aim)
-        lead *= self._stiffness
+        force = self._force
+        np.multiply(lead, self._stiffness[:, None], out=force)
         velocity -= self._speed
-        velocity *= self._damping
-        lead += velocity
-        lead *= np.minimum(1.0, recipe.strongest / (_length(lead) + TINY))
+        velocity *= self._damping[:, None]
+        force += velocity
+        force[:, :2] *= np.minimum(1.0, self._bound / (_length(force) + TINY))[:, None]
+        force[:, 2] = force[:, 2].clip(-self._bound, self._bound)
         self._unsteady *= self._keep
-        self._unsteady += self._gust * _planar(gust)
-        lead += self._unsteady
-        lead += push
-        out[:, :2] = lead.T
-        out[:, 2] = self._weight - self._damping * state.object_linear_velocity[:, 2]
-        out[:, 5] = self._arm[0] * lead[1] - self._arm[1] * lead[0]
-        self._force[:] = out[:, :3]
+        self._unsteady += self._gust[:, None] * gust[:, :2]
+        force[:, :2] += self._unsteady
+        force[:, :2] += along * (state.partner_share * self._resistance)[:, None]
+        force[:, 2] += state.partner_share * self._weight
+        force *= self._present[:, None]
+        out[:, :3] = force
+        out[:, 3:] = rotations.cross(self._arm, force)
+
+    def _share_now(self, chance: Array, state: SimulationState) -> None:
+        """The share wanders about the one drawn; it neither changes sign nor passes one."""
+        self._wandering *= self._keep_share
+        self._wandering += self._drift * chance
+        low, high = np.minimum(0.0, np.sign(self._share)), np.maximum(0.0, np.sign(self._share))
+        state.partner_share[:] = (self._share + self._wandering).clip(low, high) * self._present
+
+    def _path(self, commanded: Array) -> Array:
+        """Velocity of the path at the handle, (n, 3) [m/s], after the partner's delay; turns the path's heading."""
+        risen = np.nan_to_num(commanded[:, 3] - self._height) / self._period
+        self._height[:] = commanded[:, 3]
+        heard = commanded.copy()
+        heard[:, 3] = risen
+        self._line.push(heard)
+        wanted = self._line.read()
+        cosine, sine = self._heading.T
+        offset_x = cosine * self._offset[:, 0] - sine * self._offset[:, 1]
+        offset_y = sine * self._offset[:, 0] + cosine * self._offset[:, 1]
+        velocity = np.empty((len(wanted), 3))
+        velocity[:, 0] = cosine * wanted[:, 0] - sine * wanted[:, 1] - wanted[:, 2] * offset_y
+        velocity[:, 1] = sine * wanted[:, 0] + cosine * wanted[:, 1] + wanted[:, 2] * offset_x
+        velocity[:, :2] *= self._pace[:, None]
+        velocity[:, 2] = wanted[:, 3]
+        self._turn(wanted[:, 2] * self._period)
+        return velocity
+
+    def _turn(self, angle: Array) -> None:
+        """Turns the path's heading by small angles (n,) [rad], by Cayley's form of a rotation."""
+        half = 0.5 * angle * (1.0 + angle * angle / 12.0)
+        scale = 1.0 / (1.0 + half * half)
+        cosine, sine = (1.0 - half * half) * scale, 2.0 * half * scale
+        x, y = self._heading[:, 0].copy(), self._heading[:, 1].copy()
+        self._heading[:, 0] = cosine * x - sine * y
+        self._heading[:, 1] = sine * x + cosine * y
 
     def observe(self, state: SimulationState) -> None:
         """Follows the handle over a period, and adds up the work done on it."""
         if not self._any:
             return
-        before, height = self._at, self._height
+        before = self._at
         self._observe(state)
-        before -= self._at
-        height -= self._height
-        self._energy -= self._force[:, 0] * before[0] + self._force[:, 1] * before[1] + self._force[:, 2] * height
+        way = self._at - before
+        self._energy += self._force[:, 0] * way[:, 0] + self._force[:, 1] * way[:, 1] + self._force[:, 2] * way[:, 2]
         state.partner_force[:] = self._force
         state.partner_energy[:] = self._energy
 
     def _observe(self, state: SimulationState) -> None:
-        w, x, y, z = state.object_quaternion.T
-        arm = np.empty((2, len(w)))
-        arm[0] = 0.5 - (y * y + z * z)
-        arm[1] = w * z + x * y
-        arm *= self._double_handle
-        turning = state.object_angular_velocity[:, 2]
-        self._speed = _planar(state.object_linear_velocity)
-        self._speed[0] -= turning * arm[1]
-        self._speed[1] += turning * arm[0]
-        self._at = _planar(state.object_position)
-        self._at += arm
-        self._arm, self._height = arm, state.object_position[:, 2].copy()
+        out = rotations.rotate(state.object_quaternion, self._handle)
+        self._at = state.object_position + out
+        self._speed = state.object_linear_velocity + rotations.cross(state.object_angular_velocity, out)
+        self._arm = out - rotations.rotate(state.object_quaternion, self._centre)
 
     def handle(self, env: int) -> Array:
         """The far handle of one environment's object, (3,) [m]."""
-        return np.array([self._at[0, env], self._at[1, env], self._height[env]])
+        handle: Array = self._at[env].copy()
+        return handle
 
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""
         own = {name: getattr(self, f"_{name}") for name in REMEMBERED}
-        own |= {name: getattr(self, f"_{name}").T for name in PLANAR}
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
 
     def restored(self) -> None:
@@ -148,29 +191,7 @@ class Partner:
         self._line.restored()
 
 
-def _planar(vectors: Array) -> Array:
-    """First two columns as rows, (n, k) to (2, n)."""
-    rows: Array = vectors[:, :2].T.copy()
-    return rows
-
-
 def _length(vectors: Array) -> Array:
-    """Lengths of planar vectors, (2, n) to (n,)."""
-    squares = vectors * vectors
-    length: Array = np.sqrt(squares[0] + squares[1])
+    """Lengths of the planar parts of vectors, (n, k) to (n,)."""
+    length: Array = np.sqrt(vectors[:, 0] * vectors[:, 0] + vectors[:, 1] * vectors[:, 1])
     return length
-
-
-def _turned(direction: Array, vectors: Array) -> Array:
-    """Planar vectors turned by the angle that a unit vector makes with the x axis, (2, n) each."""
-    turned: Array = direction[0] * vectors
-    turned[0] -= direction[1] * vectors[1]
-    turned[1] += direction[1] * vectors[0]
-    return turned
-
-
-def _heading(rotation: Array) -> Array:
-    """Direction of the frames' x axes in the plane, of length one; (n, 3, 3) to (2, n)."""
-    forward = _planar(rotation[:, :, 0])
-    forward /= _length(forward) + TINY
-    return forward

@@ -11,17 +11,22 @@ from numpy.typing import NDArray
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim import partner
 from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.divergence import Divergence
 from iowbc.sim.drives import Drives
 from iowbc.sim.episode_draws import Draws
+from iowbc.sim.period import Period
 from iowbc.sim.sensing import Sensing
 from iowbc.sim.snapshots import by_environment, by_world
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
+
+TINY = 1e-9
+"""Keeps a division by the friction of an absent object from dividing by zero."""
 
 
 class Simulation:
@@ -67,7 +72,7 @@ class Simulation:
         self.state = SimulationState.empty(n, len(robot.joints))
         self.state.has_object[:] = [model.object is not None for model in models]
         self.target = np.tile(robot.default_position, (n, 1))
-        self.feed = np.zeros((n, 3))
+        self.feed = np.zeros((n, partner.FEED))
         self.planned_push = np.zeros((n, 3))
         """Force on the base in the period to come beside the drawn pushes, world frame, (n, 3) [N]."""
         self._partner = partner.Partner(recipe.partner, models, self.period)
@@ -96,6 +101,12 @@ class Simulation:
             level=True,
         )
         self._robot_mass = np.zeros(n)
+        held = [model.kind == "lift" for model in models]
+        by_contact = np.array([model.grasp.kind == "contact" for model in models]) & held
+        self._pressed = by_contact * np.array([model.grasp.squeeze for model in models])
+        self._by_friction = (held & ~by_contact) * np.array([model.grasp.by_friction for model in models])
+        self._borne = np.zeros(n)
+        self._strength = np.array([model.grasp.strength for model in models])
         handover = np.array([model.grasp.handover if model.kind == "lift" else 0.0 for model in models])
         self._handover = handover / self.period
         width = self._sensing.noise_width + partner.NOISE_WIDTH
@@ -163,9 +174,10 @@ class Simulation:
             world.reset(ids, joint_position[chosen], pitch[chosen], heading[chosen], drawn)
             world.gather(state)
             self._robot_mass[world.place] = world.robot_mass
-        for name in ("slipped", "partner_force", "partner_energy", "external_force", "push_force"):
+        for name in ("slipped", "partner_force", "partner_energy", "partner_share", "external_force", "push_force"):
             getattr(state, name)[which] = 0
         state.grasped[which] = state.has_object[which, None]
+        self._borne[which] = 0.0
         self._drives.reset(which, self.drawn)
         self._impulses.reset(which, key)
         self._pushes.reset(which, key)
@@ -184,34 +196,42 @@ class Simulation:
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
         np.add(state.push_force, self.planned_push, out=state.push_force)
         target = self.target - drawn["encoder_bias"]
-        effort = self._drives.ranges(target, state)
+        given = Period(
+            target=target,
+            effort=self._drives.ranges(target, state),
+            wrench=wrench,
+            push=state.push_force,
+            resistance=drawn["rolling_resistance"],
+            squeeze=self._squeeze(),
+            slip_force=drawn["slip_force"],
+        )
         self.clock += 1
         diverged[:] = np.isnan(target.sum(axis=1))
         for world in self.worlds:
             place = world.place
             failed = diverged[place]
-            world.step(
-                target[place],
-                effort[place],
-                wrench[place],
-                state.push_force[place],
-                drawn["rolling_resistance"][place],
-                failed,
-            )
+            world.step(given.rows(place), failed)
             if failed.any():
                 diverged[place] = failed
-                self._keep_divergences(world, np.flatnonzero(failed), target, effort, wrench)
+                self._keep_divergences(world, np.flatnonzero(failed), given)
             world.gather(state)
             world.release(state, drawn["slip_force"])
+        self._borne[:] = 0.5 * np.sqrt(np.vecdot(state.grip_force, state.grip_force)).sum(axis=1)
         self._partner.observe(state)
         self._sensing.advance(state)
         self._deliver()
 
     def _hand_over(self, wrench: Array) -> None:
-        """Bears at first the robot's part of a held object's weight, less and less: f = (1 - share) m g (1 - t / T)."""
+        """Bears at first the robot's part of a held object's weight between its hands, less and less:
+        f = (1 - share) m g (1 - t / T)."""
         if np.any(self.clock < self._handover):
             left = np.maximum(self._handover - self.clock, 0.0) / np.maximum(self._handover, 1.0)
-            wrench[:, 2] += GRAVITY * left * (1.0 - self.drawn["partner_share"]) * self.drawn["object_mass"]
+            drawn, lifted = self.drawn, np.zeros((self.n, 3))
+            lifted[:, 2] = GRAVITY * left * (1.0 - drawn["partner_share"]) * drawn["object_mass"]
+            between = -drawn["object_com_offset"]
+            between[:, 0] -= drawn["grip_shift"]
+            wrench[:, :3] += lifted
+            wrench[:, 3:] += rotations.cross(rotations.rotate(self.state.object_quaternion, between), lifted)
 
     def _deliver(self) -> None:
         self._noise = random.noise(self._episode_key, self.clock.view(np.uint64), self._noise.shape[1])
@@ -224,13 +244,18 @@ class Simulation:
             if len(chosen):
                 yield world, np.searchsorted(world.rows, which[chosen]), chosen
 
-    def _keep_divergences(self, world: World, ids: Indices, target: Array, effort: Array, wrench: Array) -> None:
+    def _squeeze(self) -> Array:
+        """Force with which the arms press each hand against a held object, (n,) [N]: always the same where friction
+        alone holds it, else what friction needs for the palms' part of the load they bore last."""
+        needed = self._by_friction * self._borne / np.maximum(self.drawn["surface_friction"], TINY)
+        pressed: Array = self._pressed + np.minimum(needed, self._strength)
+        return pressed
+
+    def _keep_divergences(self, world: World, ids: Indices, given: Period) -> None:
         self.divergence_count += len(ids)
         for index in ids:
             row = int(world.rows[index])
-            arrays = world.record(int(index))
-            arrays |= {"target": target[row], "effort": effort[row], "wrench": wrench[row]}
-            arrays |= {"push": self.state.push_force[row], "resistance": self.drawn["rolling_resistance"][row]}
+            arrays = world.record(int(index)) | given.of(row)
             self.divergences.append(
                 Divergence(
                     scene=self.scene_names[row],
@@ -244,7 +269,7 @@ class Simulation:
     def _memory(self) -> dict[str, Array]:
         """Every array that the future depends on, besides the worlds'."""
         own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
-        own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass}
+        own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass, "borne": self._borne}
         parts: dict[str, dict[str, Array]] = {
             "state": self.state.arrays(),
             "drawn": self.drawn,

@@ -82,6 +82,8 @@ class SimulationState(_Arrays):
     """Size of the force of links other than the hands, or of the ground, on the object, (n,) [N]."""
     partner_force: Array
     """Force of the partner on the object, (n, 3) [N]."""
+    partner_share: Array
+    """Share of the weight, or in a push of the rolling resistance, that the partner bears at the time, (n,)."""
     partner_energy: Array
     """Work of the partner on the object since the reset, (n,) [J]."""
     external_force: Array
@@ -120,6 +122,7 @@ class SimulationState(_Arrays):
             "hand_weight_share": (),
             "link_object_force": (),
             "partner_energy": (),
+            "partner_share": (),
         }
         arrays: dict[str, Any] = {}
         for field in fields(cls):

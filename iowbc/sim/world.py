@@ -11,9 +11,11 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.sim.grip import Grip
 from iowbc.sim.model import compile_scene
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
+from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.stability import require_stable
@@ -58,14 +60,25 @@ class World:
             forces = history[:, self.layout.past_forces].reshape(count, 2, -1)
             self._past_forces = forces[..., 2 + timing.substeps :].reshape(count, 2, timing.substeps, 3)
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
-        by_contact = scene.kind == "lift" and scene.grasp.kind == "contact"
-        self._squeeze = Squeeze(robot, self.batch, self.layout, scene.grasp.squeeze) if by_contact else None
+        self._centres = bind("xipos")
+        self._squeeze, self._grip = self._grasp(scene)
         self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
-        self._touch = {} if self._rolling is None else {"touch": self._rolling.touch}
+        self._memory = {} if self._rolling is None else {"touch": self._rolling.touch}
+        self._memory |= {} if self._grip is None else self._grip.arrays()
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
         self.before = self.batch.state.copy()
         self._mass_cache()
+
+    def _grasp(self, scene: Scene) -> tuple[Squeeze | None, Grip | None]:
+        """What arms and palms do to hold an object, beside their connection or the contact with it."""
+        if scene.kind != "lift" or scene.object is None:
+            return None, None
+        if self.layout.palms is not None:
+            return Squeeze(self._robot, self.batch, "geom_xpos", as_slice(self.layout.palms)), None
+        grip = Grip(self.batch, self.layout, scene.object, scene.grasp, self.timing.period)
+        pressed = scene.grasp.by_friction > 0.0
+        return Squeeze(self._robot, self.batch, "site_xpos", self.layout.grips) if pressed else None, grip
 
     def _mass_cache(self) -> None:
         mass = self.fields.body_mass
@@ -78,7 +91,8 @@ class World:
         order = np.argsort(ids)
         ids, joint_position, pitch, yaw = ids[order], joint_position[order], pitch[order], yaw[order]
         self.batch.reset(ids, stage=NOTHING)
-        self.fields.write(ids, {name: values[order] for name, values in drawn.items()})
+        drawn = {name: values[order] for name, values in drawn.items()}
+        self.fields.write(ids, drawn)
         self.qpos[ids, :3] = (0.0, 0.0, 1.0)
         self.qpos[ids, 3:7] = rotations.from_euler(np.zeros_like(pitch), pitch, yaw)
         self.qpos[ids, self.layout.joints] = joint_position
@@ -88,10 +102,10 @@ class World:
         drop = self._lowest_sole(ids)
         self.qpos[ids, 2] -= drop
         if self.layout.object_position is not None:
-            self._place_object(ids, drop, yaw, self.layout.object_position.start)
+            self._place_object(ids, drop, yaw, drawn["grip_shift"], self.layout.object_position.start)
         self._connected[ids] = 1.0
-        for touch in self._touch.values():
-            touch[ids] = 0.0
+        for values in self._memory.values():
+            values[ids] = 0.0
         self.batch.forward(ids)
         self._warnings[ids] = self._warning_counts[ids]
         self._mass_cache()
@@ -105,7 +119,7 @@ class World:
         lowest: Array = np.min(centre[..., 2] - self.model.geom_size[points, 0], axis=1)
         return lowest
 
-    def _place_object(self, ids: Indices, drop: Array, yaw: Array, start: int) -> None:
+    def _place_object(self, ids: Indices, drop: Array, yaw: Array, shift: Array, start: int) -> None:
         turn = rotations.from_euler(np.zeros_like(yaw), np.zeros_like(yaw), yaw)
         hands = self._sites[ids][:, self.layout.grips]
         hands[..., 2] -= drop[:, None]
@@ -120,6 +134,7 @@ class World:
             self.qpos[ids, start : start + 2] = rotations.rotate(turn, middle)[:, :2]
             self.qpos[ids, start + 2] = yaw
             return
+        middle[:, 0] += shift
         middle[:, 2] -= self.scene.grasp.height
         self.qpos[ids, start : start + 3] = rotations.rotate(turn, middle)
         self.qpos[ids, start + 3 : start + 7] = turn
@@ -137,29 +152,38 @@ class World:
         )
         return turned
 
-    def step(self, target: Array, effort: Array, wrench: Array, push: Array, resistance: Array, diverged: Mask) -> None:
-        """One control period with joint targets held, and torques within `effort` (n, joints, 2).
-
-        `wrench` (n, 6) acts on the object's and `push` (n, 3) on the base's centre of mass; `resistance` (n,) is
-        that of a crate's wheels [N]. Marks in `diverged` the simulations that left the numbers and puts them back.
-        """
+    def step(self, given: Period, diverged: Mask) -> None:
+        """One control period. Marks in `diverged` the simulations that left the numbers and puts them back."""
         np.copyto(self.before, self.batch.state)
-        np.copyto(self.control, target)
-        np.copyto(self.fields.torque_range, effort)
-        if self._squeeze is not None:
-            self._squeeze.add(self.control)
-        self._applied[:, self.layout.base, :3] = push
-        if self._rolling is not None:
-            self._rolling.turn(resistance, wrench)
+        np.copyto(self.control, given.target)
+        np.copyto(self.fields.torque_range, given.effort)
+        self._applied[:, self.layout.base, :3] = given.push
         if self.layout.object is not None:
-            self._applied[:, self.layout.object] = wrench
+            self._handle(given, self.layout.object)
         try:
             self.batch.step(nstep=self.timing.substeps, stage=VELOCITY)
         except SimulationError as error:
             diverged[error.ids] = True
         if self._rolling is not None:
-            self._rolling.observe(wrench)
+            self._rolling.observe(given.wrench)
         self._check(diverged)
+
+    def _handle(self, given: Period, thing: int) -> None:
+        """What acts on the object, and between it and the hands."""
+        layout, applied = self.layout, self._applied
+        applied[:, thing] = given.wrench
+        if self._rolling is not None:
+            self._rolling.turn(given.resistance, given.wrench)
+        if self._squeeze is not None:
+            inward, points = self._squeeze.add(self.control, given.squeeze)
+            if self._grip is not None:
+                applied[:, layout.wrists, :3] = -inward
+                lever = points - self._centres[:, layout.wrists]
+                applied[:, layout.wrists, 3:] = rotations.cross(inward, lever)
+        if self._grip is not None:
+            torque = self._grip.twist(self.fields.body_mass[:, thing], given.slip_force, self._connected)
+            applied[:, thing, 3:] += torque
+            applied[:, layout.hands, 3:] = -0.5 * torque[:, None]
 
     def _check(self, diverged: Mask) -> None:
         """Marks what warned, or moves too fast or not in numbers, and puts it back to the start of the period."""
@@ -176,7 +200,7 @@ class World:
 
     def record(self, index: int) -> dict[str, Array]:
         """What a simulation was at the start of the last control period: its state row and its model's own fields."""
-        kept = {name: values[index] for name, values in self._touch.items()}
+        kept = {name: values[index] for name, values in self._memory.items()}
         return kept | {"state": self.before[index]} | self.fields.of(index)
 
     def release(self, state: SimulationState, slip_force: Array) -> None:
@@ -268,8 +292,8 @@ class World:
     def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
         """Puts a simulation into what `record` kept."""
         self.fields.set(index, recorded)
-        for name, touch in self._touch.items():
-            touch[index] = recorded[name]
+        for name, array in self._memory.items():
+            array[index] = recorded[name]
         self.batch.state[index] = recorded["state"]
         self.batch.forward(np.array([index]), stage=VELOCITY)
         self._mass_cache()
@@ -281,14 +305,14 @@ class World:
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""
-        touch = {name: values.copy() for name, values in self._touch.items()}
-        return touch | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
+        own = {name: array.copy() for name, array in self._memory.items()}
+        return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`; the simulations then take bit for bit the same course."""
         self.fields.restore(values)
-        for name, touch in self._touch.items():
-            touch[...] = values[name]
+        for name, array in self._memory.items():
+            array[...] = values[name]
         self.batch.state[...] = values["state"]
         self._warning_counts[...] = values["warnings"]
         self._warnings[...] = values["warnings"]

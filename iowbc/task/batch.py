@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices, as_slice
-from iowbc.control.command import VELOCITY
+from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import MeasuredState
@@ -124,7 +124,8 @@ class Batch:
         memory, simulation = self.memory, self.simulation
         action = self.buffers["action"].astype(np.float64).clip(-self._bound, self._bound)
         simulation.target[:] = self.targets(action)
-        simulation.feed[:] = memory.command[:, VELOCITY]
+        simulation.feed[:, :3] = memory.command[:, VELOCITY]
+        simulation.feed[:, 3] = memory.command[:, HEIGHT] + memory.command[:, OFFSET][:, 2::3].mean(axis=1)
         if self._pushes.any:
             simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)
         simulation.step()

@@ -18,7 +18,7 @@ def wander(simulation, steps):
     """Steps with targets that move, and returns everything seen."""
     seen, posture = [], simulation.target.copy()
     for step in range(steps):
-        simulation.feed[:] = (0.3, 0.05, 0.2)
+        simulation.feed[:, :3] = (0.3, 0.05, 0.2)
         phase = 0.2 * step + simulation.envs[:, None]
         simulation.target[:] = posture
         simulation.target[:, :15] += 0.1 * np.sin(phase + np.arange(15))

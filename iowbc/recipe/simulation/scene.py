@@ -21,7 +21,20 @@ class Grasp(Section):
     which the hand slips. At friction 1.0 two hands hold 28 kg; the tyre at 150 % weighs 27."""
     squeeze: float = Field(default=60.0, ge=0.0)
     """Force with which the arms press each palm against an object held by contact [N]: motor torques beside the joint
-    control. At friction 1.0 it holds 12 kg and takes 15 of the 25 N·m at the shoulders."""
+    control. At friction 1.0 it holds 9.5 kg and takes 15 of the 25 N·m at the shoulders."""
+    by_friction: float = Field(default=1.0, ge=0.0, le=1.0)
+    """Part of what a hand bears in a compliant grasp for which the palm has to press, with load / friction, at the cost
+    of the arms' motors; the rest lies on fingers beneath."""
+    stiffness: float = Field(default=10.0, ge=0.0)
+    """Stiffness with which the palms resist turning of the object about the line between them [N·m/rad]; soft, so that
+    a box follows the hands by half, yet keeps what a second carrier leaves unbalanced. They slip at two thirds of a
+    contact radius of 3 cm times the slip force, both together 5.6 N·m at friction 1.0."""
+    stability: float = Field(default=0.3, gt=0.0, le=1.0)
+    """Bound on that stiffness · period² / inertia, and on damping · period / inertia, above which a torque that is held
+    over a control period would make a light object oscillate."""
+    near_end: float = Field(default=0.8, ge=0.0, le=1.0)
+    """Part of the way from the middle to the near end up to which the grips of an object carried by two are placed, so
+    that the lever arms share the weight as the carriers do."""
     height: float = 0.08
     """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
     settling: int = Field(default=5, ge=0)
@@ -31,7 +44,8 @@ class Grasp(Section):
     """Time over which an object's weight comes to bear at the start of an episode [s]; dropped into the hands at once,
     it would pull with twice its weight."""
     swing_damping: float = Field(default=3.0, ge=0.0)
-    """Rate at which friction in the palms damps the object's rotation [1/s]; a box on two points swings at 1.5 Hz."""
+    """Rate at which the palms damp the object's turning against the hands [1/s]; a box on two points swings at
+    1.0 Hz."""
 
 
 class Object(Section):
@@ -85,8 +99,10 @@ class Scenes(Section):
         kind="lift", object=Object(shape="box", size=(0.30, 0.25, 0.30), mass=7.0), grasp=Grasp(kind="contact")
     )
     """The same box, held between the palms by friction alone; its width is fitted to the distance of the hands."""
-    tyre: Scene = Scene(kind="lift", object=Object(shape="tyre", size=(0.18, 0.56, 0.56), mass=18.0))
-    """A rubber tyre, 18 kg (paper IV-A)."""
+    tyre: Scene = Scene(
+        kind="lift", object=Object(shape="tyre", size=(0.18, 0.56, 0.56), mass=18.0), grasp=Grasp(by_friction=0.0)
+    )
+    """A rubber tyre, 18 kg (paper IV-A); fingers reach beneath its rim."""
     push: Scene = Scene(
         kind="push", object=Object(shape="box", size=(0.70, 0.60, 1.10), mass=65.0), palm=(0.11, 0.0, 0.0)
     )
