@@ -99,7 +99,13 @@ def test_partner_follows_the_commanded_motion_after_its_delay(start, calm, hold_
 def test_partner_helps_or_resists_a_push_with_its_share_of_the_resistance(start, calm, hold_base, share, sign):
     hold_base()
     recipe = changed(changed(calm, "partner.enabled", True), "scenes.push.gap", 0.5)
-    held = {"object_mass": 50.0, "object_ground_friction": 0.1, "partner_share": share, "partner_noise": 0.0}
+    held = {
+        "object_mass": 50.0,
+        "object_ground_friction": 0.1,
+        "partner_share": share,
+        "partner_noise": 0.0,
+        "partner_share_drift": 0.0,
+    }
     simulation = start(recipe, ["push"], partner_stiffness=0.0, partner_damping=0.0, **held)
     simulation.feed[:, :3] = (0.3, 0.0, 0.0)
     run(simulation, 30)
@@ -111,7 +117,13 @@ def test_partner_helps_or_resists_a_push_with_its_share_of_the_resistance(start,
 def test_energy_of_the_partner_is_force_times_way(start, calm, hold_base):
     hold_base()
     recipe = changed(changed(calm, "partner.enabled", True), "scenes.push.gap", 1.0)
-    held = {"object_mass": 50.0, "object_ground_friction": 0.05, "partner_share": 0.8, "partner_noise": 0.0}
+    held = {
+        "object_mass": 50.0,
+        "object_ground_friction": 0.05,
+        "partner_share": 0.8,
+        "partner_noise": 0.0,
+        "partner_share_drift": 0.0,
+    }
     recipe = changed(recipe, "partner.push_yielding", 1.0)
     simulation = start(recipe, ["push"], **held)
     begin = simulation.state.object_position[0, 0]

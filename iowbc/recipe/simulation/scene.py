@@ -25,10 +25,11 @@ class Grasp(Section):
     by_friction: float = Field(default=1.0, ge=0.0, le=1.0)
     """Part of what a hand bears in a compliant grasp for which the palm has to press, with load / friction, at the cost
     of the arms' motors; the rest lies on fingers beneath."""
-    stiffness: float = Field(default=10.0, ge=0.0)
-    """Stiffness with which the palms resist turning of the object about the line between them [N·m/rad]; soft, so that
-    a box follows the hands by half, yet keeps what a second carrier leaves unbalanced. They slip at two thirds of a
-    contact radius of 3 cm times the slip force, both together 5.6 N·m at friction 1.0."""
+    stiffness: float = Field(default=4.0, ge=0.0)
+    """Stiffness with which the palms resist turning of the object about the line between them [N·m/rad]; so soft that a
+    box still hangs and wrists of 5 N·m bear what a tilt of the hands costs, yet it bears what a second carrier leaves
+    unbalanced. They slip at two thirds of a contact radius of 3 cm times the slip force, both together 5.6 N·m at
+    friction 1.0."""
     stability: float = Field(default=0.3, gt=0.0, le=1.0)
     """Bound on that stiffness · period² / inertia, and on damping · period / inertia, above which a torque that is held
     over a control period would make a light object oscillate."""
