@@ -157,13 +157,14 @@ def diff(first: Named, second: Named, runs: RunsFolder = None) -> None:
 def compare(
     recipes: Annotated[list[str], typer.Argument(help="Recipes that have run, two or more.", metavar="RECIPE...")],
     output: Annotated[Path | None, typer.Option(help="Folder to write to; runs/compare.")] = None,
+    film: Annotated[bool, typer.Option("--film", help="Also film one trial with all of them side by side.")] = False,
     runs: RunsFolder = None,
 ) -> None:
     """Write tables and figures over several runs."""
     from iowbc.commands.compare import compare as write_comparison
 
     store = _store(runs)
-    write_comparison(store, _console(), recipes, output or store.runs.root / "compare")
+    write_comparison(store, _console(), recipes, output or store.runs.root / "compare", film)
 
 
 @app.command()

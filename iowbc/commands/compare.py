@@ -3,21 +3,29 @@
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from iowbc.commands.named import Named, named
+from iowbc.commands.play import input_of
 from iowbc.commands.results import shown_path
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 TRIALS = "trials.parquet"
 
 
-def compare(store: Store, console: Console, words: Sequence[str], output: Path) -> None:
-    """Write `metrics.md`, and the report over all trials, under `output`; print the tables. Raises `UsageError`."""
+def compare(store: Store, console: Console, words: Sequence[str], output: Path, film: bool = False) -> None:
+    """Write `metrics.md`, and the report over all trials, under `output`; print the tables. Raises `UsageError`.
+
+    film: also play one trial that all share again, and show the runs side by side.
+    """
     found = [named(store, word) for word in words]
     if len(found) < 2:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
@@ -26,7 +34,11 @@ def compare(store: Store, console: Console, words: Sequence[str], output: Path) 
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = [run for run in found if _trials(run).is_file()]
     if len(tried) > 1:
-        _report(tried, output)
+        trials = _report(tried, output)
+        if film:
+            _film(store, tried, trials, output / "side_by_side.mp4")
+    elif film:
+        raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     for path in (output / "metrics.md", *sorted((output / "tables").glob("*.md"))):
         console.print(path.read_text(encoding="utf-8"), markup=False, highlight=False, soft_wrap=True)
     for path in sorted(output.rglob("*.*")):
@@ -51,7 +63,8 @@ def _trials(run: Named) -> Path:
     return run.artifacts["eval"].folder / TRIALS if "eval" in run.artifacts else Path(TRIALS, "missing")
 
 
-def _report(runs: Sequence[Named], output: Path) -> None:
+def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
+    """The trials of each run, each under a name of its own."""
     import pandas as pd
 
     from iowbc.evaluation.report.report import write_report
@@ -70,3 +83,29 @@ def _report(runs: Sequence[Named], output: Path) -> None:
             f"the recipes count a mass as carried at different rates (eval.success.capacity_rate): {rates}"
         )
     write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)
+    return trials
+
+
+def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]", path: Path) -> None:
+    """Play one trial that all runs share again, with the policies that were evaluated, and film it."""
+    from iowbc.evaluation.side_by_side import Actor, common_trial, film_side_by_side
+    from iowbc.evaluation.trials.protocol import evaluated_world
+    from iowbc.learning.acting import load_policy
+    from iowbc.recipe.recipe import Recipe
+    from iowbc.robot.description import robot_folder
+    from iowbc.stages.evaluate import acting_stage
+    from iowbc.task.specification import Specification
+
+    actors = []
+    for run, table in zip(runs, trials, strict=True):
+        artifact = run.artifacts["eval"]
+        recipe = Recipe.model_validate(artifact.recipe)
+        policy, generator = (input_of(store, artifact, stage) for stage in (acting_stage(recipe), "rg-fit"))
+        if policy is None:
+            raise UsageError(f"{run.word}: its evaluation names no policy; run its recipe again")
+        world = Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)
+        actors.append(Actor(evaluated_world(world), load_policy(policy.folder), table))
+    rows = common_trial(actors)
+    if not rows:
+        raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
+    film_side_by_side(actors, rows, path)

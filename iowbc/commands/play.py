@@ -28,7 +28,7 @@ def play_word(store: Store, console: Console, word: str, stage: str | None, requ
     artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
     generator = None
     if artifact is not None:
-        generator = _generator(store, artifact)
+        generator = generator_of(store, artifact)
         for read in filter(None, (artifact, generator)):
             _check_whole(store, read)
 
@@ -71,18 +71,23 @@ def _check_whole(store: Store, artifact: Artifact) -> None:
         ) from None
 
 
-def _generator(store: Store, artifact: Artifact) -> Artifact | None:
+def generator_of(store: Store, artifact: Artifact) -> Artifact | None:
     """The reference generator that a policy was trained on; None for an export, which holds its own, or without one."""
-    digest = artifact.ingredients.get("inputs", {}).get("rg-fit")
-    if artifact.manifest.stage == "export" or digest is None:
+    return None if artifact.manifest.stage == "export" else input_of(store, artifact, "rg-fit")
+
+
+def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
+    """What an artifact was made from; None where it read nothing of that stage. Raises `UsageError` if it is gone."""
+    digest = artifact.ingredients.get("inputs", {}).get(stage)
+    if digest is None:
         return None
-    generator = next((found for found in store.artifacts("rg-fit") if found.manifest.digest == digest), None)
-    if generator is None:
+    found = next((one for one in store.artifacts(stage) if one.manifest.digest == digest), None)
+    if found is None:
         raise UsageError(
-            f"the reference generator (content {digest[:12]}) that {artifact.manifest.stage} "
-            f"{artifact.manifest.key[:12]} was trained on is no longer stored; run its recipe again"
+            f"the {stage} (content {digest[:12]}) that {artifact.manifest.stage} "
+            f"{artifact.manifest.key[:12]} was made from is no longer stored; run its recipe again"
         )
-    return generator
+    return found
 
 
 def _source(artifact: Artifact, generator: Artifact | None) -> "Source":

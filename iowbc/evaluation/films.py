@@ -1,6 +1,6 @@
 """Films of episodes: writes an mp4 file frame by frame, with lines of text in a corner, and plays trials again."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -72,6 +72,33 @@ class Film:
             self._unfinished.unlink(missing_ok=True)
 
 
+class Pictures:
+    """Frames that are kept as files in a folder, to make a film of several later."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self._count = folder, 0
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def add(self, frame: Frame) -> None:
+        """Keep a frame (H, W, 3)."""
+        Image.fromarray(frame).save(self.folder / f"{self._count:06}.png", compress_level=1)
+        self._count += 1
+
+    def frames(self) -> Iterator[Frame]:
+        """Those kept so far, in order."""
+        for path in sorted(self.folder.glob("*.png")):
+            with Image.open(path) as image:
+                yield np.asarray(image)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """What was kept stays."""
+
+
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
     """The trials to film, with names: the first trial of up to `count` masses, spread over those with an object.
 
@@ -101,10 +128,10 @@ def film_title(row: "pd.Series[Any]") -> str:
 class EpisodeFilm:
     """A film of the first environment of an in-process vector environment; give `look` to `play_in`."""
 
-    def __init__(self, environment: VectorEnv, path: Path, video: Video, title: Sequence[str]) -> None:
+    def __init__(self, environment: VectorEnv, film: Film | Pictures, video: Video, title: Sequence[str]) -> None:
         """`title`: lines of text in every frame, above the line with time and command."""
         self.environment, self.video, self.title = environment, video, list(title)
-        self._film = Film(path, video.fps)
+        self._film = film
         self._renderer: SceneRenderer | None = None
         self.frames = 0
 
@@ -137,13 +164,17 @@ def film_trial(
     world: Specification,
     policy: Acting,
     row: "pd.Series[Any]",
-    path: Path,
+    film: Film | Pictures,
+    video: Video,
     interrupted: Callable[[], bool] = lambda: False,
 ) -> Outcome:
-    """Play the trial in a row of `trials.parquet` again and film it. Raises Interrupted when interrupted."""
+    """Play the trial in a row of `trials.parquet` again and film it.
+
+    Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
+    """
     environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     try:
-        with EpisodeFilm(environment, path, world.recipe.eval.video, [film_title(row)]) as film:
-            return play_in(environment, in_batch(policy, row), interrupted, look=film.look)[0]
+        with EpisodeFilm(environment, film, video, [film_title(row)]) as episode:
+            return play_in(environment, in_batch(policy, row), interrupted, look=episode.look)[0]
     finally:
         environment.close()

@@ -10,7 +10,7 @@ from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
 from iowbc.evaluation.exported import ExportedPolicy
-from iowbc.evaluation.films import EpisodeFilm
+from iowbc.evaluation.films import EpisodeFilm, Film
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
@@ -76,7 +76,7 @@ def play(source: Source, request: PlayRequest, interrupted: Callable[[], bool] =
             return Shown(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
-        with EpisodeFilm(environment, request.video, settings, title) as film:
+        with EpisodeFilm(environment, Film(request.video, settings.fps), settings, title) as film:
             outcome = play_in(environment, policy, interrupted, look=film.look)[0]
         return Shown(outcome, episode.duration, film.frames)
     finally:

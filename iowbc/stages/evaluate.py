@@ -30,7 +30,7 @@ def run(job: Job) -> None:
     import torch
 
     from iowbc.errors import NoRenderer
-    from iowbc.evaluation.films import film_trial, filmed
+    from iowbc.evaluation.films import Film, film_trial, filmed
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
     from iowbc.learning.acting import load_policy
@@ -55,7 +55,8 @@ def run(job: Job) -> None:
         (job.out / "videos").mkdir()
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
-            film_trial(world, policy, row, job.out / "videos" / f"{name}.mp4", job.interrupted)
+            film = Film(job.out / "videos" / f"{name}.mp4", recipe.eval.video.fps)
+            film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
     except Interrupted as stopped:

@@ -24,16 +24,15 @@ crouch, bow: 20 s."""
 
 PUSHING = (
     Segment(duration=1.0, ramp=0.0),
-    Segment(duration=4.5, velocity=(0.5, 0.0, 0.0), pitch=0.2),
-    Segment(duration=2.5, velocity=(0.4, 0.0, 0.3), pitch=0.2),
-    Segment(duration=4.0, velocity=(0.5, 0.0, 0.0), height=0.65, pitch=0.35),
-    Segment(duration=2.5, velocity=(0.4, 0.0, -0.3), height=0.65, pitch=0.35),
-    Segment(duration=2.0, velocity=(0.4, 0.0, 0.0), height=0.5, pitch=0.5, ramp=1.0),
+    Segment(duration=4.5, velocity=(0.5, 0.0, 0.1), pitch=0.2),
+    Segment(duration=4.5, velocity=(0.5, 0.0, 0.0), height=0.65, pitch=0.35),
+    Segment(duration=2.5, velocity=(0.4, 0.0, 0.0), height=0.5, pitch=0.5, ramp=1.0),
+    Segment(duration=4.0, velocity=(0.4, 0.0, -0.1), height=0.65, pitch=0.35, ramp=1.0),
     Segment(duration=1.5, height=0.6, pitch=0.7, ramp=0.7),
     Segment(duration=2.0, height=0.76, pitch=-0.2, ramp=1.8),
 )
-"""Stand, push, turn left, push lower and leaning, turn right, push from a crouch, stop bowed, rise: 20 s. Neither back
-nor sideways: the hands do not hold the crate."""
+"""Stand, push in a left turn, push lower and leaning, push from a crouch, push in a right turn, stop bowed, rise: 20 s.
+Neither back nor sideways, for the hands do not hold the crate, and turns as slow as two palms can make it turn."""
 
 STAGNATION = (
     Segment(duration=1.0, ramp=0.0),

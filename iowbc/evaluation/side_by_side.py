@@ -1,0 +1,86 @@
+"""A film of several variants on the same trial, side by side."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from iowbc.evaluation.films import Film, Frame, Pictures, film_trial, filmed
+from iowbc.evaluation.trials.rollout import Acting
+from iowbc.task.specification import Specification
+
+TRIAL = ["suite", "case", "mass", "impulse", "trial"]
+"""What tells one trial of a variant from another."""
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A variant on the stage."""
+
+    world: Specification
+    """Where its trials took place."""
+    policy: Acting
+    trials: pd.DataFrame
+    """Its long table."""
+
+
+def common_trial(actors: Sequence[Actor]) -> list["pd.Series[Any]"]:
+    """The row of each actor for one trial that all played, of the middle mass; none where they share no trial."""
+    shared = actors[0].trials
+    for actor in actors[1:]:
+        shared = shared.merge(actor.trials[TRIAL], on=TRIAL)
+    chosen = filmed(shared, 1)
+    if not chosen:
+        return []
+    wanted = chosen[0][1][TRIAL]
+    return [actor.trials[(actor.trials[TRIAL] == wanted).all(axis=1)].iloc[0] for actor in actors]
+
+
+def film_side_by_side(
+    actors: Sequence[Actor],
+    rows: Sequence["pd.Series[Any]"],
+    path: Path,
+    interrupted: Callable[[], bool] = lambda: False,
+) -> None:
+    """Play the trial in each actor's row again, and film them as tiles; who falls stays as he lay.
+
+    Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
+    """
+    video = actors[0].world.recipe.eval.video
+    with TemporaryDirectory() as folder:
+        clips = [Pictures(Path(folder) / str(place)) for place in range(len(actors))]
+        for actor, row, clip in zip(actors, rows, clips, strict=True):
+            film_trial(actor.world, actor.policy, row, clip, video, interrupted)
+        with Film(path, video.fps) as film:
+            for frames in _together([clip.frames() for clip in clips]):
+                film.add(tiled(frames))
+
+
+def tiled(frames: Sequence[Frame]) -> Frame:
+    """Frames of one size as one picture, in rows of equal length, black where there is none."""
+    columns = math.ceil(math.sqrt(len(frames)))
+    rows = math.ceil(len(frames) / columns)
+    height, width, colours = frames[0].shape
+    picture = np.zeros((rows * height, columns * width, colours), np.uint8)
+    for place, frame in enumerate(frames):
+        top, left = height * (place // columns), width * (place % columns)
+        picture[top : top + height, left : left + width] = frame
+    return picture
+
+
+def _together(clips: Sequence[Iterator[Frame]]) -> Iterator[list[Frame]]:
+    """The frames of all clips, as long as one goes on; those that have ended keep their last."""
+    shown = [next(clip) for clip in clips]
+    going = True
+    while going:
+        yield list(shown)
+        going = False
+        for place, clip in enumerate(clips):
+            frame = next(clip, None)
+            if frame is not None:
+                shown[place], going = frame, True
