@@ -12,7 +12,7 @@ from iowbc.commands.play import input_of
 from iowbc.commands.results import shown_path
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
-from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.store import Artifact, Store
 from iowbc.pipeline.writability import require_writable
 
 if TYPE_CHECKING:
@@ -86,6 +86,14 @@ def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
     return trials
 
 
+def _evaluated(store: Store, artifact: Artifact) -> Artifact:
+    """The policy that an evaluation played. Raises `UsageError`."""
+    found = [policy for stage in ("distill", "teacher") if (policy := input_of(store, artifact, stage)) is not None]
+    if not found:
+        raise UsageError(f"{artifact.folder}: this evaluation read no policy; run its recipe again")
+    return found[0]
+
+
 def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]", path: Path) -> None:
     """Play one trial that all runs share again, with the policies that were evaluated, and film it."""
     from iowbc.evaluation.side_by_side import Actor, common_trial, film_side_by_side
@@ -93,16 +101,13 @@ def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]",
     from iowbc.learning.acting import load_policy
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
-    from iowbc.stages.evaluate import acting_stage
     from iowbc.task.specification import Specification
 
     actors = []
     for run, table in zip(runs, trials, strict=True):
         artifact = run.artifacts["eval"]
         recipe = Recipe.model_validate(artifact.recipe)
-        policy, generator = (input_of(store, artifact, stage) for stage in (acting_stage(recipe), "rg-fit"))
-        if policy is None:
-            raise UsageError(f"{run.word}: its evaluation names no policy; run its recipe again")
+        policy, generator = _evaluated(store, artifact), input_of(store, artifact, "rg-fit")
         world = Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)
         actors.append(Actor(evaluated_world(world), load_policy(policy.folder), table))
     rows = common_trial(actors)

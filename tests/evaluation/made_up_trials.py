@@ -37,6 +37,7 @@ def trace(steps: int = 400) -> Trace:
         saturation=zeros,
         slipped=zeros,
         partner_force=vectors,
+        link_object_force=zeros,
         grip_force=np.zeros((steps, 6)),
         power=np.full(steps, 100.0),
         base_position=vectors,

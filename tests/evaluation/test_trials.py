@@ -85,9 +85,12 @@ def test_cases_keep_their_names_masses_and_conditions() -> None:
         ("heavy", "crate", 65.0, 1),
         ("stagnation", "crate above friction", 65.0, 0),
         ("stagnation", "crate above friction", 65.0, 1),
+        ("stagnation", "blocked crate", 65.0, 0),
+        ("stagnation", "blocked crate", 65.0, 1),
     ]
-    assert [t.episode.fixed["partner_share"] for t in trials[::2]] == [0.5, 0.5, 0.0]
-    assert trials[-1].episode.fixed["object_ground_friction"] == 1.0
+    assert [t.episode.fixed["partner_share"] for t in trials[::2]] == [0.5, 0.5, 0.0, 0.0]
+    assert trials[4].episode.fixed["object_ground_friction"] == 1.0
+    assert trials[6].episode.fixed["resistance_scale"] == 50.0
 
 
 def test_the_longest_trial_of_the_robustness_suite_lasts_a_minute() -> None:
@@ -140,7 +143,7 @@ def test_trials_are_batched_with_those_that_last_as_long() -> None:
     recipe = Recipe.model_validate({"name": "test", "eval": {"trials": 3, "robustness": {"pushes": None}}})
     trials = [trial for one in planned_sweeps(recipe) for trial in one.trials((0.0, 4.0))] + case_trials(recipe)
     batches = list(batched_by_duration(trials, 16))
-    assert [len(batch) for batch in batches] == [16, 11, 3]
+    assert [len(batch) for batch in batches] == [11, 11, 11, 3]
     assert all(len({trial.episode.duration for trial in batch}) == 1 for batch in batches)
     assert sum(map(len, batches)) == len(trials)
 

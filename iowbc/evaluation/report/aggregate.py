@@ -22,6 +22,7 @@ COSTS = (
     "slip_share",
     "partner_force_peak",
     "grip_force_peak",
+    "link_object_force",
     "energy",
     "foot_slip",
     "foot_slip_peak",

@@ -93,6 +93,7 @@ def effort_metrics(trace: Trace, joints: tuple[str, ...]) -> dict[str, float]:
         "slip_share": float(np.mean(trace.slipped > 0)),
         "partner_force_peak": float(np.max(np.linalg.norm(trace.partner_force, axis=1))),
         "grip_force_peak": float(np.max(grips)),
+        "link_object_force": float(np.mean(trace.link_object_force)),
         "energy": float(np.sum(trace.power) * trace.dt),
         "torso_jerk": jerk(trace.torso_position, trace.dt),
         "object_jerk": jerk(trace.object_position, trace.dt) if np.any(trace.object_position) else np.nan,

@@ -1,5 +1,6 @@
 """The whole evaluation: trials of many masses and suites at once over all workers, resumable batch by batch."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +15,7 @@ from iowbc.evaluation.trials.table import measure_of, trial_row
 from iowbc.files import newest_checked, write_checked
 from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
+from iowbc.task.vector.setup import shares
 
 
 def evaluated_world(specification: Specification) -> Specification:
@@ -106,11 +108,11 @@ class Protocol:
 
 
 def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Trial]]:
-    """Trials of one duration in batches of at most `size`, so that none waits long for another to end."""
+    """Trials of one duration in nearly equal batches of at most `size`, so that none waits long for another to end."""
     for duration in sorted({trial.episode.duration for trial in trials}):
         alike = [trial for trial in trials if trial.episode.duration == duration]
-        for first in range(0, len(alike), size):
-            yield alike[first : first + size]
+        for first, last in shares(len(alike), math.ceil(len(alike) / size)):
+            yield alike[first:last]
 
 
 def _succeeds(table: pd.DataFrame, suite: str, mass: float) -> bool:

@@ -33,6 +33,8 @@ class Trace:
     """1 while a hand does not hold the object, or in a push does not touch it, shape (T,)."""
     partner_force: Array
     """Partner's force on the object, shape (T, 3) [N]."""
+    link_object_force: Array
+    """Size of the net force of links other than the hands on the object, shape (T,) [N]."""
     grip_force: Array
     """Force of the object on each hand, left then right, shape (T, 6) [N]."""
     power: Array

@@ -85,10 +85,12 @@ class Stagnation(Section):
     cases: tuple[Case, ...] = Field(
         default=(
             Case(name="crate above friction", scene="push", mass=65.0, rolling_resistance=1.0, sequence=STAGNATION),
+            Case(name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION),
         ),
         min_length=1,
     )
-    """At μ 1.0 the 65 kg crate resists with 638 N; foot friction of at most 1.2 allows 392 N."""
+    """At μ 1.0 the 65 kg crate resists with 638 N, and foot friction of at most 1.2 allows 392 N; with fifty times its
+    resistance it does not move at all."""
 
 
 class PushLadder(Section):
@@ -122,12 +124,14 @@ class Robustness(Section):
     cases: tuple[Case, ...] = (
         Case(name="nominal"),
         Case(name="encoder bias", fixed={"encoder_bias": 0.03}),
+        Case(name="inertial bias", fixed={"imu_tilt": 0.06, "gyro_bias": 0.04}),
         Case(name="gains 80 %", fixed={"kp_scale": 0.8, "kd_scale": 0.8}),
         Case(name="gains 120 %", fixed={"kp_scale": 1.2, "kd_scale": 1.2}),
+        Case(name="weak motors", fixed={"motor_strength": 0.7}),
         Case(name="friction 0.4", fixed={"ground_friction": 0.4}),
         Case(name="60 s", repetitions=3),
     )
-    """Conditions with a 4 kg box: twice the training's largest encoder bias [rad] and change of gains, less than its
-    least friction, three times its longest trial."""
+    """Conditions with a 4 kg box: twice the training's largest bias of encoders [rad], inertial unit [rad], gyroscope
+    [rad/s], twice its change of gains and loss of strength, less than its least friction, three sequences in a row."""
     pushes: PushLadder | None = PushLadder()
     """Pushes on the base; empty leaves them out."""

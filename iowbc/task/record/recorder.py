@@ -63,6 +63,7 @@ def write_trial_signals(buffers: Buffers, state: SimulationState) -> None:
         "foot_position": state.foot_position.reshape(n, -1),
         "foot_velocity": state.foot_velocity.reshape(n, -1),
         "foot_load": state.foot_force[:, :, 2],
+        "link_object_force": state.link_object_force[:, None],
         "joint_torque": state.joint_torque,
         "joint_saturation": state.saturation,
     }

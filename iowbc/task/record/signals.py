@@ -44,9 +44,11 @@ TRIAL_SIGNALS = {
     "foot_position": 6,
     "foot_velocity": 6,
     "foot_load": 2,
+    "link_object_force": 1,
 }
 """Further signals of planned episodes, world frame: a point in the torso, the object (zero without one), left and right
-sole centre [m], their velocities [m/s], the ground's vertical force on each foot [N]."""
+sole centre [m], their velocities [m/s], the ground's vertical force on each foot [N], the size of the net force of
+thighs, torso and arms on the object [N]."""
 JOINT_SIGNALS = ("joint_torque", "joint_saturation")
 """Signals of planned episodes with a value a joint: torque [N·m], whether it is at its limit."""
 
