@@ -12,7 +12,8 @@ from iowbc.commands.play import input_of
 from iowbc.commands.results import shown_path
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
-from iowbc.pipeline.store.store import Artifact, Store
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import pytest
 import torch
 from stage_jobs import make_job
 
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import Interrupted
 from iowbc.evaluation.report.aggregate import COSTS
 from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.errors import ERRORS
@@ -260,17 +260,12 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
     assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"]
 
 
-def test_a_teacher_is_not_taken_for_the_student(recipe: Recipe, tmp_path: Path) -> None:
-    architecture = {
-        "inputs": full_layout(recipe, load_robot(robot_folder("g1"))).size,
-        "actions": 15,
-        "hidden": [8],
-        "activation": "elu",
-        "clip": 10.0,
-    }
-    save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
-    with pytest.raises(StageFailed, match=r"add `distill` .* or evaluate the teacher"):
-        evaluate.run(job(recipe, tmp_path, tmp_path / "job"))
+def test_a_student_that_no_stage_trains_is_refused_before_anything_runs() -> None:
+    without = Recipe.model_validate({"name": "test", "stages": ["rg-dataset", "rg-fit", "teacher", "eval"]})
+    ((place, text),) = evaluate.problems(without)
+    assert place == "eval.policy"
+    assert "add `distill`" in text
+    assert not list(evaluate.problems(Recipe(name="test")))
 
 
 def test_a_sweep_goes_on_while_something_survives(recipe: Recipe, student: Path, tmp_path: Path) -> None:
