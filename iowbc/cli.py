@@ -169,9 +169,9 @@ def compare(
 
 @app.command()
 def gc(
-    unused: Annotated[bool, typer.Option("--unused", help="Artifacts that no recipe used last.")] = False,
+    unused: Annotated[bool, typer.Option("--unused", help="Artifacts that no recipe ever used.")] = False,
     recipe: Annotated[
-        list[str] | None, typer.Option(help="This recipe's record, and artifacts that only it used last.")
+        list[str] | None, typer.Option(help="This recipe's record, and artifacts that only it used.")
     ] = None,
     work: Annotated[bool, typer.Option("--work", help="Checkpoints of stages that did not finish.")] = False,
     damaged: Annotated[bool, typer.Option("--damaged", help="Artifacts that were set aside as damaged.")] = False,

@@ -12,7 +12,7 @@ from iowbc.commands.named import known_recipes, last_used
 from iowbc.commands.results import shown_path
 from iowbc.errors import UsageError, nearest
 from iowbc.pipeline.console.wording import size
-from iowbc.pipeline.store.last_used import recall
+from iowbc.pipeline.store.last_used import ever_used
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
@@ -23,6 +23,8 @@ REMOVING = ".removing-"
 """What the name of a folder that is being removed begins with."""
 DAY = 86_400.0
 """Seconds."""
+PRECIOUS = 3600.0
+"""A stage that took longer [s] is removed by its recipe's name alone."""
 
 
 @dataclass(frozen=True)
@@ -30,22 +32,22 @@ class Scope:
     """What may be removed."""
 
     unused: bool = False
-    """Artifacts that no recipe used last."""
+    """Artifacts that no recipe ever used; with `older_than` also those that none used lately."""
     recipes: tuple[str, ...] = ()
-    """These recipes' records, and artifacts that no other recipe used last."""
+    """These recipes' records, and artifacts that they used and no other recipe did."""
     work: bool = False
     """Scratch and checkpoints of stages that did not finish, and journals of their runs that MLflow has."""
     damaged: bool = False
     """Artifacts that were set aside as damaged."""
     older_than: float = 0.0
-    """Of all these only what is older [days]."""
+    """Of all these only what is older [days], and of artifacts in use before what has not been used for as long."""
 
 
 def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None:
     """Remove what the scope names, or list it. Raises `UsageError` without a scope."""
     if not (scope.unused or scope.recipes or scope.work or scope.damaged):
         raise UsageError(
-            "gc removes only what it is told to: --unused (artifacts that no recipe used last), --recipe NAME, "
+            "gc removes only what it is told to: --unused (artifacts that no recipe ever used), --recipe NAME, "
             "--work (unfinished stages), --damaged; --older-than DAYS narrows it, --dry-run only lists"
         )
     if store.runs.root.exists() and not dry_run:
@@ -72,15 +74,19 @@ def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
             raise UsageError(
                 f"--recipe {recipe}: no such recipe has run; those that have: {listing}{nearest(recipe, recipes)}"
             )
-    kept = {use["key"] for name in recipes if name not in scope.recipes for use in _uses(store, name)}
     own = [artifact for artifact in store.artifacts() if not artifact.published]
-    free = [a for a in own if a.manifest.key not in kept and not holder(runs, a.manifest.key)]
+    free = [artifact for artifact in own if not holder(runs, artifact.manifest.key)]
     if scope.unused:
-        remembered = {use["key"] for name in recipes for use in _uses(store, name)}
-        yield from (artifact.folder for artifact in free if artifact.manifest.key not in remembered)
+        last = {artifact.manifest.key for name in recipes for artifact in last_used(store, name).values()}
+        limit = time.time() - scope.older_than * DAY if scope.older_than else 0.0
+        spared = last | {key for name in recipes for key, used in ever_used(runs, name).items() if used >= limit}
+        for artifact in free:
+            if artifact.manifest.key not in spared and artifact.manifest.seconds < PRECIOUS:
+                yield artifact.folder
         yield from runs.store.glob(f"*/{REMOVING}*")
+    others = {key for name in recipes if name not in scope.recipes for key in ever_used(runs, name)}
     for recipe in scope.recipes:
-        keys = {artifact.manifest.key for artifact in last_used(store, recipe).values()}
+        keys = ever_used(runs, recipe).keys() - others
         yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)
         yield runs.recipes / f"{recipe}.json"
     if scope.work:
@@ -92,10 +98,6 @@ def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
                     yield sent_path(path)
     if scope.damaged:
         yield from runs.damaged.glob("*")
-
-
-def _uses(store: Store, recipe: str) -> list[dict[str, str]]:
-    return list(recall(store.runs, recipe).get("stages", {}).values())
 
 
 def _remove(path: Path) -> None:

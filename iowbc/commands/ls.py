@@ -3,11 +3,12 @@
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.named import known_recipes, last_used
+from iowbc.commands.named import known_recipes
 from iowbc.commands.results import metrics_text
 from iowbc.commands.tables import plain_table
 from iowbc.errors import require_known
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
+from iowbc.pipeline.store.last_used import ever_used
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.recipe import PIPELINE
 
@@ -18,8 +19,8 @@ def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
         require_known(stage, "stage", PIPELINE)
     users: dict[str, list[str]] = {}
     for recipe in known_recipes(store):
-        for artifact in last_used(store, recipe).values():
-            users.setdefault(artifact.manifest.key, []).append(recipe)
+        for key in ever_used(store.runs, recipe):
+            users.setdefault(key, []).append(recipe)
     table = plain_table("stage", "key", "used by", "made", "took", "size", "metrics")
     artifacts = store.artifacts(stage)
     for artifact in artifacts:

@@ -13,6 +13,9 @@ import pytest
 
 from iowbc.commands.named import open_artifact
 from iowbc.errors import UsageError
+from iowbc.pipeline.store.artifact import write_manifest
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 Key = Callable[[str, str], str]
@@ -142,10 +145,33 @@ def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: C
     assert "all stages are cached" in command("plan", "first.yaml").stdout
 
 
-def test_gc_keeps_an_unused_artifact_only_until_it_is_told(folder: Path, command: Command) -> None:
+def test_a_run_with_overrides_leaves_the_recipes_name_to_what_it_had(folder: Path, command: Command, key: Key) -> None:
+    before = key("first", "teacher")
     assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
-    assert "runs/store/teacher" in command("gc", "--unused").stdout
+    assert key("first", "teacher") == before
+    assert before in command("show", "first/teacher").stdout
+    assert command("gc", "--unused").stdout == "0 B in all\n"
     assert command("run", "first.yaml", "--set", "seed=4").stdout.count(": cached") == 6
+    assert command("run", "first.yaml").stdout.count(": cached") == 6
+
+
+def test_gc_removes_what_was_used_long_ago_only_when_told_how_long(folder: Path, command: Command, key: Key) -> None:
+    assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
+    teachers = folder / "runs" / "store" / "teacher"
+    assert len(list(teachers.iterdir())) == 3
+    assert command("gc", "--unused", "--older-than", "1").stdout == "0 B in all\n"
+    assert command("gc", "--unused", "--older-than", "1e-9").returncode == 0
+    assert {path.name for path in teachers.iterdir()} == {key("first", "teacher"), key("second", "teacher")}
+
+
+def test_a_long_training_is_removed_by_its_recipes_name_alone(folder: Path, command: Command, key: Key) -> None:
+    for record in (folder / "runs" / "recipes").glob("*.json"):
+        record.unlink()
+    store = Store(Runs(folder / "runs"))
+    teachers = store.artifacts("teacher")
+    write_manifest(teachers[0].folder, teachers[0].manifest.model_copy(update={"seconds": 7200.0}))
+    assert command("gc", "--unused").returncode == 0
+    assert [made.manifest.key for made in store.artifacts()] == [teachers[0].manifest.key]
 
 
 def test_status_tells_what_each_recipe_has(command: Command) -> None:

@@ -1,4 +1,4 @@
-"""What each recipe used last: the artifacts that `status` and `show` tell of and `gc` keeps."""
+"""What each recipe used last, of which `status` and `show` tell, and ever, which `gc` spares."""
 
 import json
 import shlex
@@ -14,14 +14,26 @@ from iowbc.recipe.reading.loading import LoadedRecipe
 
 
 def remember(runs: Runs, loaded: LoadedRecipe, stage: str, key: str) -> None:
-    """Record that a recipe's stage has this artifact now."""
+    """Record that a recipe's stage uses this artifact.
+
+    What a recipe has without overrides is what its name stands for: a run with some only adds to what was ever used.
+    """
     path = record_path(runs, loaded.recipe.name)
-    record = _record(path) or {}
-    record["file"] = str(loaded.file)
-    record["overrides"] = list(loaded.overrides)
-    record["recipe"] = loaded.recipe.model_dump(mode="json")
-    record.setdefault("stages", {})[stage] = {"key": key, "time": time.time()}
+    record = _record(path) or {"stages": {}}
+    if not loaded.overrides or record.get("overrides", True):
+        record["file"] = str(loaded.file)
+        record["overrides"] = list(loaded.overrides)
+        record["recipe"] = loaded.recipe.model_dump(mode="json")
+        record["stages"][stage] = {"key": key, "time": time.time()}
+    record.setdefault("ever", {})[key] = time.time()
     write_whole(path, json.dumps(record, indent=1))
+
+
+def ever_used(runs: Runs, recipe: str) -> dict[str, float]:
+    """When a recipe, with any overrides, last used an artifact, by its key [s since 1970]."""
+    record = recall(runs, recipe)
+    last = {str(use["key"]): float(use["time"]) for use in record.get("stages", {}).values()}
+    return last | {str(key): float(moment) for key, moment in record.get("ever", {}).items()}
 
 
 def recall(runs: Runs, recipe: str) -> dict[str, Any]:
@@ -57,7 +69,9 @@ def _record(path: Path) -> dict[str, Any] | None:
     record = read_json(path)
     if not isinstance(record, dict) or not isinstance(record.get("recipe"), dict):
         return None
-    stages = record.get("stages")
+    stages, ever = record.get("stages"), record.get("ever", {})
+    if not isinstance(ever, dict) or not all(isinstance(moment, (int, float)) for moment in ever.values()):
+        return None
     if not isinstance(stages, dict) or not all(
         isinstance(use, dict) and {"key", "time"} <= use.keys() for use in stages.values()
     ):
