@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from iowbc.commands.unforeseen import prepare_streams, told
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -277,7 +279,9 @@ def doctor(runs: RunsFolder = None) -> None:
 def _console() -> "Console":
     from rich.console import Console
 
-    return Console(width=None if sys.stdout.isatty() else int(os.environ.get("COLUMNS", PIPE_WIDTH)))
+    columns = os.environ.get("COLUMNS", "")
+    width = int(columns) if columns.isdecimal() and int(columns) > 0 else PIPE_WIDTH
+    return Console(width=None if sys.stdout.isatty() else width)
 
 
 def _store(folder: Path | None) -> "Store":
@@ -301,12 +305,15 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 a stage failed, 2 the recipe or the usage is wrong, 130 interrupted."""
     signal.signal(signal.SIGINT, _leave)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    prepare_streams()
     try:
         app(arguments, prog_name="iowbc")
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # a reader that has gone away, as of `| head`
+        sys.exit(1)
     except Exception as error:
         from iowbc.errors import IowbcError
 
-        if not isinstance(error, IowbcError):
-            raise
-        print(error, file=sys.stderr)
-        sys.exit(error.exit_code)
+        foreseen = isinstance(error, IowbcError)
+        print(error if foreseen else told(error, arguments or sys.argv[1:]), file=sys.stderr)
+        sys.exit(error.exit_code if isinstance(error, IowbcError) else 1)

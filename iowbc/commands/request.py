@@ -61,6 +61,11 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
 
     from iowbc.robot.description import robot_folder
 
+    if Path(loaded.recipe.robot).name != loaded.recipe.robot and not loaded.place("robot").startswith("--set"):
+        text = (
+            f"key 'robot' = '{loaded.recipe.robot}': a recipe names a folder under robots/; a path is for --set robot="
+        )
+        raise RecipeError([Problem(loaded.place("robot"), text)])
     try:
         robot = robot_folder(loaded.recipe.robot)
     except FileNotFoundError as error:

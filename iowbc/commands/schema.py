@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from iowbc.errors import UsageError
 from iowbc.recipe.recipe import Recipe
 
 DEFINITIONS = "#/$defs/"
@@ -19,7 +20,10 @@ def write_schema(output: Path | None) -> None:
     if output is None:
         sys.stdout.write(text)
     else:
-        output.write_text(text, encoding="utf-8")
+        try:
+            output.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise UsageError(f"--output {output}: cannot be written: {error.strerror}; name another file") from None
 
 
 def recipe_schema() -> dict[str, Any]:

@@ -8,6 +8,9 @@ from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.simulation.holding import FREE, SCENES
 
+HEAVIEST = 1000.0
+"""No object is heavier [kg]."""
+
 
 @dataclass(frozen=True)
 class PlayRequest:
@@ -30,6 +33,8 @@ class PlayRequest:
 
     def __post_init__(self) -> None:
         require_known(self.scene, "scene", SCENES)
+        if not 0.0 <= self.mass <= HEAVIEST:
+            raise UsageError(f"--mass {self.mass:g}: should be 0 to {HEAVIEST:g} kg")
         if self.video is not None and self.video.suffix != ".mp4":
             raise UsageError(f"{self.video}: a film is an mp4 file; give a name that ends in .mp4")
 

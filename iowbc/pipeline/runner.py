@@ -1,5 +1,7 @@
 """Runs the stages of a recipe: reuses what is stored, makes the rest, loses nothing."""
 
+import contextlib
+import errno
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +20,9 @@ from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.writing import as_yaml
+
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Errors that say that nothing more can be written."""
 
 
 class Runner:
@@ -151,8 +156,16 @@ class Runner:
             self._ended(workspace, view, "failed", "FAILED", str(error))
             raise PipelineFailed(f"{stage.name} failed: {error}") from error
         except Exception as error:
+            if isinstance(error, OSError) and error.errno in FULL:
+                self._ended(workspace, view, "failed", "FAILED", "no space left")
+                place = error.filename or workspace.root
+                raise PipelineFailed(
+                    f"{stage.name} failed: no space is left on the disk at {place}; its last checkpoint is kept. "
+                    "Make some: `iowbc gc` removes what you name"
+                ) from error
             details = workspace.root / "error.txt"
-            details.write_text(traceback.format_exc(), encoding="utf-8")
+            with contextlib.suppress(OSError):
+                details.write_text(traceback.format_exc(), encoding="utf-8")
             summary = f"{type(error).__name__}: {error}"
             self._ended(workspace, view, "failed", "FAILED", summary)
             self.display.say(traceback.format_exc())
@@ -185,8 +198,10 @@ class Runner:
         return artifact
 
     def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
-        workspace.write()
+        with contextlib.suppress(OSError):  # a full disk must not hide why the stage ended
+            workspace.write()
         view.state, view.note, view.seconds = state, "", workspace.seconds
         self.display.changed(view)
         if self.tracker is not None:
-            self.tracker.end(view.name, status, message)
+            with contextlib.suppress(OSError):
+                self.tracker.end(view.name, status, message)

@@ -27,7 +27,7 @@ class Check(Section):
     """Masses in the scene `push` [kg], where the task plays it."""
     trials: int = Field(default=2, ge=1)
     """Trials at each mass."""
-    seed: int = Field(default=5000, ge=0)
+    seed: int = Field(default=5000, ge=0, lt=2**32)
     """Seed of the first trial: apart from those of training, evaluation and export."""
     sequence: tuple[Segment, ...] = Field(default=STAND_WALK_TURN, min_length=1)
     """Commands of a trial, in order."""

@@ -22,7 +22,7 @@ class Acceptance(Section):
     """Commands of the trial, in order; standing by default."""
     trials: int = Field(default=5, ge=1)
     """Number of trials."""
-    seed: int = Field(default=2000, ge=0)
+    seed: int = Field(default=2000, ge=0, lt=2**32)
     """Seed of the first trial."""
     minimum: int = Field(default=1, ge=0)
     """Trials that must survive, or the stage fails; 0 only reports."""

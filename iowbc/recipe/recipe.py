@@ -26,11 +26,11 @@ NAME = "[a-z0-9][a-z0-9_-]*"
 class Recipe(Section):
     """One experiment."""
 
-    name: str = Field(pattern=f"^{NAME}$")
-    """Name of the experiment: lower-case letters, digits, `-` and `_`."""
+    name: str = Field(pattern=f"^{NAME}$", max_length=64)
+    """Name of the experiment: up to 64 lower-case letters, digits, `-` and `_`."""
     description: str = ""
     """What the experiment is for, in a sentence."""
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, lt=2**32)
     """Seed of everything that is drawn at random."""
     robot: str = "g1"
     """Folder under `robots/` that describes the robot."""

@@ -78,7 +78,12 @@ class Robot:
 
 
 def robot_folder(name: str) -> Path:
-    """Finds `robots/<name>`: in the current folder, else in the checkout, else in the installed package."""
+    """Finds `robots/<name>`: in the current folder, else in the checkout, else in the installed package.
+
+    A name with a slash is the path of a folder. Raises `FileNotFoundError` with the known robots.
+    """
+    if Path(name).name != name and (Path(name) / DESCRIPTION).is_file():
+        return Path(name)
     package = Path(__file__).resolve().parents[1]
     roots = [Path.cwd() / "robots", package.parent / "robots", package / "robots"]
     for root in roots:

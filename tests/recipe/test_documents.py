@@ -71,3 +71,9 @@ def test_aliases_that_contain_themselves_or_multiply_are_refused() -> None:
     bomb += "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 7))
     with pytest.raises(RecipeError, match="far too many"):
         read_document(bomb, "file.yaml")
+
+
+def test_a_deeply_nested_file_is_refused_before_it_overflows_the_parser() -> None:
+    for text in ("[" * 100_000, "a: " + "{a: " * 100_000, "- " * 50_000 + "a"):
+        with pytest.raises(RecipeError, match=r"nested more than 40 deep|not valid YAML"):
+            read_document(text, "file.yaml")

@@ -3,12 +3,14 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from iowbc.errors import RecipeError
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.reading.study import load_study
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -31,12 +33,29 @@ def loaded(folder: Path, text: str, *overrides: str) -> LoadedRecipe:
 
 @pytest.mark.parametrize("path", sorted(RECIPES.glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_shipped_recipe_is_valid(path: Path) -> None:
-    assert load_recipe(path).recipe.name
+    study = load_study(path)
+    assert study.variants if study else load_recipe(path).recipe.name
 
 
 def test_an_empty_recipe_is_refused(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "# nothing yet\n")
     assert text.startswith("mine.yaml:1:1: is empty")
+
+
+def test_thousands_of_problems_are_counted(tmp_path: Path) -> None:
+    before = time.process_time()
+    texts = problems(tmp_path, "".join(f"key_{number}: 1\n" for number in range(20_000)))
+    assert len(texts) == 51
+    assert texts[-1].endswith("and 19950 more problems")
+    assert time.process_time() - before < 20.0
+
+
+def test_what_is_no_file_of_a_recipes_size_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(RecipeError, match="is no regular file"):
+        load_recipe(tmp_path / "pipe.yaml")
+    (text,) = problems(tmp_path, "#" * 1_000_001)
+    assert "has 1,000,001 bytes" in text
 
 
 def test_a_tab_is_named(tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from iowbc.pipeline.machine import host
 from iowbc.pipeline.store.runs import Runs, read_json
 
 PROGRESS = "progress.json"
+NUMBERS = ("attempts", "before", "seconds", "updated", "done", "total")
+"""Entries of the progress that are numbers."""
 WRITE_INTERVAL = 1.0
 """Seconds between two records of the progress on disk."""
 
@@ -32,8 +34,7 @@ class Workspace:
     @property
     def record(self) -> dict[str, Any]:
         """What the last attempt recorded; empty where there was none."""
-        found = read_json(self.root / PROGRESS)
-        return found if isinstance(found, dict) else {}
+        return _record(self.root)
 
     def begin(self, recipe: str, forced: bool, code: dict[str, str]) -> bool:
         """Make room for an attempt; returns whether it continues an earlier one.
@@ -90,7 +91,16 @@ class Workspace:
         shutil.rmtree(self.root, ignore_errors=True)
 
 
+def _record(root: Path) -> dict[str, Any]:
+    """What a work folder says of its stage; empty where that is missing or not what was written."""
+    found = read_json(root / PROGRESS)
+    if not isinstance(found, dict):
+        return {}
+    numbers = all(isinstance(found.get(name, 0.0), (int, float)) for name in NUMBERS)
+    return found if numbers and isinstance(found.get("code", {}), dict) else {}
+
+
 def unfinished(runs: Runs) -> list[tuple[Path, dict[str, Any]]]:
     """Work folders and their records, newest first."""
-    found = [(path, read_json(path / PROGRESS) or {}) for path in runs.work.glob("*") if path.is_dir()]
+    found = [(path, _record(path)) for path in runs.work.glob("*") if path.is_dir()]
     return sorted(found, key=lambda item: -float(item[1].get("updated", 0.0)))

@@ -21,7 +21,7 @@ class Evaluation(Section):
     """Name of the variant in tables and figures; the paper's are IO-WBC, WBC, w/o RG, w/o Distill."""
     trials: int = Field(default=5, ge=1)
     """Trials per mass; trial k of every mass and variant has the same seed."""
-    seed: int = Field(default=1000, ge=0)
+    seed: int = Field(default=1000, ge=0, lt=2**32)
     """Seed of the first trial; apart from the seed of training, so that no trial was met there."""
     sequence: tuple[Segment, ...] = ()
     """Commands of every sweep and case that has none of its own, in order; their durations add up to the trial's.

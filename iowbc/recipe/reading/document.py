@@ -64,6 +64,7 @@ def read_value(text: str, place: str) -> Located:
 
 def _read(text: str, place_of: PlaceOf, root: str) -> Located:
     try:
+        _limit_depth(text, place_of)
         node = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -78,6 +79,18 @@ def _read(text: str, place_of: PlaceOf, root: str) -> Located:
     if builder.problems:
         raise RecipeError(builder.problems)
     return tree
+
+
+def _limit_depth(text: str, place_of: PlaceOf) -> None:
+    """Raises `RecipeError` for nesting that would overflow the stack of the parser written in C."""
+    depth = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > MAXIMUM_DEPTH:
+                raise RecipeError([Problem(place_of(event.start_mark), f"is nested more than {MAXIMUM_DEPTH} deep")])
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
 
 
 def _is_tab(text: str, mark: yaml.Mark) -> bool:

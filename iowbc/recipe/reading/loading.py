@@ -1,6 +1,7 @@
 """Reads a recipe file: inheritance, overrides, validation, and where each value came from."""
 
 import os
+import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from iowbc.recipe.reading.overrides import overridden
 from iowbc.recipe.reading.validation import validate
 from iowbc.recipe.recipe import Recipe
 
+LARGEST_FILE = 1_000_000
+"""Bytes of the largest recipe that is read."""
 OWN_KEYS = ("name", "description")
 """Keys that a recipe never inherits: they say which experiment this is."""
 
@@ -67,7 +70,7 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
     own = Located(entries, tree.place)
     if extends is None:
         return own
-    if not isinstance(extends.value, str):
+    if not isinstance(extends.value, str) or "\0" in extends.value:
         raise RecipeError([Problem(extends.place, "key 'extends': should be the name of one recipe file")])
     parent = os.path.normpath(os.path.join(os.path.dirname(file), extends.value))
     base = _resolve(parent, (*above, file), extends.place)
@@ -82,6 +85,12 @@ def _mapping(tree: Located) -> dict[str, Located]:
 def read_text(file: str, place: str) -> str:
     """The text of a recipe file. Raises `RecipeError` where it cannot be read."""
     try:
+        found = os.stat(file)
+        if not stat.S_ISREG(found.st_mode):
+            raise RecipeError([Problem(place, f"recipe {file}: is no regular file")])
+        if found.st_size > LARGEST_FILE:
+            text = f"recipe {file}: has {found.st_size:,} bytes; a recipe has {LARGEST_FILE:,} at most"
+            raise RecipeError([Problem(place, text)])
         return Path(file).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         text = f"is not UTF-8 text ({error.reason} at byte {error.start})"

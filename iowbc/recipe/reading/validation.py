@@ -13,6 +13,9 @@ from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
 
+PROBLEMS_TOLD = 50
+"""Problems of a recipe that are told; the others are counted."""
+
 
 def validate(tree: Located) -> Recipe:
     """The recipe that a tree describes, laid upon the defaults: a section may hold any part of its keys.
@@ -43,13 +46,15 @@ def _defaults() -> Located:
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
     """One problem a place and key: what the members of a union say about the same value is joined."""
     texts: dict[tuple[str, str], list[str]] = {}
-    for error in errors:
+    for error in errors[:PROBLEMS_TOLD]:
         place, head, text = _problem(tree, error)
         texts.setdefault((place, head), [])
         if text not in texts[place, head]:
             texts[place, head].append(text)
     problems = [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
-    return sorted(problems, key=lambda problem: _position(problem.place))
+    problems.sort(key=lambda problem: _position(problem.place))
+    rest = len(errors) - PROBLEMS_TOLD
+    return [*problems, Problem(tree.place, f"and {rest} more problems")] if rest > 0 else problems
 
 
 def _position(place: str) -> tuple[str, int, int]:
@@ -129,9 +134,14 @@ def _inside(annotation: Any, name: str) -> Iterator[Any]:
         yield from arguments[-1:]
 
 
+@functools.cache
+def _all_paths() -> list[tuple[str, ...]]:
+    return list(_known_paths(Recipe, ()))
+
+
 def _elsewhere(name: str) -> str:
     """`; did you mean 'section.name'?` where a misplaced key belongs to exactly one other section."""
-    places = [path for path in _known_paths(Recipe, ()) if path[-1] == name]
+    places = [path for path in _all_paths() if path[-1] == name]
     return f"; did you mean '{'.'.join(places[0])}'?" if len(places) == 1 else ""
 
 

@@ -1,0 +1,115 @@
+"""What nobody foresaw ends with one sentence, the place of the details, and the command that goes on."""
+
+import errno
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from iowbc.commands.unforeseen import told
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+BROKEN = """
+from iowbc.commands import ls
+def broken(*arguments):
+    raise KeyError("what nobody foresaw")
+ls.list_artifacts = broken
+from iowbc.cli import main
+main()
+"""
+
+
+def iowbc(folder: Path, *words: str, **settings: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "iowbc", *words]
+    return subprocess.run(
+        command, cwd=folder, env=os.environ | settings, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+def test_an_unforeseen_error_is_told_in_one_sentence_with_its_details_kept(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", BROKEN, "ls", "teacher"]
+    settings = os.environ | {"TMPDIR": str(tmp_path)}
+    done = subprocess.run(words, cwd=tmp_path, env=settings, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    sentence, again = done.stderr.splitlines()
+    assert "KeyError: 'what nobody foresaw'; the details are in " in sentence
+    assert again == "to go on: iowbc ls teacher"
+    (details,) = tmp_path.glob("iowbc-*.txt")
+    assert "in broken" in details.read_text()
+
+
+def test_a_full_disk_is_named_with_the_command_that_goes_on() -> None:
+    text = told(OSError(errno.ENOSPC, "No space left on device", "runs/store/x"), ["run", "a b.yaml"])
+    assert text.startswith("no space is left on the disk at runs/store/x")
+    assert text.endswith("\nto go on: iowbc run 'a b.yaml'")
+
+
+def test_details_that_cannot_be_written_are_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def full(*arguments: object, **settings: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("tempfile.NamedTemporaryFile", full)
+    assert "ValueError: odd\n" in told(ValueError("odd"), ["ls"])
+
+
+@pytest.mark.parametrize(
+    ("words", "settings"),
+    [
+        (["ls"], {"COLUMNS": "abc"}),
+        (["ls"], {"COLUMNS": "0"}),
+        (["plan", "smoke"], {"PYTHONIOENCODING": "ascii"}),
+    ],
+)
+def test_an_odd_terminal_breaks_nothing(tmp_path: Path, words: list[str], settings: dict[str, str]) -> None:
+    done = iowbc(tmp_path, *words, **settings)
+    assert done.returncode == 0, done.stderr
+
+
+def test_closed_output_breaks_nothing(tmp_path: Path) -> None:
+    command = shlex.join([sys.executable, "-m", "iowbc", "ls"])
+    done = subprocess.run(["bash", "-c", f"{command} >&-"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["schema", "--output", "nowhere/x.json"], "--output nowhere/x.json: cannot be written"),
+        (["play", "first", "--mass", "inf"], "--mass inf: should be 0 to 1000 kg"),
+        (["gc", "--unused", "--older-than", "nan"], "greater than or equal to 0"),
+        (["plan", "first.yaml", "--set", ".".join(["a"] * 3000) + "=1"], "names 3000 levels"),
+        (["plan", "first.yaml", "--set", "__class__.__init__=1"], "'__class__'"),
+        (["plan", "first.yaml", "--set", "name=" + "a" * 300], "at most 64 characters"),
+        (["plan", "first.yaml", "--set", "seed=4294967296"], "seed"),
+        (["plan", "."], "is no regular file"),
+        (["plan", "/dev/zero"], "is no regular file"),
+        (["plan", "null.yaml"], "key 'extends'"),
+        (["plan", "long.yaml"], "File name too long"),
+        (["plan", "climbing.yaml"], "a recipe names a folder under robots/"),
+    ],
+)
+def test_what_an_attacker_would_type_is_refused(folder: Path, command: Command, words: list[str], text: str) -> None:
+    (folder / "null.yaml").write_text('extends: "a\\0b"\n')
+    (folder / "long.yaml").write_text(f"extends: {'a' * 5000}.yaml\n")
+    (folder / "climbing.yaml").write_text("robot: ../../elsewhere\n")
+    done = command(*words)
+    assert done.returncode == 2, done.stderr
+    assert text in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("text", ["[]", "3", '{"updated": "never"}', '{"code": 3}', "\x00"])
+def test_a_progress_of_other_types_is_no_progress(
+    folder: Path, command: Command, key: Callable[..., str], text: str
+) -> None:
+    work = folder / "runs" / "work" / key("first", "teacher")
+    work.mkdir(parents=True)
+    (work / "progress.json").write_text(text)
+    for words in (["status"], ["run", "first.yaml", "--force", "teacher"]):
+        done = command(*words)
+        assert done.returncode == 0, done.stderr
