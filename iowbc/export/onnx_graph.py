@@ -23,6 +23,7 @@ def write_onnx(graph: ControllerGraph, path: Path, opset: int, about: Mapping[st
     example = tuple(torch.zeros(2, *port.shape) for port in ports)  # an example of one row would fix the axis
     with warnings.catch_warnings(), _quiet("torch.onnx"):
         warnings.simplefilter("ignore", FutureWarning)  # torch's own use of a name that it deprecates
+        warnings.filterwarnings("ignore", ".*_flat_weights", UserWarning)  # views that nn.GRU keeps of its parameters
         program = torch.onnx.export(
             graph,
             example,

@@ -5,20 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from iowbc.learning.checkpoint import Arrays
-from iowbc.learning.networks import StudentNetwork
 from iowbc.robot.mirror import MirrorMap
-
-
-def gaussian_kl(teacher_mean: Tensor, student_mean: Tensor, teacher_std: Tensor, student_std: Tensor) -> Tensor:
-    """D_KL(teacher || student) of diagonal Gaussians, summed over the action, shape (n,)."""
-    variance = student_std**2
-    difference = teacher_std**2 + (teacher_mean - student_mean) ** 2
-    return (torch.log(student_std / teacher_std) + difference / (2 * variance) - 0.5).sum(-1)
 
 
 def spread(environments: int) -> NDArray[np.float64]:
@@ -32,21 +22,22 @@ def spread(environments: int) -> NDArray[np.float64]:
 
 
 class Experience:
-    """A ring of the newest control steps of n environments: s_t, the teacher's mean action, and the age of the episode.
+    """A ring of the newest control steps of n environments: s_t, what it should be answered, the age of the episode.
 
-    A sample is the history H_t that the student saw, rebuilt from the ring, and the teacher's answer to it.
+    A sample is the history H_t that the student saw, rebuilt from the ring, and the answer to it: the teacher's action,
+    and what else is to be learnt.
     """
 
-    def __init__(self, capacity: int, environments: int, observation: int, actions: int, history: int) -> None:
+    def __init__(self, capacity: int, environments: int, observation: int, targets: int, history: int) -> None:
         self.steps = max(capacity // environments, history)
         self.history = history
         self.observations = np.zeros((self.steps, environments, observation), np.float32)
-        self.targets = np.zeros((self.steps, environments, actions), np.float32)
+        self.targets = np.zeros((self.steps, environments, targets), np.float32)
         self.ages = np.zeros((self.steps, environments), np.int64)
         self.added = 0
 
     def add(self, observation: NDArray[np.float32], target: NDArray[np.float32], starts: NDArray[np.bool_]) -> None:
-        """Append a control step: s_t, shape (n, S), the teacher's action, shape (n, A), and where an episode starts."""
+        """Append a control step: s_t, shape (n, S), the answer, shape (n, T), and where an episode starts."""
         slot, last = self.added % self.steps, (self.added - 1) % self.steps
         self.observations[slot] = observation
         self.targets[slot] = target
@@ -54,7 +45,7 @@ class Experience:
         self.added += 1
 
     def sample(self, batch: int, random: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Histories, shape (batch, K, S), and actions, shape (batch, A), drawn uniformly."""
+        """Histories, shape (batch, K, S), and answers, shape (batch, T), drawn uniformly."""
         oldest = 0 if self.added <= self.steps else self.added - self.steps + self.history - 1
         times = random.integers(oldest, self.added, batch)
         environments = random.integers(0, self.observations.shape[1], batch)
@@ -79,23 +70,6 @@ class Experience:
         self.targets[:] = arrays["targets"]
         self.ages[:] = arrays["ages"]
         self.added = int(arrays["added"][0])
-
-
-def gradient_step(
-    student: StudentNetwork,
-    optimizer: torch.optim.Optimizer,
-    histories: NDArray[np.float32],
-    targets: NDArray[np.float32],
-    std: Tensor,
-    gradient_norm: float,
-) -> float:
-    """One step, of a gradient no larger than given, down the KL divergence; returns it as it was before the step."""
-    loss = gaussian_kl(torch.from_numpy(targets), student(torch.from_numpy(histories)), std, std).mean()
-    optimizer.zero_grad()
-    loss.backward()  # type: ignore[no-untyped-call]
-    torch.nn.utils.clip_grad_norm_(student.parameters(), gradient_norm)
-    optimizer.step()
-    return float(loss.detach())
 
 
 def mirror_half(

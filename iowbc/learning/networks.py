@@ -7,10 +7,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iowbc.learning.activations import ACTIVATIONS
-from iowbc.learning.perceptron import DenseMlp, Perceptron, mlp
-from iowbc.learning.symmetric import SymmetricMlp
-from iowbc.robot.mirror import MirrorMap
+from iowbc.learning.encoders import ENCODERS, EncoderName, MirroredEncoder
+from iowbc.learning.perceptron import DenseMlp, Perceptron
+from iowbc.learning.symmetric import SymmetricMlp, paired
+from iowbc.robot.mirror import MirrorMap, side_by_side
 
 Mirrors = tuple[MirrorMap, MirrorMap]
 """Of an input and of an output."""
@@ -80,12 +80,20 @@ class TeacherNetwork(nn.Module):
         return cast(Tensor, self.body(self.normalizer(observation)))
 
 
+def swap(pairs: int) -> MirrorMap:
+    """Mirror of a latent whose halves the mirror swaps, (2 pairs,)."""
+    places = np.arange(2 * pairs)
+    return MirrorMap(np.roll(places, pairs), np.ones(2 * pairs, np.float32))
+
+
 class StudentNetwork(nn.Module):
     """Mean action of the student: the history H_t, shape (n, K, S), oldest first, to a, shape (n, A).
 
-    Each of the K observations is projected by the same layer, the encoder turns all projections into a latent of what
-    the load does to the robot, and the body sees that latent beside the newest observation.
+    An encoder turns the history into a latent of what the load does to the robot; the body sees it beside the newest
+    observation.
     """
+
+    log_std: Tensor
 
     def __init__(
         self,
@@ -97,15 +105,32 @@ class StudentNetwork(nn.Module):
         hidden: Sequence[int],
         activation: str,
         clip: float,
+        encoder: EncoderName = "mlp",
+        mirrors: Any = None,
     ) -> None:
+        """`mirrors`: of observation and action, as `mirror_as_json` gives them; the network then commutes with them."""
         super().__init__()
         self.normalizer = Normalizer(observation, clip)
-        activate = ACTIVATIONS[activation].module
-        self.frame = nn.Sequential(nn.Linear(observation, frame_features), activate())
-        self.encoder = nn.Sequential(nn.Linear(history * frame_features, latent), activate())
-        self.body = mlp([observation + latent, *hidden, actions], activation)
+        both = mirrors_from_json(mirrors)
+        make = ENCODERS[encoder]
+        body = None
+        if both is None:
+            self.encoder = make(observation, history, frame_features, latent, activation)
+        else:
+            half = make(observation, history, frame_features, paired(latent), activation)
+            self.encoder = MirroredEncoder(half, both[0])
+            body = side_by_side((both[0], swap(paired(latent)))), both[1]
+        self.body = perceptron(observation + latent, hidden, actions, activation, body)
+        self.register_buffer("log_std", torch.zeros(actions))
 
     def forward(self, history: Tensor) -> Tensor:
+        return self.act(*self.read(history))
+
+    def read(self, history: Tensor) -> tuple[Tensor, Tensor]:
+        """The newest observation, normalised, and the latent."""
         normal = self.normalizer(history)
-        latent = self.encoder(self.frame(normal).flatten(1))
-        return cast(Tensor, self.body(torch.cat([normal[:, -1], latent], dim=1)))
+        return normal[:, -1], self.encoder(normal)
+
+    def act(self, newest: Tensor, latent: Tensor) -> Tensor:
+        """The mean action."""
+        return cast(Tensor, self.body(torch.cat([newest, latent], dim=1)))

@@ -2,19 +2,39 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import TeacherPolicy
-from iowbc.learning.distillation import Experience, gradient_step, mirror_half, spread
+from iowbc.learning.distillation import Experience, mirror_half, spread
+from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.environments import Environments
 from iowbc.learning.history import History
-from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork
+from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
+from iowbc.processes import keep_freed_memory
 from iowbc.recipe.distillation import Distillation
+from iowbc.robot.mirror import MirrorMap, side_by_side
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Where in a row of the environments is what, and how it is mirrored."""
+
+    observation: slice
+    """s_t."""
+    privileged: slice
+    """s_priv."""
+    facts: NDArray[np.int64]
+    """What the latent is to tell: places of the object's mass and the base's velocity."""
+    observation_mirror: MirrorMap
+    facts_mirror: MirrorMap
+    action_mirror: MirrorMap
 
 
 class StudentTraining:
@@ -25,19 +45,18 @@ class StudentTraining:
         settings: Distillation,
         environments: Environments,
         teacher: TeacherNetwork,
-        places: tuple[slice, slice],
-        mirrors: Mirrors | None,
+        rows: Rows,
+        symmetry: Symmetry,
         seed: int,
     ) -> None:
-        """`places`: of s_t and of s_priv in a row; `mirrors`: of s_t and the action, to learn from mirror images, too.
-
-        Observations are normalised as the teacher's are.
-        """
+        """`symmetry`: as the teacher's. Observations are normalised as the teacher's are."""
         torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
-        self.settings, self.environments, self.mirrors = settings, environments, mirrors
+        torch.manual_seed(seed)
+        keep_freed_memory()
+        self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
         self.teacher = TeacherPolicy(teacher)
-        self.seen, self.privileged = places
-        size, actions = self.seen.stop, environments.action_space.shape[0]
+        size, actions = rows.observation.stop, environments.action_space.shape[0]
+        mirrors = [mirror_as_json(rows.observation_mirror), mirror_as_json(rows.action_mirror)]
         self.architecture: dict[str, Any] = {
             "observation": size,
             "history": settings.history,
@@ -47,14 +66,20 @@ class StudentTraining:
             "hidden": list(settings.hidden),
             "activation": settings.activation,
             "clip": teacher.normalizer.clip,
+            "encoder": settings.encoder,
+            "mirrors": mirrors if symmetry == "construction" else None,
         }
         self.network = StudentNetwork(**self.architecture)
-        self.network.normalizer.mean.copy_(teacher.normalizer.mean[self.seen])
-        self.network.normalizer.std.copy_(teacher.normalizer.std[self.seen])
-        self.std = torch.clamp(teacher.log_std.exp(), min=settings.std_floor)
-        self.optimizer = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
+        self.network.normalizer.mean.copy_(teacher.normalizer.mean[rows.observation])
+        self.network.normalizer.std.copy_(teacher.normalizer.std[rows.observation])
+        floor = float(np.log(settings.std_floor))
+        self.loss = DistillationLoss(settings, teacher.log_std.clamp(min=floor), self.network, rows, symmetry)
+        self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
+        self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)
-        self.experience = Experience(settings.buffer, settings.environments, size, actions, settings.history)
+        self.experience = Experience(
+            settings.buffer, settings.environments, size, actions + len(rows.facts), settings.history
+        )
         self.history = History(settings.environments, settings.history, size)
         self.starts = np.ones(settings.environments, np.bool_)
         self.observation: NDArray[np.float32] | None = None
@@ -86,10 +111,12 @@ class StudentTraining:
         error, target_square = self._rollout(share)
         for group in self.optimizer.param_groups:
             group["lr"] = settings.learning_rate * (0.1 + 0.9 * 0.5 * (1 + np.cos(np.pi * progress)))
-        losses = [self._gradient_step() for _ in range(settings.gradient_steps)]
+        figures = [self._gradient_step() for _ in range(settings.gradient_steps)]
         self.rounds += 1
+        self.network.log_std.copy_(self.loss.log_std.detach())
         return {
-            "kl": float(np.mean(losses)),
+            **{name: float(np.mean([found[name] for found in figures])) for name in figures[0]},
+            "std": float(self.network.log_std.exp().mean()),
             "action_rmse": float(np.sqrt(error)),
             "action_agreement": float(1 - error / target_square),
             "teacher_share": share,
@@ -102,29 +129,39 @@ class StudentTraining:
             self.observation = self.environments.reset()
         errors, squares = [], []
         for _ in range(self.settings.rollout):
-            frame = self.observation[:, self.seen]
-            target = self.teacher.act(frame, self.observation[:, self.privileged])
+            frame = self.observation[:, self.rows.observation]
+            target = self.teacher.act(frame, self.observation[:, self.rows.privileged])
+            facts = (self.observation[:, self.rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
             frames = self.history.push(frame, self.starts)
             with torch.inference_mode():
                 action = self.network(torch.from_numpy(frames)).numpy()
-            self.experience.add(frame, target, self.starts)
+            self.experience.add(frame, np.concatenate([target, facts], axis=1), self.starts)
             errors.append(np.mean((action - target) ** 2))
             squares.append(np.mean(target**2))
             driven = np.where((self.teacher_drives < teacher_share)[:, None], target, action)
             self.observation, _, self.starts, _ = self.environments.step(driven)
         return np.mean(errors), np.mean(squares)
 
-    def _gradient_step(self) -> float:
-        histories, targets = self.experience.sample(self.settings.batch, self.random)
-        if self.mirrors is not None:
-            mirror_half(histories, targets, *self.mirrors, self.random)
-        return gradient_step(self.network, self.optimizer, histories, targets, self.std, self.settings.gradient_norm)
+    def _gradient_step(self) -> dict[str, float]:
+        """One step, of a gradient no larger than the recipe's, down the loss; its figures as they were before."""
+        histories, answers = self.experience.sample(self.settings.batch, self.random)
+        if self.symmetry == "augment":
+            answer_mirror = side_by_side((self.rows.action_mirror, self.rows.facts_mirror)).as_float32()
+            mirror_half(histories, answers, self.rows.observation_mirror, answer_mirror, self.random)
+        loss: Tensor
+        figures: dict[str, float]
+        loss, figures = self.loss(torch.from_numpy(histories), torch.from_numpy(answers))
+        self.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.loss.parameters(), self.settings.gradient_norm)
+        self.optimizer.step()
+        return figures
 
     def arrays(self) -> checkpoint.Arrays:
         """Everything that a resumed training needs, between two rounds."""
         assert self.observation is not None
         return {
-            **checkpoint.prefixed("student", checkpoint.module_arrays(self.network)),
+            **checkpoint.prefixed("student", checkpoint.module_arrays(self.loss)),
             **checkpoint.prefixed("optimizer", checkpoint.optimizer_arrays(self.optimizer)),
             **checkpoint.prefixed("experience", self.experience.arrays()),
             **checkpoint.prefixed("environment", self.environments.state()),
@@ -137,7 +174,7 @@ class StudentTraining:
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `arrays`, on a training made from the same recipe."""
-        checkpoint.restore_module(self.network, checkpoint.under("student", arrays))
+        checkpoint.restore_module(self.loss, checkpoint.under("student", arrays))
         checkpoint.restore_optimizer(self.optimizer, checkpoint.under("optimizer", arrays))
         self.experience.restore(checkpoint.under("experience", arrays))
         self.environments.restore(checkpoint.under("environment", arrays))

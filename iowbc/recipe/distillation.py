@@ -18,10 +18,14 @@ class Distillation(Section):
     """Control steps between two rounds of gradient steps."""
     history: int = Field(default=25, ge=1)
     """Length of the observation history H_t (paper Table I)."""
+    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
+    """What turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
+    recurrent unit. Where the teacher is symmetric by construction, so is the student: the encoder has half the latent's
+    size and reads the history and its mirror image."""
     frame_features: int = Field(default=32, ge=1)
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1)
-    """Size of what the encoder makes of the whole history."""
+    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
     hidden: tuple[PositiveInt, ...] = (512, 256, 128)
     """Hidden layers behind the encoder (paper Table I)."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
@@ -38,8 +42,14 @@ class Distillation(Section):
     """Samples that are kept, the newest."""
     teacher_share: float = Field(default=0.1, ge=0, le=1)
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
+    std: Literal["learnt", "shared"] = "learnt"
+    """Standard deviation of the student's Gaussian. `learnt`: its own, which grows where its action is uncertain
+    (paper eq. 7). `shared`: the teacher's, and the loss is a squared error that it scales."""
     std_floor: float = Field(default=0.1, gt=0)
     """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales the error."""
+    auxiliary: float = Field(default=0.1, ge=0)
+    """Weight of the squared error with which the object's mass and the base's velocity are read from the latent, each
+    in its standard deviations; 0 leaves it out. It makes the latent hold what the history tells of the load."""
     checkpoint_every: int = Field(default=50, ge=1, json_schema_extra=COSMETIC)
     """Rounds between two checkpoints."""
 

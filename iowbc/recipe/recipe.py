@@ -1,8 +1,8 @@
 """The whole recipe: one experiment, from the reference generator to the exported policy."""
 
-from typing import Literal, get_args
+from typing import Literal, Self, get_args
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from iowbc.recipe.distillation import Distillation
 from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -52,6 +52,17 @@ class Recipe(Section):
     """The ONNX graph and its checks."""
     execution: Execution = Execution()
     """How this machine runs it; never changes a result, and is not part of any key."""
+
+    @model_validator(mode="after")
+    def _students_units_in_pairs(self) -> Self:
+        student = self.distill
+        unpaired = [units for units in (student.latent, *student.hidden) if units % 2]
+        if self.teacher.symmetry == "construction" and unpaired:
+            raise ValueError(
+                f"distill: with teacher.symmetry 'construction' the mirror swaps units of latent and hidden in pairs; "
+                f"{unpaired[0]} is odd, give an even number"
+            )
+        return self
 
     @field_validator("stages")
     @classmethod

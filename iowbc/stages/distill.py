@@ -1,26 +1,41 @@
 """Stage `distill`: the student drives, the teacher says what it would have done, the student learns it (DAgger)."""
 
+from collections.abc import Mapping
+
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 from iowbc.stages.training import train
 
-PANELS = ("kl", "action_rmse", "action_agreement", "episode_seconds", "teacher_share", "reward")
+PANELS = (
+    "kl",
+    "kl_at_shared_std",
+    "auxiliary_error",
+    "std",
+    "action_rmse",
+    "action_agreement",
+    "episode_seconds",
+    "terminations/fallen",
+    "teacher_share",
+    "reward",
+)
 """Shown in the figure of the learning curves."""
+FACTS = ("object_mass", "base_linear_velocity")
+"""Privileged observations that the student's latent is to tell."""
 
 
 def run(job: Job) -> None:
     """Distil the teacher; leave the student's network, normalisation and curves."""
-    import torch
+    import numpy as np
 
     from iowbc.control.action import action_mirror
     from iowbc.learning.storage import load_teacher, save_network
-    from iowbc.learning.student import StudentTraining
+    from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
+    from iowbc.robot.mirror import side_by_side
     from iowbc.task.specification import Specification
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
-    torch.manual_seed(recipe.seed)
     teacher, about = load_teacher(job.inputs["teacher"])
     environments = VectorEnv(
         Specification(recipe, job.robot, job.inputs.get("rg-fit")),
@@ -30,12 +45,18 @@ def run(job: Job) -> None:
     )
     try:
         environments.set_curriculum(about["curriculum"])
-        layout, mirrors = environments.layout, None
-        if recipe.teacher.symmetry != "none":
-            mirrors = layout.state.mirror, action_mirror(robot)
-        places = layout.observation, layout.privileged
-        training = StudentTraining(settings, environments, teacher, places, mirrors, recipe.seed)
-        curves = train(job, training, settings.checkpoint_every, lambda values: f"KL {values['kl']:.3f}")
+        layout = environments.layout
+        own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
+        rows = Rows(
+            observation=layout.observation,
+            privileged=layout.privileged,
+            facts=np.concatenate([np.arange(layout.size)[layout.slices[f"privileged/{name}"]] for name in FACTS]),
+            observation_mirror=layout.state.mirror,
+            facts_mirror=side_by_side([own[name] for name in FACTS]),
+            action_mirror=action_mirror(robot),
+        )
+        training = StudentTraining(settings, environments, teacher, rows, recipe.teacher.symmetry, recipe.seed)
+        curves = train(job, training, settings.checkpoint_every, _note)
     finally:
         environments.close()
 
@@ -43,9 +64,14 @@ def run(job: Job) -> None:
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 
 
+def _note(values: Mapping[str, float]) -> str:
+    name = "kl" if "kl" in values else "kl_at_shared_std"
+    return f"KL {values[name]:.3f}, agreement {values['action_agreement']:.2f}"
+
+
 STAGE = Stage(
     name="distill",
-    version=2,
+    version=3,
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), "teacher"),
     run=run,

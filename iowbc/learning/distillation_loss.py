@@ -1,0 +1,75 @@
+"""What the student learns down: KL(teacher || student) (paper eq. 7), and how well its latent tells of the load."""
+
+from typing import Literal, Protocol
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from iowbc.learning.gaussian import divergence
+from iowbc.learning.networks import StudentNetwork, perceptron, swap
+from iowbc.recipe.distillation import Distillation
+from iowbc.robot.mirror import MirrorMap
+
+Symmetry = Literal["construction", "augment", "none"]
+
+
+class Mirrored(Protocol):
+    """How facts and actions are mirrored."""
+
+    @property
+    def facts_mirror(self) -> MirrorMap:
+        """Of the facts that the latent is to tell."""
+
+    @property
+    def action_mirror(self) -> MirrorMap:
+        """Of the action."""
+
+
+class DistillationLoss(nn.Module):
+    """The student's network with all that is learnt beside it: its standard deviation, and what reads its latent."""
+
+    teacher_log_std: Tensor
+    std_place: Tensor
+
+    def __init__(
+        self,
+        settings: Distillation,
+        teacher_log_std: Tensor,
+        network: StudentNetwork,
+        mirrors: Mirrored,
+        symmetry: Symmetry,
+    ) -> None:
+        """`teacher_log_std`: not below the recipe's floor, (A,)."""
+        super().__init__()
+        self.settings, self.network = settings, network
+        self.register_buffer("teacher_log_std", teacher_log_std.clone())
+        self.actions, facts = len(teacher_log_std), len(mirrors.facts_mirror)
+        symmetric = symmetry == "construction"
+        own = np.arange(self.actions)
+        kinds, place = np.unique(
+            np.minimum(own, mirrors.action_mirror.permutation) if symmetric else own, return_inverse=True
+        )
+        self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
+        self.log_stds = nn.Parameter(teacher_log_std[kinds].clone(), requires_grad=settings.std == "learnt")
+        """One for each pair of actions that the mirror swaps, and one for each other."""
+        both = (swap(settings.latent // 2), mirrors.facts_mirror) if symmetric else None
+        self.reader = perceptron(settings.latent, (settings.latent,), facts, settings.activation, both)
+
+    @property
+    def log_std(self) -> Tensor:
+        """Logarithm of the student's standard deviation, (A,), not below the floor."""
+        return self.log_stds[self.std_place].clamp(min=float(np.log(self.settings.std_floor)))
+
+    def forward(self, histories: Tensor, answers: Tensor) -> tuple[Tensor, dict[str, float]]:
+        """The loss of histories, (n, K, S), with the teacher's actions and the facts, (n, A + facts), and its parts."""
+        target, facts = answers[:, : self.actions], answers[:, self.actions :]
+        newest, latent = self.network.read(histories)
+        mean = self.network.act(newest, latent)
+        loss = kl = divergence(target, self.teacher_log_std, mean, self.log_std).mean()
+        figures = {"kl" if self.settings.std == "learnt" else "kl_at_shared_std": float(kl.detach())}
+        if self.settings.auxiliary:
+            read = nn.functional.mse_loss(self.reader(latent), facts)
+            loss = loss + self.settings.auxiliary * read
+            figures["auxiliary_error"] = float(read.detach())
+        return loss, figures

@@ -1,0 +1,50 @@
+"""Every student that a recipe can ask for becomes a graph that answers as it does, and obeys the mirror."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from test_graph import random_inputs
+
+from iowbc.control.action import action_mirror
+from iowbc.control.observation import observation_layout
+from iowbc.deploy.session import open_session, run
+from iowbc.export.golden import largest_difference
+from iowbc.export.graph import ControllerGraph
+from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.learning.encoders import ENCODERS, EncoderName
+from iowbc.learning.networks import StudentNetwork, mirror_as_json
+from iowbc.learning.symmetry import mirror_tensor
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+
+HISTORY = 7
+
+
+@pytest.mark.parametrize("encoder", list(ENCODERS))
+def test_a_symmetric_student_is_exported_with_its_encoder(
+    encoder: EncoderName, robot: Robot, recipe: Recipe, tmp_path: Path
+) -> None:
+    torch.manual_seed(0)
+    layout = observation_layout(robot, True)
+    mirrors = [mirror_as_json(layout.mirror), mirror_as_json(action_mirror(robot))]
+    student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16, 8], "elu", 10.0, encoder, mirrors)
+    graph = ControllerGraph(
+        student,
+        None,
+        robot,
+        layout,
+        recipe.task.references.gait,
+        history=HISTORY,
+        action_scale=robot.action_scale,
+        action_bound=recipe.task.action.bound,
+    )
+    write_onnx(graph, tmp_path / "policy.onnx", 18, {})
+    inputs = random_inputs(graph, 5)
+    theirs = run(open_session(tmp_path / "policy.onnx"), inputs)
+    assert max(largest_difference(theirs, run_torch(graph, inputs)).values()) < 1e-5
+    history = torch.from_numpy(np.random.default_rng(1).normal(size=(5, HISTORY, layout.size)).astype(np.float32))
+    with torch.no_grad():
+        expected = mirror_tensor(action_mirror(robot), student(history))
+        torch.testing.assert_close(student(mirror_tensor(layout.mirror, history)), expected, rtol=0, atol=1e-5)

@@ -1,0 +1,137 @@
+"""The student's networks and what they learn down."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
+from iowbc.learning.encoders import ENCODERS, EncoderName
+from iowbc.learning.networks import StudentNetwork, mirror_as_json
+from iowbc.learning.storage import load_student, save_network
+from iowbc.learning.symmetry import mirror_tensor
+from iowbc.recipe.distillation import Distillation
+from iowbc.robot.mirror import MirrorMap
+
+OBSERVATION = MirrorMap(np.array([1, 0, 2, 3]), np.array([1, 1, -1, 1], np.float32))
+ACTION = MirrorMap(np.array([1, 0, 2]), np.array([-1, -1, 1], np.float32))
+FACTS = MirrorMap(np.array([0, 1]), np.array([1, -1], np.float32))
+
+
+@dataclass(frozen=True)
+class Sides:
+    facts_mirror: MirrorMap = FACTS
+    action_mirror: MirrorMap = ACTION
+
+
+def architecture(encoder: EncoderName, symmetric: bool, history: int = 9) -> dict[str, Any]:
+    mirrors = [mirror_as_json(OBSERVATION), mirror_as_json(ACTION)] if symmetric else None
+    sizes = {"observation": 4, "history": history, "actions": 3, "frame_features": 8, "latent": 12, "hidden": [16]}
+    return {**sizes, "activation": "elu", "clip": 10.0, "encoder": encoder, "mirrors": mirrors}
+
+
+@pytest.mark.parametrize("encoder", list(ENCODERS))
+def test_a_symmetric_student_commutes_with_the_mirror_of_every_observation(encoder: EncoderName) -> None:
+    torch.manual_seed(0)
+    network = StudentNetwork(**architecture(encoder, symmetric=True))
+    history = torch.randn(40, 9, 4)
+    with torch.no_grad():
+        action, mirrored = network(history), network(mirror_tensor(OBSERVATION, history))
+    torch.testing.assert_close(mirrored, mirror_tensor(ACTION, action), rtol=0, atol=1e-5)
+    assert float((mirrored - action).abs().max()) > 1e-2, "the mirror does something"
+
+
+@pytest.mark.parametrize("encoder", list(ENCODERS))
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_every_encoder_sees_the_oldest_observation_and_any_length_of_history(
+    encoder: EncoderName, symmetric: bool
+) -> None:
+    torch.manual_seed(0)
+    for length in (1, 2, 9, 25):
+        network = StudentNetwork(**architecture(encoder, symmetric, length))
+        history = torch.randn(3, length, 4)
+        changed = history.clone()
+        changed[:, 0] += 5.0
+        assert network(history).shape == (3, 3)
+        assert not torch.allclose(network(history), network(changed))
+
+
+@pytest.mark.parametrize("encoder", list(ENCODERS))
+def test_a_student_is_read_back_whatever_its_encoder(encoder: EncoderName, tmp_path: Path) -> None:
+    about = architecture(encoder, symmetric=True)
+    network = StudentNetwork(**about)
+    save_network(network, about, tmp_path, "student", {})
+    again, _ = load_student(tmp_path)
+    history = torch.randn(5, 9, 4)
+    torch.testing.assert_close(again(history), network(history), rtol=0, atol=0)
+
+
+def loss(symmetry: Symmetry = "construction", **changes: Any) -> DistillationLoss:
+    torch.manual_seed(0)
+    settings = Distillation(latent=12).model_copy(update=changes)
+    network = StudentNetwork(**architecture("mlp", symmetry == "construction"))
+    return DistillationLoss(settings, torch.full((3,), math.log(0.3)), network, Sides(), symmetry)
+
+
+def test_at_a_shared_deviation_the_divergence_is_the_squared_error_over_twice_the_variance() -> None:
+    learnt = loss(std="shared", auxiliary=0.0)
+    histories, answers = torch.randn(6, 9, 4), torch.randn(6, 5)
+    with torch.no_grad():
+        error = ((learnt.network(histories) - answers[:, :3]) ** 2).sum(-1).mean()
+        found, figures = learnt(histories, answers)
+    assert math.isclose(float(found), float(error) / (2 * 0.3**2), rel_tol=1e-5)
+    assert figures == {"kl_at_shared_std": pytest.approx(float(found))}
+    assert not learnt.log_stds.requires_grad
+
+
+def test_a_learnt_deviation_comes_to_rest_at_that_of_the_error_and_the_teacher_together() -> None:
+    learnt = loss(auxiliary=0.0)
+    histories = torch.randn(64, 9, 4)
+    answers = torch.zeros(64, 5)
+    with torch.no_grad():
+        answers[:, :3] = learnt.network(histories)
+        answers[:, 2] += torch.where(torch.arange(64) % 2 == 0, 0.4, -0.4)
+    optimizer = torch.optim.Adam([learnt.log_stds], 0.05)
+    for _ in range(200):
+        optimizer.zero_grad()
+        learnt(histories, answers)[0].backward()
+        optimizer.step()
+    expected = torch.tensor([0.3, 0.3, math.hypot(0.3, 0.4)])
+    torch.testing.assert_close(learnt.log_std.exp().detach(), expected, rtol=1e-2, atol=0)
+    assert learnt.log_stds.shape == (2,), "the mirror swaps the first two actions"
+
+
+def test_the_deviation_keeps_above_its_floor() -> None:
+    learnt = loss(std_floor=0.2)
+    with torch.no_grad():
+        learnt.log_stds.fill_(-9.0)
+    assert float(learnt.log_std.exp().min().detach()) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
+def test_the_latent_learns_to_tell_what_depends_on_the_past(symmetry: Symmetry) -> None:
+    learnt = loss(symmetry, auxiliary=1.0)
+    optimizer = torch.optim.Adam(learnt.parameters(), 3e-3)
+    errors = []
+    for _ in range(250):
+        histories = torch.randn(128, 9, 4)
+        facts = torch.stack([histories[:, 0, 3], histories[:, 4, 0] - histories[:, 4, 1]], 1)
+        total, figures = learnt(histories, torch.cat([torch.zeros(128, 3), facts], 1))
+        optimizer.zero_grad()
+        total.backward()
+        optimizer.step()
+        errors.append(figures["auxiliary_error"])
+    assert np.mean(errors[-10:]) < 0.25 * np.mean(errors[:5])
+
+
+def test_the_reader_of_a_symmetric_latent_mirrors_what_it_tells() -> None:
+    learnt = loss()
+    histories = torch.randn(20, 9, 4)
+    with torch.no_grad():
+        told = learnt.reader(learnt.network.read(histories)[1])
+        mirrored = learnt.reader(learnt.network.read(mirror_tensor(OBSERVATION, histories))[1])
+    torch.testing.assert_close(mirrored, mirror_tensor(FACTS, told), rtol=0, atol=1e-5)
