@@ -37,6 +37,8 @@ PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
 LABEL_WIDTH = 11
 """Characters in a line under a bar."""
+SHIFT = 0.012
+"""Distance of the intervals of two variants at one mass, in parts of the range of masses."""
 HEADROOM = 0.15
 """Room above the highest point, in parts of its height."""
 FAILURE_SPACING = 0.035
@@ -59,8 +61,10 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
             rows = _rows(summary, suite, variant)
             colour, marker = style_of(variant, variants_of(summary))
             half = rows[f"{name}_half"].fillna(0.0)
+            beside = SHIFT * float(np.ptp(summary.loc[summary["suite"] == suite, "mass"]))
+            masses = rows["mass"] + beside * (variants_of(summary).index(variant) - (len(variants_of(summary)) - 1) / 2)
             axes.errorbar(
-                rows["mass"], rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
+                masses, rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
             )
             _paper_curve(axes, kind, variant, ERRORS.index(name), colour, marker)
             _mark_failures(axes, rows, variant, variants_of(summary))

@@ -15,7 +15,7 @@ class Kernel(Section):
 
 
 class Synchronisation(Section):
-    """r_sync: coupled motion consistency (eq. 7)."""
+    """r_sync: coupled motion consistency (eq. 8)."""
 
     support_reference: Kernel = Kernel(weight=1.0, width=0.8)
     """‖θ_S − θ_S_ref‖ [rad]."""

@@ -1,4 +1,4 @@
-"""r_sync: coupled motion consistency (eq. 7), and the tracking of the rest of the command.
+"""r_sync: coupled motion consistency (eq. 8), and the tracking of the rest of the command.
 
 Squared errors; progress, turning and roll count as they are, the others are scored by `kernel`.
 """
@@ -13,12 +13,12 @@ SLOW = 1e-6
 
 
 def support_reference(support_position: Array, support_reference: Array) -> Array:
-    """‖θ_S − θ_S_ref‖², (n,) [rad²]; joints (n, 15). The paper's first term of eq. 7."""
+    """‖θ_S − θ_S_ref‖², (n,) [rad²]; joints (n, 15). The paper's first term of eq. 8."""
     return squared_norm(support_position - support_reference)
 
 
 def system_velocity(velocity: Array, command: Array) -> Array:
-    """‖v_sys − v_coll‖² in the plane, (n,) [m²/s²]; (n, 2), heading frame. The paper's second term of eq. 7."""
+    """‖v_sys − v_coll‖² in the plane, (n,) [m²/s²]; (n, 2), heading frame. The paper's second term of eq. 8."""
     return squared_norm(velocity - command)
 
 
