@@ -88,7 +88,7 @@ def test_unknown_scenes_and_quantities_are_named_with_what_is_valid() -> None:
 def test_what_may_be_held_is_what_the_simulation_draws() -> None:
     robot = load_robot(robot_folder("g1"))
     simulation = Simulation(robot, SimulationRecipe(), envs=np.arange(1), seed=0, scenes=["lift"])
-    follows_from_others = {"slip_force", "rolling_resistance"}
+    follows_from_others = {"slip_force", "rolling_resistance", "grip_shift"}
     assert set(HOLDABLE) == set(simulation.drawn) - follows_from_others
 
 
