@@ -51,6 +51,7 @@ axial_vector = in_place(*AXIAL_SIGN)
 turn = in_place(-1.0)
 """An angle about the vertical, or a rate of it."""
 rotation = in_place(*QUATERNION_SIGN)
+roll_and_pitch = in_place(*AXIAL_SIGN[:2])
 
 
 def polar_vector_each_side(robot: Robot) -> MirrorMap:
@@ -69,6 +70,12 @@ def joint_mirror(robot: Robot) -> MirrorMap:
     """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints)."""
     permutation = np.array([robot.joints.index(_other_side(name)) for name in robot.joints])
     return MirrorMap(permutation, np.array([_sign(hinge.axis) for hinge in robot.tree.hinges()]))
+
+
+def joint_magnitude(robot: Robot) -> MirrorMap:
+    """Mirror of what joints have without a direction, as their torque limits, in MJCF order, shape (..., joints)."""
+    places = joint_mirror(robot).permutation
+    return MirrorMap(places, np.ones(len(places)))
 
 
 def support_mirror(robot: Robot) -> MirrorMap:

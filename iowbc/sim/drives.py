@@ -13,14 +13,15 @@ class Drives:
 
     def __init__(self, robot: Robot, physics: Physics, n: int) -> None:
         self._robot = robot
-        self._effort = np.tile(robot.effort, (n, 1))
+        self.effort = np.tile(robot.effort, (n, 1))
+        """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
         self._slope = 1.0 / ((1.0 - physics.torque_corner) * robot.velocity_limit)
         self._range = np.zeros((n, len(robot.joints), 2))
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
         """Strengths of new episodes."""
-        self._effort[which] = self._robot.effort * drawn["motor_strength"][which]
-        self._effort[which[:, None, None], self._robot.linkages] = drawn["linkage_effort"][which][..., None]
+        self.effort[which] = self._robot.effort * drawn["motor_strength"][which]
+        self.effort[which[:, None, None], self._robot.linkages] = drawn["linkage_effort"][which][..., None]
 
     def ranges(self, target: Array, state: SimulationState) -> Array:
         """Least and greatest torque of each motor over the period to come, (n, joints, 2) [N·m]; `target` (n, joints)
@@ -30,7 +31,7 @@ class Drives:
         speed; a motor that brakes gives all. The joints a, b of a linkage are moved by two motors together:
         |τ_a| + |τ_b| ≤ the linkage's limit, shared as the joint control asks for it.
         """
-        effort = self._effort.copy()
+        effort = self.effort.copy()
         self._share(effort, target, state)
         reserve = state.joint_velocity * self._slope
         ranges = self._range
@@ -52,4 +53,4 @@ class Drives:
 
     def arrays(self) -> dict[str, Array]:
         """What the drives remember, by name."""
-        return {"effort": self._effort}
+        return {"effort": self.effort}

@@ -125,6 +125,18 @@ class Simulation:
         return self._draws.values
 
     @property
+    def motor_effort(self) -> Array:
+        """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
+        return self._drives.effort
+
+    @property
+    def infeasible(self) -> NDArray[np.bool_]:
+        """Where a crate resists more than the friction between feet and ground can push against, (n,)."""
+        hold = self.drawn["ground_friction"] * self._robot_mass * GRAVITY
+        beyond: NDArray[np.bool_] = self.drawn["rolling_resistance"] > hold
+        return beyond
+
+    @property
     def disturbed(self) -> NDArray[np.bool_]:
         """Where an impulse or a push acts in this control period, (n,)."""
         acting: NDArray[np.bool_] = np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))

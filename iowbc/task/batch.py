@@ -21,7 +21,7 @@ from iowbc.task.motion import Motion
 from iowbc.task.observer import EVERY, Observer
 from iowbc.task.planned_pushes import PlannedPushes
 from iowbc.task.record.divergences import keep_divergences
-from iowbc.task.record.recorder import count_endings, count_step, write_signals, write_trial_signals
+from iowbc.task.record.recorder import count_endings, count_pushes, count_step, write_signals, write_trial_signals
 from iowbc.task.schedule import Schedule
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers
@@ -67,7 +67,7 @@ class Batch:
             control_frequency=task.control_frequency,
         )
         self._holding = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
-        pushing = np.array([getattr(recipe.simulation.scenes, name).kind == "push" for name in scenes])
+        self._pushing = pushing = np.array([getattr(recipe.simulation.scenes, name).kind == "push" for name in scenes])
         self.guidance = Guidance(
             specification,
             self.robot,
@@ -170,8 +170,10 @@ class Batch:
         key = self._schedule.start(which)
         joints, pitch = self.guidance.start(which, memory, key)
         memory.clear(which)
-        self.simulation.hold(self._schedule.scales(which))
+        self.simulation.hold(self._schedule.scales(which, key))
         self.simulation.reset(which, joints, base_pitch=pitch)
+        memory.infeasible[which] = self.simulation.infeasible[which]
+        count_pushes(self.buffers, self._pushing, memory, which)
         moved = self.judge.motion(self.simulation.state)
         memory.heading_reference[which] = moved.heading[which]
         memory.heading_offset[which] = (self.simulation.measured.heading[:, 0] - moved.heading)[which]
@@ -180,10 +182,7 @@ class Batch:
         memory.object_place[which] = away[which] * self._holding[which, None]
 
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
-        simulation = self.simulation
-        self.observer.write(
-            self.buffers["observation"], simulation.measured, simulation.drawn, moved, self.memory, which
-        )
+        self.observer.write(self.buffers["observation"], self.simulation, moved, self.memory, which)
 
     def __len__(self) -> int:
         return self.n

@@ -24,6 +24,8 @@ class Difficulty:
     turning: Array
     posture: Array
     load: Array
+    resistance: Array
+    blocked: Array
     disturbance: Array
 
 
@@ -43,6 +45,8 @@ class Course:
     """Part of the commanded displacement that was covered; 1 without any."""
     heading: Array
     """Mean heading error [rad]."""
+    infeasible: Mask
+    """Was to push what resists more than feet can hold against."""
     stepping: Mask
     """Was to walk at the end."""
     lagged: Mask
@@ -71,6 +75,8 @@ def difficulty(curriculum: Curriculum, played: Array) -> Difficulty:
         turning=_scaled(curriculum.turning, played[:, LOCOMOTION]),
         posture=_scaled(curriculum.posture, played[:, POSTURE]),
         load=_scaled(curriculum.load, played[:, LOAD]),
+        resistance=_scaled(curriculum.resistance, played[:, LOAD]),
+        blocked=_scaled(curriculum.blocked, played[:, LOAD]),
         disturbance=_scaled(curriculum.disturbance, played[:, DISTURBANCE]),
     )
 
@@ -104,7 +110,7 @@ def _success(curriculum: Curriculum, played: Array, course: Course) -> Mask:
     steady = course.survived & (course.posture >= curriculum.tracking)
     walked = course.walked >= curriculum.least_walk
     there = (course.covered >= curriculum.progress) & (course.heading <= curriculum.heading)
-    beyond = played[:, LOCOMOTION] > OWN_RANGES + ROUNDING
+    beyond = course.infeasible | (played[:, LOCOMOTION] > OWN_RANGES + ROUNDING)
     success = np.repeat(steady[:, None], len(AXES), axis=1)
     success[:, LOCOMOTION] = walked & course.survived & np.where(beyond, steady, there)
     return success
@@ -117,7 +123,8 @@ def _failure(curriculum: Curriculum, played: Array, course: Course) -> Mask:
     statue = course.survived & (course.walked >= curriculum.least_walk) & (course.covered < curriculum.lagging)
     failure = np.zeros(played.shape, np.bool_)
     failure[:, DISTURBANCE] = ended & pushed
-    failure[:, LOCOMOTION] = (ended & walking & ~pushed) | (statue & (played[:, LOCOMOTION] <= OWN_RANGES))
+    statue &= ~course.infeasible & (played[:, LOCOMOTION] <= OWN_RANGES)
+    failure[:, LOCOMOTION] = (ended & walking & ~pushed) | statue
     failure[:, POSTURE] = failure[:, LOAD] = ended & ~walking & ~pushed
     return failure
 

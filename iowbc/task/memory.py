@@ -45,6 +45,8 @@ class Memory:
     """Levels that the episode is played at, (n, axes)."""
     walking: Array
     """Whether the episode has commands to walk, (n,) bool."""
+    infeasible: Array
+    """Whether the episode's crate resists more than the feet can hold against, (n,) bool."""
     command: Array
     """C in force, rate-limited and clamped, (n, 11)."""
     goal: Array
@@ -98,6 +100,7 @@ class Memory:
             tracking=np.zeros((n, len(TRACKED))),
             stepping=np.zeros(n, np.bool_),
             walking=np.zeros(n, np.bool_),
+            infeasible=np.zeros(n, np.bool_),
             level=np.zeros((n, len(AXES))),
             played=np.zeros((n, len(AXES))),
             command=np.zeros((n, len(COMMAND))),

@@ -45,19 +45,22 @@ class Motion:
     """Force of partner and impulses on the object, (n, 3) [N]."""
     external_torque: Array
     """Their torque about the object's centre of mass, (n, 3) [N·m]."""
+    push_force: Array
+    """Force of pushes on the base, (n, 3) [N]."""
 
 
 def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") -> Motion:
     """The motion in a simulation state; `height`: what H speaks of."""
     rotation, base = state.base_rotation, state.base_position
-    vectors = np.empty((len(base), 9, 3))
+    vectors = np.empty((len(base), 10, 3))
     vectors[:, 0] = state.system_velocity
     vectors[:, 1] = state.base_linear_velocity
     np.subtract(state.foot_position, base[:, None], out=vectors[:, 2:4])
     vectors[:, 4:6] = state.foot_force
     np.subtract(state.object_position, base, out=vectors[:, 6])
     vectors[:, 6] *= state.has_object[:, None]
-    vectors[:, 7:] = state.external_force.reshape(-1, 2, 3)
+    vectors[:, 7:9] = state.external_force.reshape(-1, 2, 3)
+    vectors[:, 9] = state.push_force
     to_heading(rotation, vectors)
     return Motion(
         heading=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]),
@@ -74,6 +77,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
         object_offset=vectors[:, 6],
         external_force=vectors[:, 7],
         external_torque=vectors[:, 8],
+        push_force=vectors[:, 9],
     )
 
 

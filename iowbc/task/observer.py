@@ -1,16 +1,14 @@
 """Writes the rows of s_t and s_priv."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Indices, as_slice
+from iowbc.arrays import Indices, as_slice
 from iowbc.control import gait
 from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
-from iowbc.sim.state import MeasuredState
+from iowbc.sim.simulation import Simulation
 from iowbc.task.layout import FullLayout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
@@ -30,8 +28,7 @@ class Observer:
     def write(
         self,
         rows: NDArray[np.float32],
-        measured: MeasuredState,
-        drawn: Mapping[str, Array],
+        simulation: Simulation,
         moved: Motion,
         memory: Memory,
         which: Indices | slice = EVERY,
@@ -40,7 +37,7 @@ class Observer:
         self._joint_reference[:, self._support] = memory.support
         self._joint_reference[:, self._arms] = memory.arms
         sensed = Sensed(
-            measured=Measured.of(measured),
+            measured=Measured.of(simulation.measured),
             command=memory.command,
             heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],
             joint_reference=self._joint_reference,
@@ -52,5 +49,7 @@ class Observer:
         layout = self._layout
         seen = np.empty((len(moved.heading[which]), layout.size), np.float32)
         layout.state.gather(sensed, seen[:, layout.observation], which)
-        layout.extra.gather(Truth(moved, drawn), seen[:, layout.privileged], which)
+        layout.extra.gather(
+            Truth(moved, simulation.state, simulation.drawn, simulation.motor_effort), seen[:, layout.privileged], which
+        )
         rows[which] = seen

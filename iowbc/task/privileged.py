@@ -9,7 +9,16 @@ from dataclasses import dataclass
 from iowbc.arrays import Array
 from iowbc.control.layout import Layout, Part
 from iowbc.robot.description import Robot
-from iowbc.robot.mirror import axial_vector, polar_vector, polar_vector_each_side, scalar
+from iowbc.robot.mirror import (
+    axial_vector,
+    joint_magnitude,
+    joint_mirror,
+    polar_vector,
+    polar_vector_each_side,
+    roll_and_pitch,
+    scalar,
+)
+from iowbc.sim.state import SimulationState
 from iowbc.task.motion import Motion
 
 
@@ -18,8 +27,11 @@ class Truth:
     """What the simulation knows of n environments; what parts of s_priv are computed from."""
 
     motion: Motion
+    state: SimulationState
     drawn: Mapping[str, Array]
     """Drawn quantities by name, (n,) or (n, k)."""
+    motor_effort: Array
+    """What each motor or linkage can give in the episode, (n, joints) [N·m]."""
 
 
 def _drawn(name: str) -> Callable[[Truth], Array]:
@@ -28,6 +40,10 @@ def _drawn(name: str) -> Callable[[Truth], Array]:
 
 def _moving(name: str) -> Callable[[Truth], Array]:
     return lambda truth: getattr(truth.motion, name)
+
+
+def _state(name: str) -> Callable[[Truth], Array]:
+    return lambda truth: getattr(truth.state, name)
 
 
 PRIVILEGED: tuple[Part[Truth], ...] = (
@@ -43,6 +59,15 @@ PRIVILEGED: tuple[Part[Truth], ...] = (
     Part("foot_force", polar_vector_each_side, "N", "heading", _moving("foot_force")),
     Part("external_force", polar_vector, "N", "heading", _moving("external_force")),
     Part("external_torque", axial_vector, "N·m", "heading", _moving("external_torque")),
+    Part("push_force", polar_vector, "N", "heading", _moving("push_force")),
+    Part("link_object_force", scalar, "N", "-", _state("link_object_force")),
+    Part("hand_weight_share", scalar, "1", "-", _state("hand_weight_share")),
+    Part("rolling_resistance", scalar, "N", "-", _drawn("rolling_resistance")),
+    Part("motor_effort", joint_magnitude, "N·m", "joint", lambda truth: truth.motor_effort),
+    Part("encoder_bias", joint_mirror, "rad", "joint", _drawn("encoder_bias")),
+    Part("imu_tilt", roll_and_pitch, "rad", "base", _drawn("imu_tilt")),
+    Part("gyro_bias", axial_vector, "rad/s", "base", _drawn("gyro_bias")),
+    Part("sensor_latency", scalar, "control periods", "-", _drawn("sensor_latency")),
     Part("partner_share", scalar, "1", "-", _drawn("partner_share")),
     Part("action_latency", scalar, "control periods", "-", _drawn("action_latency")),
 )

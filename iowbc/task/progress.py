@@ -46,6 +46,7 @@ def course(memory: Memory, ending: Ending, period: float, blame: float) -> Cours
         walked=memory.walked * period,
         covered=np.where(moved, memory.covered / np.maximum(memory.commanded, LEAST), 1.0),
         heading=memory.heading_error / steps,
+        infeasible=memory.infeasible.copy(),
         stepping=memory.stepping.copy(),
         lagged=ending.lagging,
         disturbed=memory.undisturbed * period <= blame,

@@ -15,6 +15,9 @@ from iowbc.task.episodes import Episode, PlannedPush
 from iowbc.task.memory import Memory
 from iowbc.task.progress import course
 
+BLOCKING = 50.0
+"""Factor on the rolling resistance at which a crate does not roll."""
+
 
 class Schedule:
     """Random keys, time limits and levels of n environments."""
@@ -41,7 +44,7 @@ class Schedule:
         self.episode_key = self.key.copy()
         """Key of all that is random in each environment's episode, (n,)."""
         memory.level[:] = initial_levels(task.curriculum, n) if trials is None else task.curriculum.fixed_level
-        self._scales = {name: np.ones(n) for name in ("load_scale", "impulse_scale", "push_scale")}
+        self._scales = {name: np.ones(n) for name in ("load_scale", "resistance_scale", "impulse_scale", "push_scale")}
 
     @property
     def fixed(self) -> dict[str, Array]:
@@ -82,12 +85,14 @@ class Schedule:
         memory.played[which] = played_levels(self._task.curriculum, memory.level[which], ~standing)
         return key
 
-    def scales(self, which: Indices) -> dict[str, Array]:
+    def scales(self, which: Indices, key: Keys) -> dict[str, Array]:
         """How hard the simulation is to make new episodes, by name, (n,); trials say it themselves."""
         if self._trials is not None:
             return {}
         hardness = difficulty(self._task.curriculum, self._memory.played[which])
         self._scales["load_scale"][which] = hardness.load
+        blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness.blocked
+        self._scales["resistance_scale"][which] = np.where(blocked, BLOCKING, hardness.resistance)
         self._scales["impulse_scale"][which] = self._scales["push_scale"][which] = hardness.disturbance
         return self._scales
 

@@ -22,6 +22,7 @@ WELL = Course(
     walked=np.array([5.0]),
     covered=np.array([0.9]),
     heading=np.array([0.1]),
+    infeasible=NO,
     stepping=NO,
     lagged=NO,
     disturbed=NO,
@@ -102,6 +103,7 @@ def test_an_environment_that_falls_back_into_a_phase_keeps_what_it_had_reached()
 
 def test_what_may_be_infeasible_is_promoted_by_posture_and_survival_alone() -> None:
     stuck = replace(WELL, covered=np.zeros(1), heading=np.array([1.0]))
+    assert moved(replace(stuck, infeasible=YES))["locomotion"] == 0.1
     assert moved(stuck, dict.fromkeys(AXES, 1.5)) == dict.fromkeys(AXES, 0.1)
     assert moved(replace(stuck, posture=np.zeros(1)), dict.fromkeys(AXES, 1.5)) == dict.fromkeys(AXES, 0.0)
 
@@ -175,6 +177,8 @@ def test_the_levels_set_load_and_disturbances(make: Make) -> None:
     env.reset()
     drawn = env.drawn()
     assert drawn["load_scale"].tolist() == pytest.approx([0.15, 1.3])
+    assert drawn["resistance_scale"][0] == 0.5
+    assert drawn["resistance_scale"][1] in (3.0, 50.0)
     assert drawn["impulse_scale"].tolist() == pytest.approx([0.0, 1.5])
     assert drawn["push_scale"].tolist() == pytest.approx([0.0, 1.5])
 
@@ -187,3 +191,16 @@ def test_about_half_of_the_commands_ask_for_steps_from_the_first_episode_on(make
         env.step(actions(step, 48, 0.1))
         walking.append(env.signals["commanded_velocity"].any(axis=1).mean())
     assert 0.35 < np.mean(walking) < 0.6
+
+
+def test_at_the_highest_level_three_of_ten_pushes_and_more_cannot_be_made_and_the_share_is_told(make: Make) -> None:
+    env = make(num_envs=64, changes={f"task.scenes.{name}": float(name == "push") for name in ("free", "lift", "push")})
+    env.set_attr("level", 2.0)
+    for seed in range(4):
+        env.seed(seed)
+        env.reset()
+    share = env.statistics()["infeasible_pushes"]
+    assert 0.3 <= share < 0.7
+    env.set_attr("level", 1.0)
+    env.reset()
+    assert env.statistics()["infeasible_pushes"] < 0.02

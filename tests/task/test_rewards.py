@@ -58,6 +58,10 @@ def test_the_object_costs_nothing_where_none_is_held() -> None:
     assert equilibrium.vertical_velocity(rising, np.array([0.1, 0.1]), held) == pytest.approx([0.04, 0.0])
 
 
+def test_what_rests_on_other_links_than_the_hands_costs_by_its_force_within_bounds() -> None:
+    assert equilibrium.link_contact(np.array([0.0, 50.0, 5000.0])).tolist() == [0.0, 50.0, 200.0]
+
+
 def test_an_object_that_only_turns_about_the_vertical_is_level() -> None:
     turned = np.array([[np.cos(0.4), 0.0, 0.0, np.sin(0.4)]])
     assert equilibrium.orientation(turned, np.array([True]))[0] == pytest.approx(0.0)

@@ -100,6 +100,7 @@ def test_statistics_are_complete_and_finite_from_the_first_call(make: Make) -> N
     env = make()
     env.reset()
     expected = {"reward", "episode_seconds", "episode_return", "curriculum_level", "tracking", "divergences"}
+    expected |= {"infeasible_pushes"}
     expected |= {f"reward/{term}" for term in TERMS} | {f"terminations/{name}" for name in REASONS}
     expected |= {f"falls/{cause}" for cause in CAUSES} | {f"level/{axis}" for axis in AXES}
     expected |= {f"error/{s}/{kind}/{e}" for s in ("free", "lift") for kind in KINDS for e in ERRORS}

@@ -54,6 +54,11 @@ class Curriculum(Section):
     load: Scale = Scale(start=0.15, full=1.0, extreme=1.3)
     """Upper end of the range of masses, as a part of the scene's own; the lower end stays. At 1.3 the box weighs up to
     13.5 kg, and shoulders hold 12 to 16."""
+    resistance: Scale = Scale(start=0.5, full=1.0, extreme=3.0)
+    """Factor on a crate's rolling resistance, by the level of load: at 3 it is near what feet can push against."""
+    blocked: Scale = Scale(start=0.0, full=0.0, extreme=0.25)
+    """Part of the pushes whose crate does not roll at all, by the level of load. Together with `resistance` more than
+    30 % of the pushes at level 2 are infeasible: they teach to stay upright against what does not yield."""
     disturbance: Scale = Scale(start=0.0, full=1.0, extreme=1.5)
     """Factor on impulses and pushes."""
     balance: Ceilings = Ceilings(posture=1.0, locomotion=0.5, load=1.0, disturbance=0.3)

@@ -50,6 +50,9 @@ class ObjectEquilibrium(Section):
     """Weight of the squared distance of the object from its place in the grasp, heading frame [m²]."""
     orientation: float = -0.5
     """Weight of the squared tilt of the object against gravity, sin² of the angle."""
+    link_contact: float = -0.01
+    """Weight of the force of links other than the hands on the object [N]: 50 N of a box that rests in the lap cost as
+    much as being alive brings. What thighs and torso carry is not carried."""
     vertical_velocity: float = -0.5
     """Weight of the squared vertical velocity beyond the one that a commanded change of height asks for [m²/s²]."""
 

@@ -63,6 +63,7 @@ ERRORS = ("velocity", "heading", "height", "pitch")
 COUNTERS = (
     *("steps", "tracking", "episodes", "length", "return", *REASONS),
     *(f"fell/{cause}" for cause in CAUSES),
+    *("pushes", "infeasible"),
     *(f"{kind}/{name}" for kind in KINDS for name in ("steps", *ERRORS)),
 )
 """Columns of the statistics: sums since they were last read. Length in steps, errors absolute."""

@@ -52,6 +52,7 @@ class Statistics:
             "tracking": total["tracking"] / max(total["steps"], 1.0),
             "curriculum_level": float(levels.mean()),
             **dict(zip((f"level/{axis}" for axis in AXES), levels.mean(axis=0).tolist(), strict=True)),
+            "infeasible_pushes": total["infeasible"] / max(total["pushes"], 1.0),
             "divergences": total["diverged"],
             **{f"reward/{path}": value for path, value in rewards.items()},
         }

@@ -1,9 +1,12 @@
-"""r_obj: equilibrium of the held object; every term is zero where nothing is held."""
+"""r_obj: equilibrium of the held object; terms are zero where nothing is held."""
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.task.rewards.kernel import squared_norm
+
+LAP = 200.0
+"""A box of 20 kg in the lap [N]; blows beyond say no more."""
 
 
 def position(object_offset: Array, place: Array, held: Mask) -> Array:
@@ -17,6 +20,12 @@ def orientation(object_quaternion: Array, held: Mask) -> Array:
     up = 1.0 - 2.0 * (x * x + y * y)
     tilt: Array = (1.0 - np.square(up)) * held
     return tilt
+
+
+def link_contact(force: Array) -> Array:
+    """Force of links other than the hands on the object, no more than `LAP`, (n,) [N]."""
+    bounded: Array = np.minimum(force, LAP)
+    return bounded
 
 
 def vertical_velocity(object_velocity: Array, commanded: Array, held: Mask) -> Array:
