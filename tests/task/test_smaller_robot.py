@@ -22,7 +22,7 @@ def test_a_robot_of_23_joints_is_stepped_and_mirrored(make: Callable[..., Vector
     rows, random = env.reset(), np.random.default_rng(0)
     assert env.action_space.shape == (13,)
     assert rows.shape == (4, env.layout.size)
-    assert env.layout.state.slices["joint_position"] == slice(17, 40)
+    assert env.layout.state.slices["joint_position"] == slice(18, 41)
     for _ in range(STEPS):
         rows, reward, _, _ = env.step(0.2 * random.normal(size=(4, 13)).astype(np.float32))
         assert np.isfinite(rows).all()
