@@ -9,10 +9,10 @@ from iowbc.recipe.simulation.simulation import Simulation as Recipe
 COUNT = 64
 
 
-def test_draws_cover_the_ranges_of_table_one(start):
+def test_draws_cover_the_ranges_of_table_one_and_light_loads(start):
     simulation = start(Recipe(), ["push"] * COUNT)
     for name, low, high in (
-        ("object_mass_scale", 0.5, 1.5),
+        ("object_mass_scale", 0.07, 1.5),
         ("ground_friction", 0.5, 1.2),
         ("object_ground_friction", 0.02, 0.15),
         ("surface_friction", 1.0, 1.5),
@@ -43,7 +43,7 @@ def test_held_quantities_are_not_drawn_and_nan_draws(start):
     simulation = start(Recipe(), ["lift"] * 3, object_mass=masses, partner_share=0.0)
     drawn = simulation.drawn["object_mass"]
     assert drawn[0] == 2.0
-    assert 3.5 <= drawn[1] <= 10.5
+    assert 0.07 * 7.0 <= drawn[1] <= 10.5
     assert drawn[2] == Recipe().scenes.lift.object.smallest_mass
     assert np.all(simulation.drawn["partner_share"] == 0.0)
 
@@ -51,8 +51,8 @@ def test_held_quantities_are_not_drawn_and_nan_draws(start):
 def test_load_scale_lowers_the_upper_end_of_the_mass_range(start):
     simulation = start(Recipe(), ["lift"] * COUNT, load_scale=0.25)
     mass = simulation.drawn["object_mass"] / 7.0
-    assert mass.min() >= 0.5
-    assert 0.7 < mass.max() <= 0.75
+    assert mass.min() >= 0.07
+    assert 0.40 < mass.max() <= 0.07 + 0.25 * (1.5 - 0.07)
 
 
 def test_holding_an_unknown_quantity_names_the_known_ones(start):
