@@ -77,8 +77,10 @@ def run(job: Job) -> None:
     training.model.save(job.out / "teacher_sb3.zip")
     if (job.work / "divergences").is_dir():
         (job.work / "divergences").rename(job.out / "divergences")
-    terms = sorted({name for row in curves.rows for name in row if name.startswith("reward/")})
-    job.summarize(curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms))
+    terms = sorted({name for row in curves.rows for name in row if name.startswith(("level/", "falls/", "reward/"))})
+    figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
+    kept = {"best_score": training.best.score} if settings.check.every is not None else {}
+    job.summarize(kept | figures)
 
 
 def _check(world: "Specification", workers: int) -> "QuickEvaluation":

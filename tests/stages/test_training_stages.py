@@ -5,12 +5,18 @@ import json
 from pathlib import Path
 
 import pytest
+import torch
 from safetensors.numpy import load_file
 from stage_jobs import make_job
 from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
+from iowbc.control.action import action_mirror
 from iowbc.learning.acting import load_policy
+from iowbc.learning.storage import load_student, load_teacher
+from iowbc.learning.symmetry import mirror_tensor
+from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import distill, teacher
+from iowbc.task.layout import full_layout
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +78,20 @@ def test_both_stages_leave_a_policy_its_layout_and_its_curves(trained: Path) -> 
     curriculum = json.loads((trained / "teacher" / "out" / "teacher.json").read_text())["curriculum"]
     assert sum(map(len, curriculum["levels"].values())) == ENVIRONMENTS
     assert (trained / "teacher" / "out" / "teacher_sb3.zip").is_file()
+
+
+def test_both_trained_networks_obey_the_mirror_of_the_robot(trained: Path) -> None:
+    robot = load_robot(robot_folder("g1"))
+    layout = full_layout(small_recipe(), robot)
+    teacher_network, _ = load_teacher(trained / "teacher" / "out")
+    student_network, about = load_student(trained / "distill" / "out")
+    torch.manual_seed(0)
+    rows = 2.0 * torch.randn(40, layout.size)
+    histories = 2.0 * torch.randn(40, about["architecture"]["history"], layout.state.size)
+    for network, mirror, given in (
+        (teacher_network, layout.mirror, rows),
+        (student_network, layout.state.mirror, histories),
+    ):
+        action = network(given)
+        mirrored = network(mirror_tensor(mirror, given))
+        torch.testing.assert_close(mirrored, mirror_tensor(action_mirror(robot), action), rtol=0, atol=1e-5)
