@@ -16,6 +16,7 @@ from iowbc.evaluation.report.figures import comparison, errors_against_mass, rob
 from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
 from iowbc.evaluation.report.report import write_report
 from iowbc.evaluation.report.tables import latex, markdown
+from iowbc.evaluation.trials.errors import ERRORS
 
 
 def test_errors_are_means_over_the_survivors_alone() -> None:
@@ -132,6 +133,15 @@ def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_pat
         "tables/summary.csv",
         *(f"figures/{name}.png" for name in ("lifting_errors", "pushing_errors", "comparison", "robustness")),
     }
+
+
+def test_there_is_no_table_of_walking_where_nobody_was_to_walk(tmp_path: Path) -> None:
+    standing = trials_of("IO-WBC", "lifting", {4.0: 5}).assign(
+        **{name: np.nan for part in ("", "still_") for name in (f"{part}{error}_moving" for error in ERRORS)}
+    )
+    write_report(standing, tmp_path, 0.8)
+    assert "lifting_moving.md" not in {path.name for path in tmp_path.rglob("*.md")}
+    assert "Fails" not in markdown(error_table(aggregate(standing), "lifting"))
 
 
 def test_every_error_table_says_what_standing_still_scores() -> None:

@@ -41,9 +41,11 @@ def write_report(
 def report_tables(
     trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str]
 ) -> list[Table]:
-    """All tables that the trials give."""
+    """All tables that the trials give; of walking and of joints only where somebody was to walk, or survived."""
     swept, kinds = suites_of(summary, "lifting", "pushing"), set(summary["kind"])
-    tables = [make for suite in swept for make in (error_table(summary, suite, labels), moving_table(summary, suite))]
+    walked = set(summary.loc[summary["still_E_v_moving"].notna(), "suite"])
+    tables = [error_table(summary, suite, labels) for suite in swept]
+    tables += [moving_table(summary, suite) for suite in swept if suite in walked]
     tables += [error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")]
     if "heavy" in kinds:
         tables += [success_table(summary, labels), error_table(summary, "heavy", name="heavy_errors")]
@@ -51,6 +53,7 @@ def report_tables(
         tables.append(capacity_table(summary, capacity_rate))
     if "pushes" in kinds:
         tables.append(push_table(summary, capacity_rate))
-    tables.append(joint_table(summary))
+    if (summary["survived"] > 0).any():
+        tables.append(joint_table(summary))
     differences = difference_table(trials)
     return tables if differences is None else [*tables, differences]
