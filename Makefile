@@ -1,11 +1,12 @@
 # make test   sets everything up, then lint, types and tests
 # make run    sets everything up, then the quickstart recipe
+# make measure   makes the tables of the README anew
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup test lint types run image clean
+.PHONY: setup test lint types run measure image clean
 
 setup: $(READY)
 
@@ -28,6 +29,13 @@ test: lint types
 
 run: setup
 	$(BIN)/iowbc run recipes/quickstart.yaml
+
+measure: run
+	$(BIN)/iowbc show quickstart
+	$(BIN)/iowbc run recipes/full.yaml --until rg-fit
+	$(BIN)/iowbc bench rg
+	$(BIN)/iowbc bench sim
+	$(BIN)/iowbc bench train
 
 image:
 	docker build --tag iowbc .

@@ -149,6 +149,18 @@ def test_the_number_of_workers_changes_nothing(done: Job, recipe: Recipe, studen
     pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
 
 
+def test_a_damaged_batch_is_played_again(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
+    for batch in done.work.glob("*.batch"):
+        (tmp_path / batch.name).write_bytes(batch.read_bytes())
+    damaged = tmp_path / "trials-0-0.batch"
+    content = bytearray(damaged.read_bytes())
+    content[len(content) // 2] ^= 1
+    damaged.write_bytes(content)
+    protocol = Protocol(Specification(recipe, done.robot), load_policy(student), work=tmp_path, workers=0)
+    pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
+    assert damaged.with_name("trials-0-0.batch.damaged").is_file()
+
+
 def test_a_sweep_goes_on_after_its_last_finished_mass(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
     stopping = job(recipe, student, tmp_path)
     finished = "trials-0-0.batch"
