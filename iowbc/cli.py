@@ -121,6 +121,17 @@ def _request(
 
 
 @app.command()
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder to make or to fill.", metavar="DIR")],
+    robot: Annotated[str, typer.Option(help="Robot whose description is copied.")] = "g1",
+) -> None:
+    """Copy the recipes and a robot's description into a folder to begin from."""
+    from iowbc.commands.init import begin
+
+    begin(folder, robot, _console())
+
+
+@app.command()
 def status(runs: RunsFolder = None) -> None:
     """Show what runs, what was left unfinished, and what each recipe has."""
     from iowbc.commands.status import print_status

@@ -13,6 +13,7 @@ from iowbc.commands.results import shown_path
 from iowbc.errors import UsageError, nearest
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import ever_used
+from iowbc.pipeline.store.links import remove_dangling
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
@@ -62,6 +63,8 @@ def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None
         if not dry_run:
             _remove(path)
         console.print(f"{verb} {shown_path(path)} ({size(count)})", markup=False, highlight=False, soft_wrap=True)
+    if not dry_run:
+        remove_dangling(store.runs)
     console.print(f"{size(total)} in all", highlight=False)
 
 

@@ -10,6 +10,9 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.finding import SUFFIXES
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.recipe import PIPELINE
 
 SHORTEST_PREFIX = 4
 """Characters of a key that are enough to name an artifact, where they are unique."""
@@ -28,12 +31,13 @@ class Named:
 
 def named(store: Store, word: str) -> Named:
     """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
-    recipes = known_recipes(store)
-    if Path(word).suffix in (".yaml", ".yml"):
-        return _recipe(store, word, Path(word).stem.lower(), recipes)
+    recipes = [*known_recipes(store), *_published(store)]
+    if Path(word).suffix in SUFFIXES:
+        return _recipe(store, word, _name_in(Path(word)), recipes)
     if word in recipes:
         return _recipe(store, word, word, recipes)
     name, slash, stage = word.rpartition("/")
+    name = _name_in(Path(name)) if Path(name).suffix in SUFFIXES else name
     if slash and name in recipes:
         found = _recipe(store, word, name, recipes)
         if stage not in found.artifacts:
@@ -73,7 +77,25 @@ def _recipe(store: Store, word: str, name: str, recipes: list[str]) -> Named:
     if name not in recipes:
         listing = ", ".join(recipes) or "none"
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
-    return Named(word, last_used(store, name), recall(store.runs, name)["recipe"])
+    if name in known_recipes(store):
+        return Named(word, last_used(store, name), recall(store.runs, name)["recipe"])
+    artifacts = _published(store)[name]
+    return Named(word, artifacts, list(artifacts.values())[-1].recipe)
+
+
+def _name_in(file: Path) -> str:
+    """The name that a recipe file gives, else that of the file."""
+    return load_recipe(file).recipe.name if file.is_file() else file.stem.lower()
+
+
+def _published(store: Store) -> dict[str, dict[str, Artifact]]:
+    """By the recipe that made them, and by stage: the artifacts that came with the repository."""
+    found: dict[str, dict[str, Artifact]] = {}
+    for stage in PIPELINE:
+        for artifact in store.artifacts(stage):
+            if artifact.published:
+                found.setdefault(artifact.manifest.recipe, {})[stage] = artifact
+    return found
 
 
 def _by_key(store: Store, prefix: str) -> Artifact:

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import os
 from pathlib import Path
 from typing import Literal, Self
 
@@ -136,6 +137,13 @@ def seal(contract: Contract, folder: Path) -> Contract:
     sealed = contract.model_copy(update={"files": {str(path.relative_to(folder)): digest(path) for path in files}})
     (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
     return sealed
+
+
+def exported_folder(word: Path | str) -> Path:
+    """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`."""
+    folder = Path(word)
+    named = Path(os.environ.get("IOWBC_RUNS") or "runs") / word / "export"
+    return named if not (folder / CONTRACT).is_file() and (named / CONTRACT).is_file() else folder
 
 
 def read_contract(folder: Path | str) -> Contract:

@@ -19,7 +19,7 @@ from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, read_contract
+from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, exported_folder, read_contract
 from iowbc.deploy.guard import TargetGuard
 from iowbc.deploy.session import Values, open_session, run
 from iowbc.errors import ContractBroken
@@ -125,8 +125,11 @@ class Controller:
 
     @classmethod
     def load(cls, folder: Path | str, robots: int = 1) -> Self:
-        """The controller in an exported folder. Raises ContractBroken where it is not what its contract says."""
-        folder = Path(folder)
+        """The controller in an exported folder, or the one that a recipe exported here, by the recipe's name.
+
+        Raises ContractBroken where it is not what its contract says.
+        """
+        folder = exported_folder(folder)
         contract = read_contract(folder)
         robot = load_robot(folder / ROBOT)
         if robot.joints != contract.joints:

@@ -57,7 +57,7 @@ class Runner:
                 if self.interrupted():
                     raise Interrupted
                 self.artifacts[stage.name] = self._artifact(stage)
-                remember(self.store.runs, self.loaded, stage.name, self.artifacts[stage.name].manifest.key)
+                remember(self.store.runs, self.loaded, self.artifacts[stage.name])
         finally:
             self.display.end()
         return self.artifacts
@@ -70,6 +70,7 @@ class Runner:
         view = self.views[stage.name]
         step = self._decide(stage, whole)
         if step.cached and step.artifact is not None:
+            self._clear(step.artifact)
             return self._reused(step, step.artifact, view)
         for read in self.planner.stages:
             if read.name in self.planner.reads(stage) and not self.artifacts[read.name].whole:
@@ -96,6 +97,14 @@ class Runner:
                 aside = self.store.set_aside(stage.name, step.key)
                 self.display.say(f"{stage.name}: its artifact is damaged ({step.damage}); set aside in {aside}")
             return self._made(step, workspace, view)
+
+    def _clear(self, artifact: Artifact) -> None:
+        """Remove what a process left that died after it had put this artifact into the store."""
+        workspace = Workspace(self.store.runs, artifact.manifest.stage, artifact.manifest.key)
+        if workspace.leftover:
+            with key_lock(self.store.runs, artifact.manifest.key, lambda holder: None, lambda: True) as held:
+                if held and workspace.leftover:
+                    workspace.remove()
 
     def _decide(self, stage: Stage, whole: bool) -> Step:
         inputs = {name: self.artifacts[name] for name in self.planner.reads(stage)}

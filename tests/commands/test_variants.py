@@ -19,7 +19,7 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert "2 stages would run" in planned  # eval for its trials, export for its name
     done = command("run", "both.yaml")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count(": runs") == 2
+    assert done.stdout.count(": runs - ") == 2
     assert "| teacher | count | 3 | 3 |" in (folder / "runs" / "compare" / "both" / "metrics.md").read_text()
     assert command("run", "both.yaml").stdout.count(": cached") == 12
 

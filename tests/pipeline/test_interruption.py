@@ -115,3 +115,13 @@ def test_what_is_forced_stays_forced_until_it_is_finished(workplace: Workplace) 
     reached = workplace.checkpoint("teacher")
     assert workplace.command("run", "small.yaml", "--force", "teacher").code == 0
     assert started_at(workplace, "teacher") == reached
+
+
+def test_a_death_between_storing_and_clearing_up_leaves_nothing_unfinished(workplace: Workplace) -> None:
+    made = workplace.run()["teacher"].manifest
+    work = workplace.store.runs.work / made.key
+    (work / "scratch").mkdir(parents=True)
+    (work / "progress.json").write_text(json.dumps({"stage": "teacher", "updated": 1.0, "attempts": 1}))
+    assert "stopped" not in workplace.command("status").output
+    assert workplace.command("run", "small.yaml").code == 0
+    assert not work.exists()

@@ -9,15 +9,17 @@ from typing import Any
 from iowbc.errors import UsageError
 from iowbc.files import write_whole
 from iowbc.pipeline.store.artifact import RECIPE, Artifact
+from iowbc.pipeline.store.links import link
 from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.recipe.reading.loading import LoadedRecipe
 
 
-def remember(runs: Runs, loaded: LoadedRecipe, stage: str, key: str) -> None:
+def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
     """Record that a recipe's stage uses this artifact.
 
     What a recipe has without overrides is what its name stands for: a run with some only adds to what was ever used.
     """
+    stage, key = artifact.manifest.stage, artifact.manifest.key
     path = record_path(runs, loaded.recipe.name)
     record = _record(path) or {"stages": {}}
     if not loaded.overrides or record.get("overrides", True):
@@ -25,6 +27,7 @@ def remember(runs: Runs, loaded: LoadedRecipe, stage: str, key: str) -> None:
         record["overrides"] = list(loaded.overrides)
         record["recipe"] = loaded.recipe.model_dump(mode="json")
         record["stages"][stage] = {"key": key, "time": time.time()}
+        link(runs, loaded.recipe.name, stage, artifact.folder)
     record.setdefault("ever", {})[key] = time.time()
     write_whole(path, json.dumps(record, indent=1))
 

@@ -48,6 +48,21 @@ class Runs:
         return self.root / "tracking"
 
     @property
+    def parts(self) -> tuple[Path, ...]:
+        """All of these folders."""
+        return (
+            self.store,
+            self.published,
+            self.work,
+            self.damaged,
+            self.locks,
+            self.recipes,
+            self.tracking,
+            self.tracked_files,
+            self.root / "compare",
+        )
+
+    @property
     def database(self) -> Path:
         """MLflow's embedded database."""
         return self.root / "mlflow.db"

@@ -86,6 +86,11 @@ class Workspace:
         self._state.update(seconds=self.seconds, updated=time.time())
         write_whole(self.root / PROGRESS, json.dumps(self._state))
 
+    @property
+    def leftover(self) -> bool:
+        """Whether the output has gone to the store and the rest stayed."""
+        return self.root.is_dir() and not self.out.is_dir()
+
     def remove(self) -> None:
         """Remove scratch, checkpoints and leftovers."""
         shutil.rmtree(self.root, ignore_errors=True)
@@ -100,7 +105,12 @@ def _record(root: Path) -> dict[str, Any]:
     return found if numbers and isinstance(found.get("code", {}), dict) else {}
 
 
+def _finished(runs: Runs, root: Path) -> bool:
+    """Whether the output of a work folder is in the store already."""
+    return not (root / "out").is_dir() and any(runs.store.glob(f"*/{root.name}"))
+
+
 def unfinished(runs: Runs) -> list[tuple[Path, dict[str, Any]]]:
     """Work folders and their records, newest first."""
-    found = [(path, _record(path)) for path in runs.work.glob("*") if path.is_dir()]
+    found = [(path, _record(path)) for path in runs.work.glob("*") if path.is_dir() and not _finished(runs, path)]
     return sorted(found, key=lambda item: -float(item[1].get("updated", 0.0)))

@@ -1,0 +1,78 @@
+"""One name means the same in every command and from Python."""
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from iowbc import open_artifact
+from iowbc.deploy.contract import exported_folder
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+Key = Callable[[str, str], str]
+
+
+@pytest.mark.parametrize("word", ["first", "first.yaml"])
+def test_a_recipe_and_its_stages_are_named_alike_everywhere(folder: Path, command: Command, word: str) -> None:
+    (folder / "recipes").mkdir()
+    shutil.copy(folder / "first.yaml", folder / "recipes" / "first.yaml")
+    assert "all stages are cached" in command("plan", word).stdout
+    assert "teacher" in command("show", word).stdout
+    assert "attempt" in command("show", f"{word}/teacher").stdout
+    assert command("diff", word, "first").stdout == "no difference\n"
+
+
+def test_a_file_means_the_recipe_that_it_names(folder: Path, command: Command) -> None:
+    (folder / "another.yaml").write_text("extends: first.yaml\nname: first\n")
+    assert "teacher" in command("show", "another.yaml").stdout
+
+
+def test_links_lead_by_name_to_what_a_recipe_has(folder: Path, command: Command, key: Key) -> None:
+    link = folder / "runs" / "first" / "teacher"
+    assert link.resolve().name == key("first", "teacher")
+    assert command("run", "first.yaml", "--set", "seed=4").returncode == 0
+    assert link.resolve().name == key("first", "teacher")
+    assert command("gc", "--recipe", "second").returncode == 0
+    assert not (folder / "runs" / "second" / "teacher").is_symlink()
+    assert all(path.exists() for path in (folder / "runs" / "second").glob("*"))
+
+
+def test_a_recipe_that_is_named_like_a_part_of_runs_has_no_links(folder: Path, command: Command) -> None:
+    (folder / "store.yaml").write_text("extends: first.yaml\n")
+    assert command("run", "store.yaml").returncode == 0
+    assert {path.name for path in (folder / "runs" / "store").iterdir()} >= {"teacher", "export"}
+    assert not any(path.is_symlink() for path in (folder / "runs" / "store").iterdir())
+
+
+def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(folder: Path, command: Command) -> None:
+    assert command("publish", "first.yaml").returncode == 0
+    for name in ("store", "recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+    assert "teacher" in command("show", "first").stdout
+    assert open_artifact("first/export", folder / "runs").published
+
+
+def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    export = tmp_path / "runs" / "mine" / "export"
+    export.mkdir(parents=True)
+    (export / "contract.json").write_text(json.dumps({}))
+    monkeypatch.chdir(tmp_path)
+    assert exported_folder("mine") == Path("runs/mine/export")
+    assert exported_folder("nothing") == Path("nothing")
+    monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
+    monkeypatch.chdir("/")
+    assert exported_folder("mine") == export
+
+
+def test_init_copies_recipes_and_a_robot_and_replaces_nothing(folder: Path, command: Command) -> None:
+    done = command("init", "mine")
+    assert done.returncode == 0, done.stderr
+    assert (folder / "mine" / "recipes" / "quickstart.yaml").is_file()
+    assert (folder / "mine" / "robots" / "g1" / "robot.yaml").is_file()
+    again = command("init", "mine")
+    assert again.returncode == 2
+    assert "there already" in again.stderr
+    assert "no robot 'r2d2'" in command("init", "other", "--robot", "r2d2").stderr
