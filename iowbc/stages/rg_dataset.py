@@ -121,6 +121,6 @@ STAGE = Stage(
     ),
     reads=lambda recipe: (),
     run=run,
-    results=("dataset.npz", "feasible.npz"),
+    results=("dataset.npz", LABELLED),
     packages=("reference", "control", "robot"),
 )

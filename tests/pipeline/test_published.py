@@ -73,6 +73,19 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     assert workplace.ran() == ["rg-fit", "teacher"]
 
 
+def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(publishing, "KINDS", (".json",))
+    for artifact in workplace.run().values():
+        assert publishing.publish(workplace.store.runs, artifact).manifest.omitted == (
+            "figures/curve.png",
+            "tables/counts.md",
+        )
+    shutil.rmtree(workplace.store.runs.store)
+    workplace.ran()
+    workplace.run("eval.trials=9")
+    assert workplace.ran() == ["eval"]
+
+
 def test_publishing_copies_verifies_and_refuses_what_has_not_run(workplace: Workplace) -> None:
     refused = workplace.command("publish", "small.yaml")
     assert refused.code == 2

@@ -1,5 +1,6 @@
 """Artifacts are published whole or not at all, and damage is noticed."""
 
+import dataclasses
 import json
 import shutil
 from collections.abc import Callable
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 from workplace import Workplace
 
-from iowbc.errors import Damaged, Interrupted
+from iowbc.errors import Damaged, Interrupted, PipelineFailed
 from iowbc.pipeline.store.artifact import MANIFEST
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
@@ -72,6 +73,14 @@ def test_records_decide_no_later_key(workplace: Workplace, monkeypatch: pytest.M
     assert workplace.ran() == ["teacher"]
     assert after.files["summary.json"] != before.files["summary.json"]
     assert after.digest == before.digest
+
+
+def test_a_declared_result_that_is_missing_is_a_mistake_of_the_stage(workplace: Workplace) -> None:
+    declared = dataclasses.replace(workplace.registry["teacher"], results=("result.json", "weights.safetensors"))
+    workplace.registry["teacher"] = declared
+    with pytest.raises(PipelineFailed, match=r"none of the results that the stage declares: weights\.safetensors"):
+        workplace.run(until="teacher")
+    assert workplace.store.artifacts("teacher") == []
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "key.json", "recipe.yaml"])

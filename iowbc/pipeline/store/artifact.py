@@ -86,8 +86,8 @@ class Artifact:
 
     @property
     def whole(self) -> bool:
-        """Whether all that the stage left is there: of a published one, what is large may be missing."""
-        return not self.manifest.omitted
+        """Whether all results are there; of a published one, what is large may be missing."""
+        return not set(self.manifest.omitted) & set(self.manifest.results)
 
     @property
     def ingredients(self) -> dict[str, Any]:
@@ -146,14 +146,17 @@ def seal(
 ) -> None:
     """Turn a stage's output into an artifact: records beside it, everything on disk, the manifest last.
 
-    results: patterns of the files that decide later stages. details: the fields of `Manifest` that do not follow from
-    the files.
+    results: patterns of the files that decide later stages; each must fit one. details: the fields of `Manifest` that
+    do not follow from the files.
     """
     files = {
         path.relative_to(out).as_posix(): _record(path)
         for path in sorted(out.rglob("*"))
         if path.is_file() and path.relative_to(out).as_posix() not in (MANIFEST, *BESIDE)
     }
+    lacking = [pattern for pattern in results if not any(fnmatchcase(name, pattern) for name in files)]
+    if lacking:
+        raise ValueError(f"{out} has none of the results that the stage declares: {', '.join(lacking)}")
     deciding = tuple(name for name in files if any(fnmatchcase(name, pattern) for pattern in results))
     write_whole(out / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
     write_whole(out / RECIPE, recipe)
