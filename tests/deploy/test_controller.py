@@ -54,10 +54,10 @@ def test_a_step_gives_targets_for_every_joint_with_gains(exported: Path, robot: 
 def test_the_readme_shows_a_step_that_works(exported: Path, robot: Robot) -> None:
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
     (snippet,) = [block for block in blocks if "Controller.load" in block]
-    place = "runs/store/export/<key>"
+    place = 'Controller.load("quickstart")'
     assert place in snippet
     names: dict[str, Any] = {}
-    exec(snippet.replace(place, str(exported)), names)
+    exec(snippet.replace(place, f"Controller.load({str(exported)!r})"), names)
     assert names["command"].shape == (11,)
     assert names["targets"].position.shape == (1, 29)
     assert np.array_equal(names["targets"].position, Controller.load(exported).step(measured(robot), NOMINAL).position)
