@@ -48,10 +48,14 @@ def moving(given: Array, settings: GaitPrior) -> Mask:
     return gait.wants_to_move(given, settings)
 
 
+def start_heading(trace: Trace) -> float:
+    """Heading reference before the first step [rad]; the trace begins after it."""
+    return float(trace.heading_reference[0] - trace.commanded_velocity[0, YAW_RATE] * trace.dt)
+
+
 def given_heading(trace: Trace, given: Array) -> Array:
     """The heading that the given yaw rates lead to, (T,) [rad]."""
-    start = trace.heading_reference[0] - trace.commanded_velocity[0, YAW_RATE] * trace.dt
-    heading: Array = start + trace.dt * np.cumsum(given[:, YAW_RATE])
+    heading: Array = start_heading(trace) + trace.dt * np.cumsum(given[:, YAW_RATE])
     return heading
 
 

@@ -11,6 +11,7 @@ from iowbc.evaluation.trials.errors import (
     deviations_standing_still,
     given_commands,
     moving,
+    start_heading,
     velocity_deviation,
 )
 from iowbc.evaluation.trials.feet import foot_metrics
@@ -73,8 +74,7 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_we
 
 def transport_metrics(trace: Trace, whole: Array) -> dict[str, float]:
     """The parts of the commanded way that robot and object cover; `whole`: commands of the whole trial (T, 11)."""
-    start = trace.heading_reference[0] - trace.commanded_velocity[0, 2] * trace.dt
-    directions, length = commanded_path(whole, float(start), trace.dt)
+    directions, length = commanded_path(whole, start_heading(trace), trace.dt)
     has_object = bool(np.any(trace.object_position))
     return {
         "commanded_distance": length,

@@ -21,7 +21,7 @@ class Physics(Section):
     computed explicitly from the measured state at the physics rate; then the step must be short enough, 2 ms here."""
     torque_corner: float = Field(default=0.6, ge=0.0, lt=1.0)
     """Part of the no-load speed up to which a motor gives its full torque; beyond, it falls to nothing in a line.
-    Published curves of such motors bend at about six tenths."""
+    An assumption, not a measured curve."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
     """Friction cone: the pyramid inscribed in it, or the cone itself, with which a step costs half as much again."""
     solver: Literal["newton", "cg"] = "newton"
