@@ -107,13 +107,16 @@ class Sensing:
         quaternion /= np.sqrt(np.vecdot(quaternion, quaternion))[:, None]
 
     def _sense(self, state: SimulationState) -> None:
+        """Reads the truth. The heading goes on past a half turn, for the delay line interpolates."""
         robot, thing, columns = self._robot, self._object, self._columns
         robot[:, columns.position] = state.joint_position
         robot[:, columns.velocity] = state.joint_velocity
         robot[:, columns.angular] = state.base_angular_velocity
         np.negative(state.base_rotation[:, 2], out=robot[:, columns.gravity])
         rotation = state.base_rotation
-        robot[:, columns.heading.start] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted
+        heading = robot[:, columns.heading.start]
+        turned = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted - heading
+        heading += (turned + np.pi) % (2.0 * np.pi) - np.pi
         if not self._see_object:
             return
         world, turning = self._world, state.base_angular_velocity
@@ -142,7 +145,7 @@ class Sensing:
         """The sensors' memory, by name."""
         own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
         own |= {"drift": self._drift, "drifted": self._drifted}
-        own |= {"bias": self._bias, "deviation": self._deviation, "rows": self.rows}
+        own |= {"bias": self._bias, "deviation": self._deviation, "rows": self.rows, "sensed": self._robot}
         for name, line in (("robot", self._robot_line), ("object", self._object_line)):
             own |= {f"{name}/{key}": values for key, values in line.arrays().items()}
         return own

@@ -100,3 +100,12 @@ def test_the_measured_heading_follows_the_base_and_drifts_at_the_drawn_rate(star
     rotation = simulation.state.base_rotation
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     assert simulation.measured.heading[:, 0] - heading == pytest.approx([0.0, 0.05 * 10 * 0.02], abs=1e-12)
+
+
+def test_a_delayed_heading_passes_half_a_turn_without_a_jump(start, calm):
+    simulation = start(calm, ["free"], start_yaw=np.pi - 0.004, heading_drift=0.1, sensor_latency=0.5)
+    seen = []
+    for _ in range(8):
+        simulation.step()
+        seen.append(float(simulation.measured.heading[0, 0]))
+    assert np.diff(seen) == pytest.approx(np.full(7, 0.1 * 0.02), abs=1e-3)

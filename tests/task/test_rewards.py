@@ -100,9 +100,11 @@ def test_a_foot_on_its_swing_profile_scores_one_and_a_standing_foot_nothing() ->
     assert kernel(gait.swing_height(height, profile, none), 0.04)[0].tolist() == [0.0, 0.0]
 
 
-def test_slipping_counts_on_the_ground_alone_and_feet_too_close_cost() -> None:
+def test_slipping_counts_by_the_weight_on_the_foot_and_feet_too_close_cost() -> None:
     velocity = np.array([[[0.3, 0.4, 9.0], [1.0, 0.0, 0.0]]])
-    assert gait.foot_slip(velocity, np.array([[True, False]]))[0] == pytest.approx(0.25)
+    for left, right, expected in ((300.0, 0.0, 0.5), (300.0, 100.0, 0.625), (0.0, 0.0, 0.0), (300.0, -5.0, 0.5)):
+        force = np.array([[[7.0, 0.0, left], [7.0, 0.0, right]]])
+        assert gait.foot_slip(velocity, force)[0] == pytest.approx(expected)
     feet = np.array([[[0.0, 0.05, 0.0], [0.0, -0.05, 0.0]], [[0.0, 0.2, 0.0], [0.0, -0.2, 0.0]]])
     assert gait.foot_distance(feet, 0.16) == pytest.approx([0.0036, 0.0])
 

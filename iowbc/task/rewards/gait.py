@@ -3,7 +3,9 @@
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.task.rewards.kernel import squared_norm
+
+LEAST_LOAD = 1.0
+"""Force on both feet under which slipping fades out [N]."""
 
 
 def contact_timing(contact: Mask, expected: Mask) -> Array:
@@ -17,9 +19,13 @@ def swing_height(sole_height: Array, profile: Array, swinging: Mask) -> Array:
     return np.where(swinging, np.square(sole_height - profile), np.inf)
 
 
-def foot_slip(foot_velocity: Array, contact: Mask) -> Array:
-    """Σ |v_horizontal|² of feet in contact, (n,) [m²/s²]; velocities (n, 2, 3)."""
-    return squared_norm(foot_velocity[:, :, :2] * contact[:, :, None])
+def foot_slip(foot_velocity: Array, foot_force: Array) -> Array:
+    """Horizontal speed of the soles, averaged by the weight that each bears, (n,) [m/s]; velocities and forces
+    (n, 2, 3), in m/s and N. Zero in the air."""
+    load = np.maximum(foot_force[:, :, 2], 0.0)
+    speed = np.sqrt(np.vecdot(foot_velocity[:, :, :2], foot_velocity[:, :, :2]))
+    slip: Array = np.vecdot(speed, load) / np.maximum(load.sum(axis=1), LEAST_LOAD)
+    return slip
 
 
 def standing(contact: Mask, stepping: Mask) -> Array:

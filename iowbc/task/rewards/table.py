@@ -89,7 +89,7 @@ TERMS: dict[str, Term] = {
     "smooth.saturation": lambda s: smooth.saturation(s.state.saturation[:, s.support]),
     "gait.contact_timing": lambda s: gait.contact_timing(s.state.foot_contact, s.stance),
     "gait.swing_height": lambda s: gait.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
-    "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_contact),
+    "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_force),
     "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
     "alive": lambda s: np.ones(len(s.command)),
