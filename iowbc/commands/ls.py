@@ -5,7 +5,7 @@ from rich.text import Text
 
 from iowbc.commands.named import known_recipes
 from iowbc.commands.results import metrics_text
-from iowbc.commands.tables import plain_table
+from iowbc.commands.tables import NARROW, plain_table
 from iowbc.errors import require_known
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
 from iowbc.pipeline.store.last_used import ever_used
@@ -21,7 +21,8 @@ def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
     for recipe in known_recipes(store):
         for key in ever_used(store.runs, recipe):
             users.setdefault(key, []).append(recipe)
-    table = plain_table("stage", "key", "used by", "made", "took", "size", "metrics")
+    wide = console.width >= NARROW
+    table = plain_table("stage", "key", "used by", "made", "took", "size", *(["metrics"] if wide else []))
     artifacts = store.artifacts(stage)
     for artifact in artifacts:
         manifest = artifact.manifest
@@ -32,7 +33,7 @@ def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
             ago(manifest.made),
             duration(manifest.seconds),
             size(artifact.size),
-            Text(metrics_text(artifact, 3)),
+            *([Text(metrics_text(artifact, 3))] if wide else []),
         )
     if artifacts:
         console.print(table)

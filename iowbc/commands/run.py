@@ -53,8 +53,8 @@ def _run(planner: Planner, robot: Path, request: Request, console: Console) -> i
     runner: Runner | None = None
     status, code, closing, delivered = "KILLED", INTERRUPTED, "", True
     try:
-        with StopRequest() as stop:
-            runner = Runner(planner, robot, _display(loaded, console), tracker, stop)
+        with StopRequest(shown=console.is_terminal) as stop:
+            runner = Runner(planner, robot, _display(loaded, console, stop), tracker, stop)
             try:
                 runner.run()
                 status, code = "FINISHED", DONE
@@ -88,7 +88,7 @@ def _rest(request: Request, runner: Runner | None) -> str:
     return request.command([name for name in request.options.force if name not in made])
 
 
-def _display(loaded: LoadedRecipe, console: Console) -> Display:
+def _display(loaded: LoadedRecipe, console: Console, stop: StopRequest) -> Display:
     if console.is_terminal:
-        return LiveTable(console)
+        return LiveTable(console, lambda: stop.text)
     return PlainDisplay(loaded.recipe.execution.line_interval, console.file)

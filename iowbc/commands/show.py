@@ -4,16 +4,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands.named import named
-from iowbc.commands.results import metrics_text, shown_files, shown_path
-from iowbc.commands.tables import plain_table
+from iowbc.commands.results import shown_path
+from iowbc.commands.tables import metric_columns
 from iowbc.errors import shown
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.recipe import Recipe
 
@@ -22,18 +24,17 @@ def show(store: Store, console: Console, word: str) -> None:
     """All of one artifact, or the stages and metrics of a recipe."""
     found = named(store, word)
     if found.recipe is not None:
-        table = plain_table("stage", "key", "made", "took", "metrics")
         for stage, artifact in found.artifacts.items():
             manifest = artifact.manifest
-            row = (stage, manifest.key[:KEY_LENGTH], ago(manifest.made), duration(manifest.seconds))
-            table.add_row(*row, Text(metrics_text(artifact)))
-        console.print(table)
+            took = f"made {ago(manifest.made)}, took {duration(manifest.seconds)}"
+            console.print(Text.assemble((stage, "bold"), f" {manifest.key[:KEY_LENGTH]}, {took}"))
+            console.print(Padding(metric_columns(artifact), (0, 0, 0, 2)))
         return
     (artifact,) = found.artifacts.values()
-    _show_artifact(artifact, console)
+    _show_artifact(store, artifact, console)
 
 
-def _show_artifact(artifact: Artifact, console: Console) -> None:
+def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
     manifest, ingredients = artifact.manifest, artifact.ingredients
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True)
@@ -41,7 +42,6 @@ def _show_artifact(artifact: Artifact, console: Console) -> None:
     rows = {
         "stage": f"{manifest.stage}, version {manifest.version}",
         "key": manifest.key,
-        "folder": shown_path(artifact.folder),
         "made": f"{ago(manifest.made)} by recipe {manifest.recipe} on {manifest.host}",
         "took": f"{duration(manifest.seconds)} in {manifest.attempts} attempt(s) with {manifest.workers} worker(s)",
         "reads": "\n".join(f"{name} (content {digest[:KEY_LENGTH]})" for name, digest in _inputs(ingredients).items()),
@@ -49,12 +49,13 @@ def _show_artifact(artifact: Artifact, console: Console) -> None:
         "files": "\n".join(f"{name} ({size(record.size)})" for name, record in manifest.files.items()),
         "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
         "recipe": "\n".join(_unusual(ingredients.get("recipe", {}))),
-        "to look at": "\n".join(shown_files(artifact)),
     }
     for name, text in rows.items():
         if text:
             grid.add_row(Text(name, style="bold"), Text(text))
-    console.print(grid, soft_wrap=True)
+    console.print(grid)
+    folder = named_folder(store.runs, manifest.recipe, manifest.stage, artifact.folder)
+    console.print(f"folder  {shown_path(folder)}", markup=False, highlight=False, soft_wrap=True)
 
 
 def _unusual(slices: Mapping[str, Any]) -> list[str]:

@@ -1,11 +1,17 @@
 """`iowbc status`: what runs, what was left unfinished, and what the recipes have."""
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 from rich.console import Console
+from rich.padding import Padding
 from rich.text import Text
 
 from iowbc.commands.named import known_recipes, last_used
 from iowbc.commands.results import shown_path
 from iowbc.commands.tables import plain_table
+from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration
 from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.locks import holder
@@ -17,23 +23,8 @@ from iowbc.pipeline.tracking.tracker import backlog
 def print_status(store: Store, console: Console) -> None:
     """What runs, what was left unfinished, what the recipes have, and what MLflow lacks."""
     going_on = unfinished(store.runs)
-    if going_on:
-        table = plain_table("stage", "recipe", "key", "state", "at", "spent", "attempt")
-        for folder, record in going_on:
-            who = holder(store.runs, folder.name)
-            state = f"runs, {who}" if who else f"stopped {ago(float(record.get('updated', 0.0)))}"
-            total = float(record.get("total", 0.0))
-            share = f"{100 * float(record.get('done', 0.0)) / total:.0f} % {record.get('note', '')}" if total else ""
-            table.add_row(
-                str(record.get("stage", "?")),
-                str(record.get("recipe", "?")),
-                folder.name[:KEY_LENGTH],
-                state,
-                Text(share),
-                duration(float(record.get("seconds", 0.0))),
-                str(record.get("attempts", "?")),
-            )
-        console.print(table)
+    for folder, record in going_on:
+        _print_work(store, console, folder, record)
     recipes = known_recipes(store)
     if recipes:
         table = plain_table("recipe", "finished stages", "last")
@@ -51,3 +42,22 @@ def print_status(store: Store, console: Console) -> None:
             f"(its log: {shown_path(store.runs.tracking / 'sender.log')})",
             highlight=False,
         )
+
+
+def _print_work(store: Store, console: Console, folder: Path, record: Mapping[str, Any]) -> None:
+    """A stage that is being made, or was left unfinished: who works on it, how far it is, and its small curve."""
+    who = holder(store.runs, folder.name)
+    state = ("runs", "bold yellow") if who else (f"stopped {ago(float(record.get('updated', 0.0)))}", "magenta")
+    title = f" of {record.get('recipe', '?')} ({folder.name[:KEY_LENGTH]}): "
+    by = f", {who}" if who else ""
+    console.print(Text.assemble((str(record.get("stage", "?")), "bold"), title, state, by))
+    total = float(record.get("total", 0.0))
+    share = [f"{100 * float(record.get('done', 0.0)) / total:.0f} %"] if total else []
+    spent = f"{duration(float(record.get('seconds', 0.0)))} spent"
+    note = [str(record["note"])] if record.get("note") else []
+    attempt = f"attempt {record.get('attempts', '?')}"
+    console.print(Padding(Text(", ".join([*share, spent, attempt, *note])), (0, 0, 0, 2)))
+    values = [value for _, value in record.get("curve", [])]
+    if values:
+        text = f"{record.get('metric')} {sparkline(values)} {values[-1]:.4g}"
+        console.print(Padding(Text(text), (0, 0, 0, 2)))

@@ -1,14 +1,30 @@
 """Tables without lines, as every command prints them."""
 
-from rich.table import Table
+from collections.abc import Sequence
 
-FOLDED = ("metrics", "finished stages")
+from rich.columns import Columns
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.pipeline.store.artifact import Artifact
+
+FOLDED = ("metrics", "finished stages", "used by", "recipe", "why")
 """Columns whose text may go on in the next line."""
+NARROW = 100
+"""Terminals of fewer characters than this leave out what `show` tells."""
 
 
 def plain_table(*columns: str) -> Table:
     """An empty table with these columns."""
-    table = Table(box=None, padding=(0, 1))
+    table = Table(box=None, padding=(0, 1, 0, 0))
     for name in columns:
         table.add_column(name, no_wrap=name not in FOLDED, overflow="fold")
     return table
+
+
+def metric_columns(artifact: Artifact) -> Columns:
+    """All metrics of an artifact, in as many columns as fit."""
+    cells: Sequence[Text] = [
+        Text.assemble((f"{name} ", "dim"), f"{value:.5g}") for name, value in artifact.metrics.items()
+    ]
+    return Columns(cells, padding=(0, 2), equal=True, column_first=True)

@@ -21,7 +21,8 @@ class StageReport:
         if not values:
             return
         name = self._view.metric if self._view.metric in values else next(iter(values))
-        self._view.measured(name, float(values[name]))
+        self._view.measured(name, step, float(values[name]))
+        self._workspace.drawn(self._view.metric, self._view.curve)
         if self._tracker is not None:
             self._tracker.metrics(self._view.name, values, step)
         self._display.moved(self._view)

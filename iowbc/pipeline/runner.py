@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -133,6 +134,8 @@ class Runner:
         assert key is not None
         earlier = workspace.record.get("code", step.code)
         resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code))
+        view.metric, view.curve = workspace.curve
+        view.began = time.monotonic() - workspace.seconds
         view.state, view.note = "runs", short(step.notes or step.reasons, 1)
         self.display.changed(view)
         view.note = ""

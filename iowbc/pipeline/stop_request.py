@@ -11,13 +11,22 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class StopRequest:
     """While entered, turns the signals into a flag."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, shown: bool = False) -> None:
+        """shown: somebody else shows `text`, as the live table does; nothing is written here."""
+        self.shown = shown
         self.signal: signal.Signals | None = None
         self._former: dict[signal.Signals, object] = {}
 
     def __call__(self) -> bool:
         """True once a stop was asked for."""
         return self.signal is not None
+
+    @property
+    def text(self) -> str:
+        """What was asked for, and how to ask for more; empty before."""
+        if self.signal is None:
+            return ""
+        return f"{self.signal.name}: stopping at the next checkpoint; once more to abort at once"
 
     def __enter__(self) -> Self:
         for number in SIGNALS:
@@ -33,7 +42,11 @@ class StopRequest:
     def _received(self, number: int, frame: FrameType | None) -> None:
         """Writes past Python's buffers, which the interrupted code may be using."""
         if self.signal is not None:
-            os.write(2, b"\naborting\n")
+            self._write("aborting")
             raise KeyboardInterrupt
         self.signal = signal.Signals(number)
-        os.write(2, f"\n{self.signal.name}: stopping at the next checkpoint; once more to abort at once\n".encode())
+        self._write(self.text)
+
+    def _write(self, text: str) -> None:
+        if not self.shown:
+            os.write(2, f"\n{text}\n".encode())

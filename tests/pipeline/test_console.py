@@ -1,6 +1,8 @@
 """What a run shows on a terminal and elsewhere."""
 
 import io
+import os
+import signal
 import time
 
 import pytest
@@ -9,6 +11,7 @@ from rich.console import Console
 from iowbc.pipeline.console.display import CURVE_POINTS, PlainDisplay, StageView
 from iowbc.pipeline.console.live_table import LiveTable, sparkline
 from iowbc.pipeline.console.wording import short, size
+from iowbc.pipeline.stop_request import StopRequest
 
 
 def test_a_sparkline_rises_with_its_values() -> None:
@@ -43,9 +46,17 @@ def test_a_new_phase_begins_a_new_rate(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_long_curve_is_thinned() -> None:
     view = StageView("teacher")
     for value in range(5 * CURVE_POINTS):
-        view.measured("reward", value)
+        view.measured("reward", value, value)
     assert len(view.curve) <= CURVE_POINTS
-    assert view.curve == sorted(view.curve)
+    assert view.values == sorted(view.values)
+    assert view.values[-1] == 5 * CURVE_POINTS - 1
+
+
+def test_a_curve_goes_on_where_the_checkpoint_was() -> None:
+    view = StageView("teacher")
+    for step in (1, 2, 3, 2, 3):
+        view.measured("reward", step, 10.0 * step)
+    assert view.curve == [(1, 10.0), (2, 20.0), (3, 30.0)]
 
 
 def test_plain_lines_come_once_in_an_interval() -> None:
@@ -59,19 +70,61 @@ def test_plain_lines_come_once_in_an_interval() -> None:
     assert stream.getvalue() == "teacher: runs\n"
 
 
-def test_the_live_table_shows_every_stage() -> None:
-    console = Console(file=io.StringIO(), force_terminal=True, width=120)
-    display = LiveTable(console)
-    views = [StageView("rg-fit", state="cached"), StageView("teacher", state="runs", started=0.0)]
-    views[1].progress(1, 4, "at 1")
-    views[1].measured("reward", 2.5)
+def drawn(width: int, stopping: str = "") -> str:
+    """The live table of a run whose teacher trains, as a terminal of this width shows it."""
+    console = Console(file=io.StringIO(), force_terminal=True, width=width, record=True)
+    display = LiveTable(console, lambda: stopping)
+    views = [StageView("rg-dataset", state="cached", note="published"), StageView("teacher", state="runs")]
+    views[1].began = time.monotonic() - 7500.0
+    for step in range(1, 9):
+        views[1].progress(0.05 * step, 1.0, "12.3 s an episode, 5 % fall, level 1.23, KL 0.012, 4,500 steps/s")
+        views[1].measured("episode_seconds", step, 1.5 * step)
     display.begin(views)
+    display.end()
+    return "stage " + console.export_text().rpartition("stage ")[2]
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_the_live_table_keeps_every_stage_state_and_time_at_any_width(width: int) -> None:
+    lines = drawn(width).splitlines()
+    assert all(len(line.rstrip()) <= width for line in lines)
+    row = next(line for line in lines if line.startswith("teacher"))
+    assert row.split()[:2] == ["teacher", "runs"]
+    for text in ("40 %", "2 h 05 min"):
+        assert text in row
+    assert any(line.split() == ["rg-dataset", "cached"] for line in lines)
+    assert "rg-dataset: published" in lines[-2].strip()
+    assert lines[-1].startswith("teacher: 12.3 s an episode, 5 % fall")
+
+
+def test_a_narrow_terminal_leaves_out_the_curve_then_the_notes() -> None:
+    assert "▁▂▃▄▅▆▇█ episode_seconds 12" in drawn(120)
+    assert "▁▂▄▅▆█ episode_seconds 12" in drawn(100)
+    assert "episode_seconds" not in drawn(99)
+    assert "an episode" in drawn(60)
+    assert "an episode" not in drawn(59)
+
+
+def test_lines_that_are_said_scroll_by_above_the_live_table() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=80)
+    display = LiveTable(console)
+    display.begin([StageView("teacher")])
     display.say("a line")
     display.end()
     assert isinstance(console.file, io.StringIO)
-    shown = console.file.getvalue()
-    for text in ("rg-fit", "cached", "teacher", "reward 2.5", "at 1", "a line"):
-        assert text in shown
+    assert "a line\n" in console.file.getvalue()
+
+
+def test_the_live_table_says_that_it_was_asked_to_stop() -> None:
+    assert drawn(80, "SIGINT: stopping at the next checkpoint").splitlines()[-1].startswith("SIGINT")
+
+
+def test_a_stop_that_the_live_table_shows_is_not_written_into_it(capfd: pytest.CaptureFixture[str]) -> None:
+    for shown in (True, False):
+        with StopRequest(shown=shown) as stop:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert stop.text.startswith("SIGINT: stopping at the next checkpoint")
+        assert ("SIGINT" in capfd.readouterr().err) is not shown
 
 
 def test_many_reasons_are_counted() -> None:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import IO, Protocol
 
-from iowbc.pipeline.console.wording import duration
+from iowbc.pipeline.console.wording import duration, pace
 
 RATE_WINDOW = 60.0
 """Seconds over which a stage's rate is averaged."""
-CURVE_POINTS = 400
+CURVE_POINTS = 200
 """Points of the main metric that are remembered for its small curve."""
 
 
@@ -27,9 +27,12 @@ class StageView:
     total: float = 0.0
     metric: str = ""
     """Name of the main metric: the first one that the stage reports."""
-    curve: list[float] = field(default_factory=list)
-    started: float = 0.0
+    curve: list[tuple[float, float]] = field(default_factory=list)
+    """Steps and values of the main metric."""
+    began: float | None = None
+    """When it would have begun had it never been interrupted, on the monotonic clock [s]; None before it runs."""
     seconds: float | None = None
+    """Time that it took in all [s]; None before it has ended."""
     _marks: deque[tuple[float, float]] = field(default_factory=deque)
 
     def progress(self, done: float, total: float, note: str) -> None:
@@ -42,12 +45,27 @@ class StageView:
         while len(self._marks) > 2 and moment - self._marks[0][0] > RATE_WINDOW:
             self._marks.popleft()
 
-    def measured(self, metric: str, value: float) -> None:
-        """The main metric's next value; every second one is dropped when there are many."""
+    def measured(self, metric: str, step: float, value: float) -> None:
+        """The main metric's value at a step. What an earlier attempt had from there on is dropped, and every second
+        value when there are many."""
         self.metric = self.metric or metric
-        self.curve.append(value)
+        while self.curve and self.curve[-1][0] >= step:
+            self.curve.pop()
+        self.curve.append((step, value))
         if len(self.curve) > CURVE_POINTS:
             del self.curve[1::2]
+
+    @property
+    def values(self) -> list[float]:
+        """The main metric's values."""
+        return [value for _, value in self.curve]
+
+    @property
+    def spent(self) -> float | None:
+        """Time over all attempts until now, or until its end [s]; None before it runs."""
+        if self.seconds is not None:
+            return self.seconds
+        return None if self.began is None else time.monotonic() - self.began
 
     @property
     def rate(self) -> float | None:
@@ -111,11 +129,11 @@ class PlainDisplay:
         self._last = time.monotonic()
         parts = [f"{view.name}: {100 * view.share:.0f} %"]
         if view.rate is not None:
-            parts.append(f"{view.rate:.4g}/s")
+            parts.append(pace(view.rate))
         if view.left is not None:
             parts.append(f"{duration(view.left)} left")
         if view.curve:
-            parts.append(f"{view.metric} {view.curve[-1]:.4g}")
+            parts.append(f"{view.metric} {view.values[-1]:.4g}")
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:

@@ -1,19 +1,23 @@
 """The live table of a run on a terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
 from iowbc.pipeline.console.display import StageView
-from iowbc.pipeline.console.wording import duration
+from iowbc.pipeline.console.wording import duration, pace
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE_WIDTH = 24
+COLUMNS = {"stage": 10, "state": 7, "": 14, "done": 5, "spent": 11, "left": 11, "rate": 9}
+"""Heads and widths of what is always shown: 74 characters with the spaces between them."""
+WITH_CURVES, WITH_NOTES = 100, 60
+"""Narrower terminals [characters] show no curves, and yet narrower ones no notes."""
 REFRESH_RATE = 2.0
 """Redraws a second; each takes a moment from the stage."""
 STYLES = {
@@ -40,12 +44,14 @@ def sparkline(values: Sequence[float], width: int = CURVE_WIDTH) -> str:
 
 
 class LiveTable:
-    """One row a stage, redrawn in place; lines that are said scroll by above it."""
+    """One row a stage, redrawn in place, with what the stages note beneath; lines that are said scroll by above it."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, stopping: Callable[[], str] = lambda: "") -> None:
+        """stopping: what to show once the run was asked to stop; empty before."""
         self.console = console
+        self._stopping = stopping
         self._views: Sequence[StageView] = ()
-        self._live = Live(console=console, get_renderable=self._table, refresh_per_second=REFRESH_RATE)
+        self._live = Live(console=console, get_renderable=self._drawn, refresh_per_second=REFRESH_RATE)
 
     def begin(self, views: Sequence[StageView]) -> None:
         """Start to show these stages."""
@@ -67,24 +73,43 @@ class LiveTable:
         """Nothing more comes."""
         self._live.stop()
 
-    def _table(self) -> Table:
-        table = Table(box=None, padding=(0, 1), expand=False)
-        for name in ("stage", "state", "", "rate", "time", "curve", "note"):
-            table.add_column(name, no_wrap=True, overflow="ellipsis")
+    def _drawn(self) -> Group:
+        width = self.console.width
+        notes = [_note(view) for view in self._views if view.note] if width >= WITH_NOTES else []
+        stopping = self._stopping()
+        return Group(self._table(width), *notes, *([Text(stopping, style="magenta")] if stopping else []))
+
+    def _table(self, width: int) -> Table:
+        table = Table(box=None, padding=(0, 1, 0, 0), expand=False)
+        for name, characters in COLUMNS.items():
+            table.add_column(name, width=characters, no_wrap=True, overflow="ellipsis")
+        room = width - sum(COLUMNS.values()) - len(COLUMNS) - 1
+        if width >= WITH_CURVES:
+            table.add_column("curve", width=room, no_wrap=True, overflow="ellipsis")
         for view in self._views:
-            table.add_row(*self._row(view))
+            row = _row(view)
+            table.add_row(*row, _curve(view, room)) if width >= WITH_CURVES else table.add_row(*row)
         return table
 
-    def _row(self, view: StageView) -> tuple[Text | ProgressBar | str, ...]:
-        state = Text(view.state, style=STYLES.get(view.state, ""))
-        if view.state != "runs":
-            return Text(view.name), state, "", "", duration(view.seconds), self._curve(view), Text(view.note)
-        bar = ProgressBar(total=1.0, completed=view.share, width=20, pulse=not view.total)
-        rate = f"{view.rate:.4g}/s" if view.rate is not None else ""
-        left = f"{duration(view.left)} left" if view.left is not None else ""
-        return Text(view.name), state, bar, rate, left, self._curve(view), Text(view.note)
 
-    def _curve(self, view: StageView) -> Text:
-        if not view.curve:
-            return Text("")
-        return Text(f"{sparkline(view.curve)} {view.metric} {view.curve[-1]:.4g}")
+def _row(view: StageView) -> tuple[Text | ProgressBar | str, ...]:
+    """The cells of `COLUMNS`."""
+    state = Text(view.state, style=STYLES.get(view.state, ""))
+    if view.state != "runs":
+        return Text(view.name), state, "", "", duration(view.spent), "", ""
+    bar = ProgressBar(total=1.0, completed=view.share, width=COLUMNS[""], pulse=not view.total)
+    done = f"{100 * view.share:.0f} %" if view.total else ""
+    return Text(view.name), state, bar, done, duration(view.spent), duration(view.left), pace(view.rate)
+
+
+def _note(view: StageView) -> Text:
+    """What a stage notes, in one line."""
+    return Text(f"{view.name}: {view.note}", style="dim", no_wrap=True, overflow="ellipsis")
+
+
+def _curve(view: StageView, room: int) -> Text:
+    """The small curve with its name and last value, in so many characters."""
+    if not view.curve:
+        return Text("")
+    label = f"{view.metric} {view.values[-1]:.4g}"
+    return Text(f"{sparkline(view.values, max(4, min(CURVE_WIDTH, room - len(label) - 1)))} {label}")

@@ -25,6 +25,13 @@ def duration(seconds: float | None) -> str:
     return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
+def pace(rate: float | None) -> str:
+    """Units a second for people: `4,500/s`, `0.83/s`; empty for None."""
+    if rate is None:
+        return ""
+    return f"{rate:,.0f}/s" if rate >= 100 else f"{rate:.3g}/s"
+
+
 def ago(moment: float) -> str:
     """How long ago a moment [s since 1970] was; empty for 0."""
     return f"{duration(max(0.0, time.time() - moment))} ago" if moment else ""

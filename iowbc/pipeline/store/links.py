@@ -18,6 +18,12 @@ def link(runs: Runs, recipe: str, stage: str, artifact: Path) -> None:
     os.replace(fresh, folder / stage)
 
 
+def named_folder(runs: Runs, recipe: str, stage: str, artifact: Path) -> Path:
+    """`runs/<recipe>/<stage>` where it leads to an artifact's folder, else that folder."""
+    short = runs.root / recipe / stage
+    return short if short.is_symlink() and short.resolve() == artifact.resolve() else artifact
+
+
 def remove_dangling(runs: Runs) -> None:
     """Remove the links whose artifacts are gone."""
     for folder in runs.root.iterdir() if runs.root.is_dir() else ():

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,8 @@ class Workspace:
             "attempts": int(earlier.get("attempts", 0)) + 1,
             "before": float(earlier.get("seconds", 0.0)),
             "seconds": float(earlier.get("seconds", 0.0)),
+            "metric": str(earlier.get("metric", "")),
+            "curve": earlier.get("curve", []),
             "code": code,
         }
         self.write()
@@ -79,6 +82,15 @@ class Workspace:
         self._state.update(done=done, total=total, note=note)
         if time.monotonic() - self._written > WRITE_INTERVAL:
             self.write()
+
+    def drawn(self, metric: str, curve: Sequence[tuple[float, float]]) -> None:
+        """Keep the stage's small curve of steps and values for the next record: a resumed run goes on with it."""
+        self._state.update(metric=metric, curve=curve)
+
+    @property
+    def curve(self) -> tuple[str, list[tuple[float, float]]]:
+        """Name, steps and values of the small curve up to now, over all attempts."""
+        return str(self._state["metric"]), [(step, value) for step, value in self._state["curve"]]
 
     def write(self) -> None:
         """Record the progress on disk."""
@@ -101,7 +113,9 @@ def _record(root: Path) -> dict[str, Any]:
     found = read_json(root / PROGRESS)
     if not isinstance(found, dict):
         return {}
+    curve = found.get("curve", [])
     numbers = all(isinstance(found.get(name, 0.0), (int, float)) for name in NUMBERS)
+    numbers &= isinstance(curve, list) and all(isinstance(point, list) and len(point) == 2 for point in curve)
     return found if numbers and isinstance(found.get("code", {}), dict) else {}
 
 
