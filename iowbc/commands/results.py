@@ -1,43 +1,91 @@
-"""What is worth seeing at the end of a run: metrics, result tables, and where figures, films and the export lie."""
+"""The end of a run: films, chosen metrics, tables, where the rest lies, and what to type next."""
 
 import os
-from collections.abc import Iterator, Mapping
+import shlex
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from rich.console import Console
+from rich.text import Text
 
+from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.links import named_folder
+from iowbc.pipeline.store.runs import Runs
 
-SEEN_FOLDERS = ("figures", "videos")
-"""Folders whose files are listed; tables are printed."""
+HEADLINES: Mapping[str, tuple[str, ...]] = {
+    "rg-dataset": ("samples", "kept", "crosscheck_p90"),
+    "rg-fit": ("joint_rmse", "height_p95", "foot_p95"),
+    "teacher": ("best_score", "check/survived", "episode_seconds"),
+    "distill": ("kl", "action_agreement", "episode_seconds"),
+    "eval": ("trials", "survived", "succeeded"),
+    "export": ("parity", "inference_ms", "acceptance_survived"),
+}
+"""Patterns of the metrics that are shown of each stage, the most telling first; `show` has all."""
+METRICS_SHOWN = 3
+"""Metrics of a stage that are shown at most."""
+TABLES = ("lifting", "pushing", "heavy", "capacity")
+"""Tables that are drawn; the others are named."""
 EXPORTED = "policy.onnx"
 
 
-def print_results(artifacts: Mapping[str, Artifact], console: Console) -> None:
-    """Print the results of finished stages."""
-    for name, artifact in artifacts.items():
-        if artifact.metrics:
-            values = ", ".join(f"{metric} {value:.4g}" for metric, value in artifact.metrics.items())
-            _line(console, f"{name}: {values}")
-    for artifact in artifacts.values():
-        for table in sorted((artifact.folder / "tables").glob("*.md")):
-            _line(console, "")
-            _line(console, table.read_text(encoding="utf-8").rstrip())
-    _line(console, "")
-    for name, artifact in artifacts.items():
-        for path in shown_files(artifact):
-            _line(console, f"{name}: {path}")
+def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console, word: str) -> None:
+    """Print the results of a recipe's finished stages; `word` is what the user calls the recipe."""
+    folders = {
+        stage: named_folder(runs, recipe, stage, artifact.folder).absolute() for stage, artifact in artifacts.items()
+    }
+    for folder in folders.values():
+        for film in sorted((folder / "videos").glob("*")):
+            _line(console, f"film  {shown_path(film)}")
+    for stage, artifact in artifacts.items():
+        chosen = ", ".join(f"{name} {value:.4g}" for name, value in headline(stage, artifact.metrics))
+        if chosen:
+            console.print(Text(f"{stage:<10}  {chosen}"), no_wrap=True, overflow="ellipsis")
+    for folder in folders.values():
+        _print_tables(folder / "tables", console)
+    for folder in folders.values():
+        pictures = len(list((folder / "figures").glob("*")))
+        if pictures:
+            _line(console, f"figures  {shown_path(folder / 'figures')} ({pictures})")
+        if (folder / EXPORTED).is_file():
+            _line(console, f"controller  {shown_path(folder)}")
     if artifacts:
-        _line(console, "all artifacts: " + shown_path(next(iter(artifacts.values())).folder.parents[1]))
+        _line(console, "next:")
+        for command in next_commands(runs, artifacts, word):
+            _line(console, f"  {command}")
 
 
-def shown_files(artifact: Artifact) -> Iterator[str]:
-    """Figures and films of an artifact, and the exported graph."""
-    for folder in SEEN_FOLDERS:
-        for path in sorted((artifact.folder / folder).glob("*")):
-            yield shown_path(path)
-    if (artifact.folder / EXPORTED).is_file():
-        yield shown_path(artifact.folder / EXPORTED)
+def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]]:
+    """The few metrics that tell most of a stage: by its patterns, else the first ones."""
+    patterns = HEADLINES.get(stage, ())
+    chosen = [name for pattern in patterns for name in metrics if fnmatchcase(name, pattern)]
+    return [(name, metrics[name]) for name in (chosen or list(metrics))[:METRICS_SHOWN]]
+
+
+def next_commands(runs: Runs, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
+    """What a user would type next: to see the robot, where there is a policy, and to read about the run."""
+    elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
+    seen = ["iowbc", "play", word] if {"teacher", "distill", "export"} & artifacts.keys() else ["iowbc", "show", word]
+    return [shlex.join([*words, *elsewhere]) for words in (seen, ["iowbc", "ls"])]
+
+
+def _print_tables(folder: Path, console: Console) -> None:
+    """Draw the main ones of a folder's tables, and say where the others are."""
+    others = []
+    for path in sorted(folder.glob("*.md"), key=_rank):
+        if path.stem in TABLES:
+            console.print()
+            console.print(drawn(read_table(path.read_text(encoding="utf-8")), console.width))
+        else:
+            others.append(path.name)
+    if others:
+        _line(console, f"more tables  {shown_path(folder)}: {', '.join(others)}")
+
+
+def _rank(path: Path) -> tuple[int, str]:
+    """The order in which tables are drawn."""
+    return TABLES.index(path.stem) if path.stem in TABLES else len(TABLES), path.name
 
 
 def metrics_text(artifact: Artifact, limit: int | None = None) -> str:

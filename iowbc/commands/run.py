@@ -70,7 +70,7 @@ def _run(planner: Planner, robot: Path, request: Request, console: Console) -> i
     except KeyboardInterrupt:
         code, closing = INTERRUPTED, _resumption(request, runner)
     if code == DONE and runner is not None:
-        print_results(runner.artifacts, console)
+        print_results(request.runs, loaded.recipe.name, runner.artifacts, console, request.word)
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:

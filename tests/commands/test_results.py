@@ -1,0 +1,85 @@
+"""The end of a run: films first, a few metrics, tables that fit, and what to type next."""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.commands.named import last_used
+from iowbc.commands.results import headline, print_results
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+
+LIFTING = """*Command tracking errors under lifting: means over surviving trials with their 95 % interval.*
+
+| Mass | Algorithm | E_α [rad] | E_h [m] | Survived | paper E_α |
+| --- | --- | --- | --- | --- | --- |
+| 0 kg | IO-WBC | 0.039 ± 0.024 | 0.021 ± 0.001 | 5/5 | 0.125 |
+|  | stands still | 0.047 | 0.017 | – | – |
+"""
+
+
+def shown(width: int, make: Callable[[Console], object]) -> str:
+    console = Console(width=width, file=io.StringIO())
+    with console.capture() as capture:
+        make(console)
+    return capture.get()
+
+
+def on_screen(width: int) -> str:
+    return shown(width, lambda console: console.print(drawn(read_table(LIFTING), console.width)))
+
+
+def test_a_table_of_results_is_drawn_without_its_markdown() -> None:
+    text = on_screen(100)
+    assert text.splitlines()[0] == "Command tracking errors under lifting"
+    assert "0.039 ± 0.024" in text
+    assert "|" not in text
+    assert "---" not in text
+
+
+@pytest.mark.parametrize(
+    ("width", "head", "intervals"),
+    [
+        (80, "Mass  Algorithm         E_α [rad]        E_h [m]  Survived  paper E_α", True),
+        (70, "Mass  Algorithm         E_α [rad]        E_h [m]  Survived", True),
+        (50, "Mass  Algorithm     E_α [rad]  E_h [m]  Survived", False),
+        (42, "Mass  Algorithm     E_α [rad]  E_h [m]", False),
+    ],
+)
+def test_a_narrow_terminal_leaves_out_the_papers_figures_then_intervals_then_columns(
+    width: int, head: str, intervals: bool
+) -> None:
+    lines = on_screen(width).splitlines()
+    assert all(len(line) <= width for line in lines)
+    assert lines[1].rstrip() == head
+    assert ("±" in lines[2]) == intervals
+    assert ("paper E_α" in lines[-1]) == (width < 80)
+
+
+def test_a_few_metrics_of_a_stage_are_chosen() -> None:
+    metrics = {"step": 1.0, "reward": 2.0, "best_score": 0.9, "episode_seconds": 12.0}
+    assert headline("teacher", metrics) == [("best_score", 0.9), ("episode_seconds", 12.0)]
+    assert headline("teacher", {"count": 3.0}) == [("count", 3.0)]
+
+
+def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Path) -> None:
+    runs = Runs(folder / "runs")
+    artifacts = last_used(Store(runs), "first")
+    films = runs.root / "first" / "eval" / "videos"
+    films.mkdir()
+    (films / "box.mp4").write_bytes(b"")
+    (films.parent / "tables" / "lifting.md").write_text(LIFTING)
+    lines = shown(80, lambda console: print_results(runs, "first", artifacts, console, "first.yaml")).splitlines()
+    assert lines[0].startswith("film  ")
+    assert lines[0].endswith("runs/first/eval/videos/box.mp4")
+    metrics = [line.split() for line in lines[1:7]]
+    assert [(line[0], line[1:]) for line in metrics] == [(stage, ["count", "3"]) for stage in artifacts]
+    assert not any(artifact.manifest.key in line for artifact in artifacts.values() for line in lines)
+    assert "Command tracking errors under lifting" in lines
+    commands = lines[lines.index("next:") + 1 :]
+    assert [command.split()[:3] for command in commands] == [["iowbc", "play", "first.yaml"], ["iowbc", "ls", "--runs"]]
+    assert len(lines) < 35
