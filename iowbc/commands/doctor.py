@@ -199,5 +199,5 @@ def _tracking(runs: Runs) -> Finding:
     from iowbc.pipeline.tracking.tracker import backlog, tracking_uri
 
     waiting = len(backlog(runs))
-    text = tracking_uri(runs) + (f"; {waiting} runs are not sent whole yet" if waiting else "")
+    text = (tracking_uri() or str(runs.database)) + (f"; {waiting} runs are not sent whole yet" if waiting else "")
     return Finding("tracking", "doubtful" if waiting else "good", text)

@@ -63,6 +63,13 @@ def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]
     return [(name, metrics[name]) for name in (chosen or list(metrics))[:METRICS_SHOWN]]
 
 
+def described(artifacts: Mapping[str, Artifact]) -> str:
+    """The main tables of a run in Markdown."""
+    found = [path for artifact in artifacts.values() for path in (artifact.folder / "tables").glob("*.md")]
+    chosen = sorted((path for path in found if path.stem in TABLES), key=_rank)
+    return "\n".join(path.read_text(encoding="utf-8") for path in chosen)
+
+
 def next_commands(runs: Runs, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
     """What a user would type next: to see the robot, where there is a policy, and to read about the run."""
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]

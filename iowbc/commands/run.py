@@ -7,7 +7,7 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare
 from iowbc.commands.request import Request, prepared, recipes
-from iowbc.commands.results import print_results
+from iowbc.commands.results import described, print_results
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, PipelineFailed
 from iowbc.pipeline.console.display import Display, PlainDisplay
@@ -58,6 +58,8 @@ def _run(planner: Planner, robot: Path, request: Request, console: Console) -> i
             try:
                 runner.run()
                 status, code = "FINISHED", DONE
+                if tracker is not None:
+                    tracker.describe(described(runner.artifacts))
             except PipelineFailed as error:
                 status, code = "FAILED", STAGE_FAILED
                 closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, runner)}"

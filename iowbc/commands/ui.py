@@ -1,5 +1,6 @@
 """`iowbc ui`: MLflow's web interface on the runs of this folder, for this machine alone."""
 
+import json
 import os
 import signal
 import socket
@@ -11,12 +12,23 @@ from rich.console import Console
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.tracking.delivery import client, set_up
+from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, let_files_move, set_up
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.pipeline.writability import require_writable_runs
+from iowbc.recipe.execution import Execution
 
 HOST = "127.0.0.1"
 LAST_PORT = 65_535
+VIEW = "iowbc"
+"""Name under which MLflow keeps how the runs are shown."""
+COLUMNS = {
+    "rg-fit": ("joint_rmse",),
+    "teacher": ("best_score",),
+    "distill": ("action_agreement",),
+    "eval": ("succeeded", "trials"),
+    "export": ("parity",),
+}
+"""Metrics of stages that are columns."""
 
 
 def serve(runs: Runs, console: Console, port: int) -> int:
@@ -27,20 +39,41 @@ def serve(runs: Runs, console: Console, port: int) -> int:
         other = next((other for other in range(port + 1, LAST_PORT + 1) if _free(other)), None)
         raise UsageError(f"port {port} is taken; try --port {other or 'with another number'}")
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    uri = f"sqlite:///{runs.database.absolute()}"
+    uri = embedded_uri(runs)
     with set_up(runs):
-        client(uri).search_experiments(max_results=1)
+        mlflow = client(uri)
+        mlflow.search_experiments(max_results=1)
+        let_files_move(runs)
+        shown = experiment(mlflow, Execution.model_fields["experiment"].default, embedded=True)
+        mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):
         start_sender(runs)
-    console.print(f"MLflow on http://{HOST}:{port} in about a quarter of a minute; Ctrl-C ends it", highlight=False)
+    page = f"http://{HOST}:{port}/#/experiments/{shown}/runs?workflowType=machine_learning&viewStateShareKey={VIEW}"
+    console.print("MLflow's page of the runs, ready in about a quarter of a minute; Ctrl-C ends it:", highlight=False)
+    console.print(page, markup=False, highlight=False, soft_wrap=True)
     command = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(port), "--workers", "1"]
-    command += ["--backend-store-uri", uri, "--default-artifact-root", runs.tracked_files.absolute().as_uri()]
+    command += ["--backend-store-uri", uri, "--artifacts-destination", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
     with subprocess.Popen(command, env=environment) as server:
         try:
             return server.wait()
         finally:
             server.terminate()
+
+
+def view() -> dict[str, object]:
+    """How MLflow shows the runs: newest first, stages within their run, with the columns that tell most."""
+    metrics = [f"metrics.`{stage}/{name}`" for stage, names in COLUMNS.items() for name in names]
+    return {
+        "searchFilter": "",
+        "orderByKey": "attributes.start_time",
+        "orderByAsc": False,
+        "startTime": "ALL",
+        "lifecycleFilter": "Active",
+        "selectedColumns": ["attributes.`Description`", *metrics, "tags.`iowbc.cached`"],
+        "runsExpanded": {},
+        "viewMaximized": True,
+    }
 
 
 def _free(port: int) -> bool:

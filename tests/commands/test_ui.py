@@ -9,8 +9,13 @@ import time
 import urllib.error
 import urllib.request
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.journal import Journal
+from iowbc.pipeline.tracking.tracker import DESCRIPTION
 
 
 def free_port() -> int:
@@ -30,11 +35,34 @@ def test_a_taken_port_is_refused_with_a_free_one(tmp_path: Path) -> None:
     assert done.stderr.startswith(f"port {port} is taken; try --port ")
 
 
+def recorded(runs: Runs) -> None:
+    """A run with a file and a description, as MLflow has it."""
+    (runs.root / "store" / "eval").mkdir(parents=True)
+    (runs.root / "store" / "eval" / "table.md").write_text("a table")
+    with Journal(runs.tracking / "made-up.jsonl") as journal:
+        journal.acquire()
+        journal.write("journal", uri="", experiment="iowbc", recipe="box", digest="")
+        journal.write("run", id="recipe", parent=None, name="box", tags={DESCRIPTION: "| a |"}, params={})
+        journal.write("files", id="recipe", paths=["store/eval/table.md"])
+        journal.write("end", id="recipe", status="FINISHED")
+    words = [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root)]
+    assert subprocess.run(words, check=False, timeout=120).returncode == 0
+
+
 @pytest.mark.slow
-def test_the_interface_answers_and_ends(tmp_path: Path) -> None:
+def test_the_interface_of_a_moved_folder_answers_with_its_files_and_ends(tmp_path: Path) -> None:
+    recorded(Runs(tmp_path / "before"))
+    (tmp_path / "before").rename(tmp_path / "runs")
     port = free_port()
     address = f"http://127.0.0.1:{port}"
     words = [sys.executable, "-m", "iowbc", "ui", "--port", str(port), "--runs", str(tmp_path / "runs")]
+
+    def ask(path: str, **question: object) -> Any:
+        data = json.dumps(question).encode()
+        request = urllib.request.Request(address + path, data, {"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return json.load(answer)
+
     with (tmp_path / "log.txt").open("w") as log, subprocess.Popen(words, stdout=log, stderr=log) as server:
         limit = time.monotonic() + 90.0
         while True:
@@ -45,13 +73,14 @@ def test_the_interface_answers_and_ends(tmp_path: Path) -> None:
             except (urllib.error.URLError, OSError):
                 assert time.monotonic() < limit, (tmp_path / "log.txt").read_text()
                 time.sleep(0.5)
-        question = urllib.request.Request(
-            f"{address}/api/2.0/mlflow/experiments/search",
-            data=json.dumps({"max_results": 5}).encode(),
-            headers={"Content-Type": "application/json"},
-        )
-        with urllib.request.urlopen(question, timeout=10) as answer:
-            assert "experiments" in json.load(answer)
+        page = next(line for line in (tmp_path / "log.txt").read_text().splitlines() if line.startswith(address))
+        number = page.partition("#/experiments/")[2].partition("/runs?workflowType=machine_learning")[0]
+        (run,) = ask("/api/2.0/mlflow/runs/search", experiment_ids=[number], max_results=5)["runs"]
+        tags = {tag["key"]: tag["value"] for tag in run["data"]["tags"]}
+        assert tags[DESCRIPTION] == "| a |"
+        file = f"{address}/get-artifact?path=table.md&run_uuid={run['info']['run_id']}"
+        with urllib.request.urlopen(file, timeout=10) as answer:
+            assert answer.read() == b"a table"
         server.send_signal(signal.SIGTERM)
         assert server.wait(timeout=30) == 130
     assert not (tmp_path / "mlflow.db").exists()

@@ -1,6 +1,7 @@
 """MLflow hears everything, whatever happens to the run, and nothing waits for it."""
 
 import json
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -11,6 +12,7 @@ from typing import Any
 from workplace import RECIPE, Workplace, until
 
 from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.delivery import let_files_move
 from iowbc.pipeline.tracking.journal import Journal, close_orphaned, statuses, unsent
 from iowbc.pipeline.tracking.tracker import backlog
 
@@ -70,20 +72,50 @@ def test_what_happens_to_runs_is_what_mlflow_shows(workplace: Workplace) -> None
         ("FAILED", {"rg-dataset": "FINISHED", "rg-fit": "FAILED"}),
         ("FINISHED", whole),
         ("KILLED", {"rg-dataset": "FINISHED", "rg-fit": "FINISHED", "teacher": "KILLED"}),
-        ("FINISHED", whole),
-    ]
+    ], "the last run, all cached, adds nothing"
     assert backlog(runs) == []
 
     cached_tags = tracked(runs, "SELECT value FROM tags WHERE key = 'iowbc.cached'")
-    assert cached_tags.count(("true",)) == 1 + 2 + 6  # of the second, the third and the last run
+    assert cached_tags.count(("true",)) == 1 + 2  # of the second and the third run
     assert ("4096",) in tracked(runs, "SELECT value FROM params WHERE key = 'teacher.steps'")
     teacher = "(SELECT run_uuid FROM runs WHERE name = 'teacher' ORDER BY start_time LIMIT 1)"
     counted = tracked(runs, f"SELECT value FROM metrics WHERE key = 'count' AND run_uuid = {teacher} ORDER BY step")
     assert [value for (value,) in counted] == [float(step) for step in range(1, len(counted) + 1)]
     ((location,),) = tracked(runs, f"SELECT artifact_uri FROM runs WHERE run_uuid = {teacher}")
-    kept = {path.name for path in Path(location.removeprefix("file://")).iterdir()}
-    assert kept == {"figures", "tables", "key.json", "recipe.yaml"}
-    assert location.removeprefix("file://").startswith(str(runs.tracked_files))
+    assert files_of(runs, location) == {"figures", "tables", "key.json", "recipe.yaml"}
+
+
+def files_of(runs: Runs, location: str) -> set[str]:
+    """What the server of a `runs` folder finds for a run whose files MLflow has there."""
+    assert location.startswith("mlflow-artifacts:/")
+    return {path.name for path in (runs.tracked_files / location.removeprefix("mlflow-artifacts:/")).iterdir()}
+
+
+def test_a_moved_folder_takes_mlflows_files_along_and_leaves_nothing_behind(workplace: Workplace) -> None:
+    workplace.recipe.write_text(TRACKED)
+    assert workplace.command("run", "small.yaml", "--until", "rg-dataset", FAKE_SENDER="off").code == 0
+    former, here = workplace.store.runs, Runs(workplace.folder / "elsewhere" / "runs")
+    shutil.copytree(former.root, here.root, symlinks=True)
+    assert deliver(here) == 0
+    assert not former.database.exists(), "what was not sent yet goes where the journal lies now"
+    for (location,) in tracked(here, "SELECT artifact_uri FROM runs"):
+        assert "recipe.yaml" in files_of(here, location)
+
+
+def test_files_recorded_under_an_absolute_place_are_found_again(workplace: Workplace) -> None:
+    workplace.recipe.write_text(TRACKED)
+    runs = workplace.store.runs
+    assert workplace.command("run", "small.yaml", "--until", "rg-dataset", FAKE_SENDER="off").code == 0
+    assert deliver(runs) == 0
+    former = "file:///iowbc/runs/mlartifacts"
+    with sqlite3.connect(runs.database) as database:
+        database.execute("UPDATE experiments SET artifact_location = ? WHERE name = 'iowbc'", (former,))
+        database.execute("UPDATE runs SET artifact_uri = ? || '/' || run_uuid || '/artifacts'", (former,))
+    database.close()
+    let_files_move(runs)
+    for (location,) in tracked(runs, "SELECT artifact_uri FROM runs"):
+        assert "recipe.yaml" in files_of(runs, location)
+    assert tracked(runs, "SELECT artifact_location FROM experiments WHERE name = 'iowbc'") == [("mlflow-artifacts:/",)]
 
 
 def test_two_first_runs_at_once_share_a_fresh_database(workplace: Workplace) -> None:

@@ -1,6 +1,8 @@
 """One journal on its way to MLflow."""
 
 import contextlib
+import shutil
+import sqlite3
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -32,6 +34,8 @@ MAXIMUM_TEXT = 5000
 """Longest value of a parameter or tag that MLflow's stores take [characters]."""
 ORIGIN_TAG = "iowbc.origin"
 """Tag with a run's journal and its name there, by which a sender finds what another one made before it died."""
+SERVED = "mlflow-artifacts:/"
+"""Where the files of the embedded database are for MLflow: wherever its server keeps them, so that `runs` may move."""
 REFUSALS = ("INVALID_PARAMETER_VALUE", "BAD_REQUEST", "RESOURCE_DOES_NOT_EXIST", "RESOURCE_ALREADY_EXISTS")
 """Answers that another attempt would not change; what was refused is left out."""
 
@@ -47,6 +51,8 @@ class Delivery:
         """Whether the next event may have been sent by a sender that died before it could say so."""
         self._checked = -1
         self._client: MlflowClient | None = None
+        self._embedded = False
+        """Whether it goes to the database in `runs`."""
         self._experiment = ""
 
     def lives(self) -> bool:
@@ -83,9 +89,13 @@ class Delivery:
     def _connect(self) -> None:
         if self._client is None:
             first = header(self.path)
-            made = client(str(first["uri"]))
+            own = embedded_uri(self.runs)
+            made = client(str(first["uri"]) or own)
+            self._embedded = first["uri"] in ("", own)
             with set_up(self.runs):
-                self._experiment = experiment(made, str(first["experiment"]), self.runs)
+                if self._embedded:
+                    let_files_move(self.runs)
+                self._experiment = experiment(made, str(first["experiment"]), self._embedded)
             self._client = made
 
     def _send(self) -> None:
@@ -126,7 +136,7 @@ class Delivery:
             elif event["event"] == "tags":
                 self._batch(event["id"], tags=event["tags"])
             elif event["event"] == "text":
-                self.client.log_text(self.ids[event["id"]], event["text"], event["file"])
+                self._text(event)
             elif event["event"] == "files":
                 self._files(event)
             elif event["event"] == "end":
@@ -152,12 +162,30 @@ class Delivery:
         self.ids[event["id"]] = run
         self._batch(event["id"], params=event["params"])
 
+    def _text(self, event: Mapping[str, Any]) -> None:
+        run = self.ids[event["id"]]
+        if self._embedded:
+            (self._folder(run) / event["file"]).write_text(event["text"], encoding="utf-8")
+        else:
+            self.client.log_text(run, event["text"], event["file"])
+
     def _files(self, event: Mapping[str, Any]) -> None:
-        for path in map(Path, event["paths"]):
-            if path.is_dir():
-                self.client.log_artifacts(self.ids[event["id"]], str(path), path.name)
+        run = self.ids[event["id"]]
+        for path in (self.runs.root / name for name in event["paths"]):
+            if self._embedded and path.is_dir():
+                shutil.copytree(path, self._folder(run) / path.name, dirs_exist_ok=True)
+            elif self._embedded and path.is_file():
+                shutil.copyfile(path, self._folder(run) / path.name)
+            elif path.is_dir():
+                self.client.log_artifacts(run, str(path), path.name)
             elif path.is_file():
-                self.client.log_artifact(self.ids[event["id"]], str(path))
+                self.client.log_artifact(run, str(path))
+
+    def _folder(self, run: str) -> Path:
+        """Where the files of a run of the embedded database lie: MLflow's server looks for them there."""
+        folder = self.runs.tracked_files / run / "artifacts"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
 
     def _metrics(self, gathered: list[dict[str, Any]]) -> None:
         from mlflow.entities import Metric
@@ -200,14 +228,35 @@ def client(uri: str) -> "MlflowClient":
     return MlflowClient(tracking_uri=uri)
 
 
-def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
-    """Identifier of an experiment, which is made where it is missing; files of the embedded store lie under `runs/`."""
+def experiment(client: "MlflowClient", name: str, embedded: bool) -> str:
+    """Identifier of an experiment, which is made where it is missing."""
     found = client.get_experiment_by_name(name)
     if found is not None:
         return str(found.experiment_id)
-    embedded = client.tracking_uri.startswith("sqlite:")
-    location = runs.tracked_files.absolute().as_uri() if embedded else None
-    return str(client.create_experiment(name, artifact_location=location))
+    return str(client.create_experiment(name, artifact_location=SERVED if embedded else None))
+
+
+def embedded_uri(runs: Runs) -> str:
+    """The database in `runs`, as MLflow names it."""
+    return f"sqlite:///{runs.database.absolute()}"
+
+
+def let_files_move(runs: Runs) -> None:
+    """Let an embedded database that holds absolute places of files name them as its server finds them, wherever it is.
+
+    The files lie in `mlartifacts/<run>/artifacts` either way.
+    """
+    if not runs.database.is_file():
+        return
+    with contextlib.closing(sqlite3.connect(runs.database)) as database, database:
+        if not database.execute("SELECT name FROM sqlite_master WHERE name = 'experiments'").fetchall():
+            return
+        here = f"file:%/{runs.tracked_files.name}"
+        database.execute("UPDATE experiments SET artifact_location = ? WHERE artifact_location LIKE ?", (SERVED, here))
+        database.execute(
+            "UPDATE runs SET artifact_uri = ? || run_uuid || '/artifacts' WHERE artifact_uri LIKE ?",
+            (SERVED, f"{here}/%"),
+        )
 
 
 def _fits(gathered: list[dict[str, Any]], event: Mapping[str, Any]) -> bool:

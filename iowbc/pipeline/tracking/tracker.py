@@ -29,12 +29,14 @@ SHOWN_FOLDERS = ("figures", "tables", "videos")
 """Folders of an artifact that go to MLflow."""
 CHECKING_TIME = 1.0
 """Seconds within which a sender that looks at a journal has let go of it again."""
+DESCRIPTION = "mlflow.note.content"
+"""Tag that MLflow shows as a run's description."""
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
 
 
-def tracking_uri(runs: Runs) -> str:
-    """The tracking server that the environment names, else the embedded database."""
-    return os.environ.get(URI_VARIABLE) or f"sqlite:///{runs.database.absolute()}"
+def tracking_uri() -> str:
+    """The tracking server that the environment names; empty stands for the database in `runs`, wherever that is."""
+    return os.environ.get(URI_VARIABLE, "")
 
 
 class Tracker:
@@ -44,7 +46,19 @@ class Tracker:
         self.runs = runs
         self.patience = loaded.recipe.execution.tracking_patience
         self._sender: subprocess.Popen[bytes] | None = None
-        self._journal = self._continued(loaded) or self._begun(loaded)
+        self._loaded = loaded
+        self._cached: list[tuple[str, Artifact]] = []
+        """Cached stages of a run that has made nothing yet: it is recorded once it makes something."""
+        self._open = self._continued(loaded)
+
+    @property
+    def _journal(self) -> Journal:
+        """The journal, which begins when it is first needed."""
+        if self._open is None:
+            self._open = self._begun(self._loaded)
+            for name, artifact in self._cached:
+                self.finished(name, artifact, cached=True)
+        return self._open
 
     def _begun(self, loaded: LoadedRecipe) -> Journal:
         recipe = loaded.recipe
@@ -52,9 +66,12 @@ class Tracker:
         journal = Journal(self.runs.tracking / f"{stamp}-{recipe.name}-{os.getpid()}.jsonl")
         journal.acquire(CHECKING_TIME)
         resolved = recipe.model_dump(mode="json")
-        uri = tracking_uri(self.runs)
         journal.write(
-            "journal", uri=uri, experiment=recipe.execution.experiment, recipe=recipe.name, digest=data_digest(resolved)
+            "journal",
+            uri=tracking_uri(),
+            experiment=recipe.execution.experiment,
+            recipe=recipe.name,
+            digest=data_digest(resolved),
         )
         journal.write(
             "run", id=PARENT, parent=None, name=recipe.name, tags=_process_tags(), params=parameters(resolved)
@@ -67,7 +84,7 @@ class Tracker:
         digest = data_digest(loaded.recipe.model_dump(mode="json"))
         for path in sorted(self.runs.tracking.glob(f"*-{loaded.recipe.name}-*.jsonl"), reverse=True):
             first = header(path)
-            if first.get("digest") != digest or first.get("uri") != tracking_uri(self.runs):
+            if first.get("digest") != digest or first.get("uri") != tracking_uri():
                 continue
             if statuses(path).get(PARENT) == "FINISHED":
                 return None
@@ -99,7 +116,10 @@ class Tracker:
         self._journal.write("end", id=name, status=status)
 
     def finished(self, name: str, artifact: Artifact, cached: bool) -> None:
-        """A stage has its artifact; a cached one gets a nested run too."""
+        """A stage has its artifact; a cached one gets a nested run too, where the run makes any."""
+        if cached and self._open is None:
+            self._cached.append((name, artifact))
+            return
         if cached:
             if statuses(self._journal.path).get(name) == "FINISHED":
                 return
@@ -110,12 +130,23 @@ class Tracker:
             self.metrics(name, {f"summary/{key}": value for key, value in artifact.metrics.items()}, 0)
             self.metrics(PARENT, {f"{name}/{key}": value for key, value in artifact.metrics.items()}, 0)
         files = [INGREDIENTS, RECIPE] if cached else [INGREDIENTS, RECIPE, *SHOWN_FOLDERS]
-        present = [str((artifact.folder / file).absolute()) for file in files if (artifact.folder / file).exists()]
+        folder = os.path.relpath(artifact.folder, self.runs.root)
+        present = [f"{folder}/{file}" for file in files if (artifact.folder / file).exists()]
         self._journal.write("files", id=name, paths=present)
         self._journal.write("end", id=name, status="FINISHED")
 
+    def describe(self, text: str) -> None:
+        """Markdown that MLflow shows with the run."""
+        if self._open is not None:
+            self._journal.write("tags", id=PARENT, tags={DESCRIPTION: text})
+
     def close(self, status: str, wait: bool) -> bool:
-        """End the parent run and let the sender take what is left; True where MLflow has everything."""
+        """End the parent run and let the sender take what is left; True where MLflow has everything.
+
+        A run that made nothing has nothing to tell.
+        """
+        if self._open is None:
+            return True
         self._journal.write("end", id=PARENT, status=status)
         path = self._journal.path
         self._journal.close()
@@ -139,7 +170,7 @@ def record_figures(runs: Runs, name: str, figures: Mapping[str, float]) -> None:
     with Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl") as journal:
         journal.acquire(CHECKING_TIME)
         experiment = Execution.model_fields["experiment"].default
-        journal.write("journal", uri=tracking_uri(runs), experiment=experiment, recipe=name, digest="")
+        journal.write("journal", uri=tracking_uri(), experiment=experiment, recipe=name, digest="")
         journal.write("run", id=PARENT, parent=None, name=name, tags=_process_tags(), params={})
         journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
         journal.write("end", id=PARENT, status="FINISHED")
