@@ -44,7 +44,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
         mlflow = client(uri)
         mlflow.search_experiments(max_results=1)
         let_files_move(runs)
-        shown = experiment(mlflow, Execution.model_fields["experiment"].default, embedded=True)
+        shown = experiment(mlflow, Execution.model_fields["experiment"].default, runs)
         mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):
         start_sender(runs)

@@ -95,7 +95,7 @@ class Delivery:
             with set_up(self.runs):
                 if self._embedded:
                     let_files_move(self.runs)
-                self._experiment = experiment(made, str(first["experiment"]), self._embedded)
+                self._experiment = experiment(made, str(first["experiment"]), self.runs)
             self._client = made
 
     def _send(self) -> None:
@@ -228,12 +228,15 @@ def client(uri: str) -> "MlflowClient":
     return MlflowClient(tracking_uri=uri)
 
 
-def experiment(client: "MlflowClient", name: str, embedded: bool) -> str:
-    """Identifier of an experiment, which is made where it is missing."""
+def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
+    """Identifier of an experiment, which is made where it is missing; files of any database file lie under `runs/`."""
     found = client.get_experiment_by_name(name)
     if found is not None:
         return str(found.experiment_id)
-    return str(client.create_experiment(name, artifact_location=SERVED if embedded else None))
+    location = runs.tracked_files.absolute().as_uri() if client.tracking_uri.startswith("sqlite:") else None
+    if client.tracking_uri == embedded_uri(runs):
+        location = SERVED
+    return str(client.create_experiment(name, artifact_location=location))
 
 
 def embedded_uri(runs: Runs) -> str:
