@@ -56,7 +56,7 @@ class ArmKinematics:
         """
         count, settings = len(arm_position), self.settings
         wrist, jacobian = self.forward(arm_position)
-        transposed = np.swapaxes(jacobian, -1, -2)
+        transposed = jacobian.swapaxes(-1, -2)
         error = target - wrist
         distance = np.sqrt(np.vecdot(error, error))
         near = np.minimum(distance, settings.longest_step)

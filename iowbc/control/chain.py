@@ -19,6 +19,7 @@ hinges at a quarter turn its end lies 0.3 m below the elbow, which lies 0.2 m to
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -28,12 +29,14 @@ from iowbc.robot.mjcf import Body
 
 PLANES = (slice(1, 3), slice(2, None, -2), slice(0, 2))
 """Components that a turn about x, y and z mixes, in the order in which the first turns towards the second."""
+SWAPPED = (slice(2, 0, -1), slice(0, 3, 2), slice(1, None, -1))
+"""The same in the other order."""
 
 
 def turn(vectors: Array, axis: int, angle: Array) -> None:
     """Turns vectors (3, k, ...) in place about a coordinate axis by angles (...) [rad]."""
     cosine, sines = cosine_and_sines(angle[None])
-    mix(vectors, axis, cosine[0], sines[0])
+    mix(vectors, PLANES[axis], cosine[0], sines[0])
 
 
 def cosine_and_sines(angle: Array) -> tuple[Array, Array]:
@@ -44,9 +47,9 @@ def cosine_and_sines(angle: Array) -> tuple[Array, Array]:
     return np.cos(angle), sines
 
 
-def mix(vectors: Array, axis: int, cosine: Array, sines: Array) -> None:
-    """As `turn`, from cosines (...) and the pair of -sine and sine, (2, 1, ...)."""
-    pair = vectors[PLANES[axis]]
+def mix(vectors: Array, plane: slice, cosine: Array, sines: Array) -> None:
+    """As `turn`, in one of the `PLANES`, from cosines (...) and the pair of -sine and sine, (2, 1, ...)."""
+    pair = vectors[plane]
     crossed = pair[::-1] * sines
     pair *= cosine
     pair += crossed
@@ -70,24 +73,9 @@ class Chain:
         has one."""
         links = [_links(chain) for chain in chains]
         self.length = len(links[0])
-        self._axis: list[int] = []
-        self._sign = np.ones((self.length, len(chains), 1))
-        self._offset = np.empty((self.length, 3, len(chains), 1))
-        self._before: list[Array | None] = []
-        self._after: list[Array | None] = []
-        for j in range(self.length):
-            axes = np.stack([link[j].axis for link in links])
-            fixed = np.stack([link[j].rotation for link in links])
-            axis = int(np.argmax(np.abs(axes[0])))
-            aside = np.stack([_turning_to(one, axis) for one in axes])
-            if np.allclose(np.abs(axes), np.eye(3)[axis]):
-                self._sign[j, :, 0] = axes[:, axis]
-                aside[:] = np.eye(3)
-            self._axis.append(axis)
-            self._offset[j, :, :, 0] = np.stack([link[j].position for link in links], axis=-1)
-            self._before.append(_unless_identity(np.swapaxes(aside, 1, 2)))
-            self._after.append(_unless_identity(fixed @ aside))
-        self._quarter = np.stack([-self._sign, self._sign], axis=1)
+        self._hinges = [_Hinge.of([link[j] for link in links]) for j in range(self.length)]
+        """From the base outward."""
+        self._sign = np.stack([hinge.sign for hinge in self._hinges])
 
     def carry(self, angle: Array, vectors: Array, columns: int = 0, weights: Weights | None = None) -> None:
         """Takes vectors from the last bodies' frames to the bases', in place.
@@ -100,38 +88,74 @@ class Chain:
         """
         cosine, sines = cosine_and_sines(np.multiply(angle, self._sign, order="C"))
         vectors[:, :columns] = 0.0
+        carried, last = vectors[:, columns:], vectors[:, -1]
         for j in reversed(range(self.length)):
-            axis, plane = self._axis[j], PLANES[self._axis[j]]
-            first = min(columns, j + 1)
-            carried = vectors[:, first:]
+            hinge = self._hinges[j]
             if weights is not None:
-                carried[:, -1] += weights.moment[j]
-            _apply(self._before[j], carried)
-            mix(carried, axis, cosine[j], sines[j])
+                last += weights.moment[j]
+            if hinge.before is not None:
+                _apply(hinge.before, carried)
+            mix(carried, hinge.plane, cosine[j], sines[j])
             if columns:
-                first = j
-                np.multiply(vectors[plane, -1][::-1], self._quarter[j], out=vectors[plane, j])
-            _apply(self._after[j], vectors[:, first:])
-            vectors[:, -1] += self._offset[j] if weights is None else weights.carried[j] * self._offset[j]
+                np.multiply(last[hinge.swapped], hinge.quarter, out=vectors[hinge.plane, j])
+                carried = vectors[:, j:]
+            if hinge.after is not None:
+                _apply(hinge.after, carried)
+            last += hinge.offset if weights is None else weights.carried[j] * hinge.offset
 
     def fetch(self, angle: Array, points: Array) -> None:
         """Takes points (3, k, chains, n) from the bases' frames to the last bodies', in place; inverse of `carry`."""
         cosine, sines = cosine_and_sines(np.multiply(angle, -self._sign, order="C"))
-        for j in range(self.length):
-            points -= self._offset[j][:, None]
-            _apply(_inverse(self._after[j]), points)
-            mix(points, self._axis[j], cosine[j], sines[j])
-            _apply(_inverse(self._before[j]), points)
+        for j, hinge in enumerate(self._hinges):
+            points -= hinge.offset[:, None]
+            if hinge.after is not None:
+                _apply(hinge.after.swapaxes(0, 1), points)
+            mix(points, hinge.plane, cosine[j], sines[j])
+            if hinge.before is not None:
+                _apply(hinge.before.swapaxes(0, 1), points)
 
 
-def _inverse(rotation: Array | None) -> Array | None:
-    return None if rotation is None else rotation.swapaxes(0, 1)
+@dataclass(frozen=True)
+class _Hinge:
+    """A hinge of each of the chains, with what it takes from the frame of the body that it moves to that before."""
+
+    plane: slice
+    """Components that a turn about its coordinate axis mixes."""
+    swapped: slice
+    """The same in the other order."""
+    sign: Array
+    """Of its turns about that axis, (chains, 1)."""
+    quarter: Array
+    """The pair of -sign and sign, (2, chains, 1)."""
+    before: Array | None
+    """Rotation before the turn, (3, 3, chains), and after it."""
+    after: Array | None
+    offset: Array
+    """Its place in the frame before, (3, chains, 1) [m]."""
+
+    @classmethod
+    def of(cls, links: Sequence["_Link"]) -> Self:
+        """The hinges of equal rank, one a chain."""
+        axes, fixed = np.stack([link.axis for link in links]), np.stack([link.rotation for link in links])
+        axis = int(np.argmax(np.abs(axes[0])))
+        aside, sign = np.stack([_turning_to(one, axis) for one in axes]), np.ones((len(links), 1))
+        if np.allclose(np.abs(axes), np.eye(3)[axis]):
+            sign[:, 0] = axes[:, axis]
+            aside[:] = np.eye(3)
+        return cls(
+            plane=PLANES[axis],
+            swapped=SWAPPED[axis],
+            sign=sign,
+            quarter=np.stack([-sign, sign]),
+            before=_unless_identity(np.swapaxes(aside, 1, 2)),
+            after=_unless_identity(fixed @ aside),
+            offset=np.stack([link.position for link in links], axis=-1)[..., None],
+        )
 
 
-def _apply(rotation: Array | None, vectors: Array) -> None:
+def _apply(rotation: Array, vectors: Array) -> None:
     """Multiplies vectors (3, k, chains, n) in place by matrices (3, 3, chains)."""
-    if rotation is not None:
-        vectors[:] = np.einsum("rcs,cksn->rksn", rotation, vectors)
+    vectors[:] = np.einsum("rcs,cksn->rksn", rotation, vectors)
 
 
 def _unless_identity(rotation: Array) -> Array | None:

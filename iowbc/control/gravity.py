@@ -7,6 +7,9 @@ from iowbc.control.arms import arm_chains
 from iowbc.control.chain import Chain, Weights
 from iowbc.robot.description import GRAVITY, Robot
 
+AXES = np.eye(3)[:, :, None, None]
+"""The unit vectors side by side, as `Chain.carry` takes them."""
+
 
 class ArmGravity:
     """Static torques of both arms, many robots at once. Holds constants only."""
@@ -27,7 +30,8 @@ class ArmGravity:
         """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
 
         `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or referred to; `gravity` (n, 3): its
-        direction in the base frame, (0, 0, -1) when upright; `load` (n, 2): mass that hangs on each grip point [kg].
+        direction in the base frame, (0, 0, -1) when upright; `load` (n, 2), or (n, 1) where it is the same on both:
+        mass that hangs on each grip point [kg].
 
         The torque of hinge i is -(a_i × Σ_k m_k (c_k - o_i))·g over the links k from i outward, with its axis a_i and
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
@@ -42,7 +46,7 @@ class ArmGravity:
         weights = Weights(self._moment, carried)
         self._arms.carry(arms.reshape(count, 2, hinges).transpose(2, 1, 0), moments, hinges, weights)
         axes = np.zeros((3, 4, 1, count))
-        axes[range(3), range(3)] = 1.0
+        axes[:, :3] = AXES
         self._waist.carry(waist.T[:, None], axes)
         down = np.einsum("xkn,nx->kn", axes[:, :3, 0], GRAVITY * gravity)
         torque: Array = -np.einsum("xjsn,xn->nsj", moments[:, :hinges], down)

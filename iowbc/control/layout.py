@@ -74,6 +74,5 @@ class Layout(Generic[Source]):
 
     def gather(self, source: Source, out: Row, which: NDArray[np.intp] | slice = EVERY) -> Row:
         """Fills rows (k, size) with the parts of some of the source's n environments."""
-        for part, place in zip(self.parts, self.slices.values(), strict=True):
-            out[:, place] = part.value(source)[which].reshape(len(out), -1)
-        return out
+        rows = len(out)
+        return np.concatenate([part.value(source)[which].reshape(rows, -1) for part in self.parts], axis=1, out=out)

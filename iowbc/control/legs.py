@@ -42,6 +42,13 @@ class Legs:
     """Direction of the hip yaw axis."""
     ankle_roll_z: Array
     """The ankle roll axis above the sole's centre."""
+    thigh_squared: Array
+    shank_squared: Array
+    """Squared lengths of thigh and shank [m²]."""
+    twice_product: Array
+    """Twice the product of their lengths [m²]."""
+    crooked: Array
+    """Angle that the shank makes with the thigh, positive bent back [rad]."""
 
 
 def leg_joints(robot: Robot) -> list[list[int]]:
@@ -74,15 +81,17 @@ def leg_geometry(robot: Robot) -> Legs:
                 direction.append(rotation @ body.hinge.axis)
         end = robot.tree.forward(dict.fromkeys(robot.joints, 0.0), robot.base, sole)[0]
         hip, roll, yaw, knee, ankle, ankle_roll = place
+        thigh, shank = knee - hip, ankle - knee
+        thigh_squared, shank_squared = (link[0] * link[0] + link[2] * link[2] for link in (thigh, shank))
         rows.append(
             Legs(
                 side=end[1],
                 hip_x=hip[0],
                 hip_z=hip[2],
-                thigh_x=(knee - hip)[0],
-                thigh_z=(knee - hip)[2],
-                shank_x=(ankle - knee)[0],
-                shank_z=(ankle - knee)[2],
+                thigh_x=thigh[0],
+                thigh_z=thigh[2],
+                shank_x=shank[0],
+                shank_z=shank[2],
                 sole_x=(end - ankle)[0],
                 sole_z=(end - ankle)[2],
                 roll_x=(roll - hip)[0],
@@ -92,6 +101,10 @@ def leg_geometry(robot: Robot) -> Legs:
                 tilt_x=direction[2][0],
                 tilt_z=direction[2][2],
                 ankle_roll_z=(ankle_roll - end)[2],
+                thigh_squared=thigh_squared,
+                shank_squared=shank_squared,
+                twice_product=2.0 * np.sqrt(thigh_squared * shank_squared),
+                crooked=np.arctan2(-shank[0], -shank[2]) - np.arctan2(-thigh[0], -thigh[2]),
             )
         )
     return Legs(**{field.name: np.array([getattr(row, field.name) for row in rows]) for field in fields(Legs)})

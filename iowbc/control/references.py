@@ -122,8 +122,8 @@ class ReferenceLayer:
         if self._gravity is None:
             return arms
         pitch = self.pelvis_pitch(support, command)
-        down = np.stack([np.sin(pitch), np.zeros_like(pitch), -np.cos(pitch)], axis=1)
-        each = np.repeat(0.5 * load[:, None], 2, axis=1)
-        torque = self._gravity.torque(arms, support[:, self.waist], down, each)
+        down = np.zeros((len(pitch), 3))
+        down[:, 0], down[:, 2] = np.sin(pitch), -np.cos(pitch)
+        torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None])
         target: Array = arms + torque * self._compliance
         return target

@@ -81,7 +81,7 @@ class Stride:
         moved = [change, hip_roll, hip_yaw, bend, -change - bend, ankle_roll]
         others = 0.0 * posture[:, : len(self.order) - 2 * len(moved)]
         changes = xp.concatenate([*moved, others], -1)[:, list(self.order)]
-        walked: Array = xp.clip(posture + changes, self.lower, self.upper)
+        walked: Array = (posture + changes).clip(self.lower, self.upper)
         return walked
 
     def _soles(
@@ -109,10 +109,8 @@ class Stride:
         d² = l₁² + l₂² + 2 l₁l₂ cos(knee + κ) for links that make the angle κ with the knee at zero.
         """
         legs = self.legs
-        crooked = _forward(xp, legs.shank_x, legs.shank_z) - _forward(xp, legs.thigh_x, legs.thigh_z)
-        thigh, shank = legs.thigh_x**2 + legs.thigh_z**2, legs.shank_x**2 + legs.shank_z**2
-        cosine = (x * x + z * z - thigh - shank) / (2.0 * xp.sqrt(thigh * shank))
-        knee = xp.arccos(xp.clip(cosine, -1.0, float(np.cos(self.settings.straightest_knee)))) - crooked
+        cosine = (x * x + z * z - legs.thigh_squared - legs.shank_squared) / legs.twice_product
+        knee = xp.arccos(cosine.clip(-1.0, float(np.cos(self.settings.straightest_knee)))) - legs.crooked
         return knee, _forward(xp, x, z) - _forward(xp, *_ankle(xp, legs, knee))
 
 

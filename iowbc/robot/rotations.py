@@ -4,14 +4,15 @@ import numpy as np
 
 from iowbc.arrays import Array
 
-NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""Places of the components that follow x, y and z in turn, and of those that follow these."""
+NEXT = np.array([1, 2, 0])
+"""Places of the components that follow x, y and z in turn."""
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a × b, shapes (..., 3)."""
-    out: Array = a.take(NEXT, axis=-1) * b.take(LAST, axis=-1)
-    out -= a.take(LAST, axis=-1) * b.take(NEXT, axis=-1)
+    """a × b, shapes (..., 3): z, x and y of it from the components of a and b in order and those that follow."""
+    before = a * b.take(NEXT, axis=-1)
+    before -= a.take(NEXT, axis=-1) * b
+    out: Array = before.take(NEXT, axis=-1)
     return out
 
 

@@ -23,13 +23,13 @@ class DelayLine:
     def set_latency(self, which: Indices, latency: Array) -> None:
         """Latencies of some environments, (k,) [periods]."""
         longest = self._length - 2
-        if np.any(latency > longest) or np.any(latency < 0.0):
+        if latency.max() > longest or latency.min() < 0.0:
             worst = latency[np.argmax(np.abs(latency))]
             raise ValueError(
                 f"a latency of {worst:g} periods is outside 0 to {longest}; see randomization.longest_latency"
             )
-        self._whole[which] = np.floor(latency).astype(np.int64)
-        self._part[which, 0] = latency - np.floor(latency)
+        whole = np.floor(latency)
+        self._whole[which], self._part[which, 0] = whole, latency - whole
         self._point(which)
 
     def _point(self, which: Indices) -> None:
@@ -46,8 +46,8 @@ class DelayLine:
 
     def push(self, value: Array) -> None:
         """Adds the newest value, (n, width)."""
-        self._newest[0] = (self._newest[0] + 1) % self._length
-        self._values[self._newest[0]] = value
+        newest = (int(self._newest[0]) + 1) % self._length
+        self._newest[0], self._values[newest] = newest, value
 
     def read(self) -> Array:
         """The values as each environment sees them, (n, width): (1 - f) x[k periods ago] + f x[k + 1 periods ago].

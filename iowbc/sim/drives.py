@@ -16,6 +16,9 @@ class Drives:
         self.effort = np.tile(robot.effort, (n, 1))
         """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
         self._slope = 1.0 / ((1.0 - physics.torque_corner) * robot.velocity_limit)
+        self._at_rest = self._slope * robot.velocity_limit
+        """What a motor could give at rest as a multiple of its limit."""
+        self._kp, self._kd = robot.kp[robot.linkages], robot.kd[robot.linkages]
         self._range = np.zeros((n, len(robot.joints), 2))
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
@@ -35,18 +38,19 @@ class Drives:
         self._share(effort, target, state)
         reserve = state.joint_velocity * self._slope
         ranges = self._range
-        ranges[..., 1] = effort * (self._slope * self._robot.velocity_limit - reserve).clip(0.0, 1.0)
-        ranges[..., 0] = -effort * (self._slope * self._robot.velocity_limit + reserve).clip(0.0, 1.0)
+        ranges[..., 1] = effort * (self._at_rest - reserve).clip(0.0, 1.0)
+        ranges[..., 0] = -effort * (self._at_rest + reserve).clip(0.0, 1.0)
         return ranges
 
     def _share(self, effort: Array, target: Array, state: SimulationState) -> None:
-        robot, pairs = self._robot, self._robot.linkages
+        pairs = self._robot.linkages
         if not len(pairs):
             return
-        wanted = robot.kp[pairs] * (target[:, pairs] - state.joint_position[:, pairs])
-        wanted -= robot.kd[pairs] * state.joint_velocity[:, pairs]
-        np.abs(np.nan_to_num(wanted, copy=False), out=wanted)
-        limit = effort[:, pairs]
+        wanted = self._kp * (target - state.joint_position).take(pairs, axis=1)
+        wanted -= self._kd * state.joint_velocity.take(pairs, axis=1)
+        np.abs(wanted, out=wanted)
+        np.copyto(wanted, 0.0, where=np.isnan(wanted))
+        limit = effort.take(pairs, axis=1)
         both = wanted[..., 0] + wanted[..., 1]
         scale = np.minimum(1.0, limit[..., 0] / np.maximum(both, 1e-9))
         effort[:, pairs] = limit - wanted[..., ::-1] * scale[..., None]

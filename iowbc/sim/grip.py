@@ -44,7 +44,7 @@ class Grip:
         holding = 0.5 * (connected[:, 0] + connected[:, 1])
         most = 2.0 * TORSION * slip_force * holding
         reach = most / np.maximum(stiffness, TINY)
-        np.clip(self.angle, -reach, reach, out=self.angle)
+        self.angle.clip(-reach, reach, out=self.angle)
         damping = np.minimum(self._grasp.swing_damping * inertia, stable)
         size = (stiffness * self.angle + damping * rate).clip(-most, most)
         torque: Array = axis * -size[:, None]

@@ -41,7 +41,7 @@ class ModelFields:
         return mass
 
     def write(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
-        """Sets the models of simulations `ids` from rows of drawn values in the same order."""
+        """Sets the models of simulations `ids`, which rise, from rows of drawn values in the same order."""
         links, speeds = self._layout.links, self._layout.joint_speeds
         fields, nominal = self._fields, self._nominal
         mass = drawn["link_mass_scale"]
@@ -58,7 +58,7 @@ class ModelFields:
         fields["geom_friction"][ids[:, None], self._layout.foot_geoms, 0] = drawn["ground_friction"][:, None]
         if self._layout.object is not None:
             self._write_object(ids, drawn)
-        self._derive(np.sort(ids))
+        self._derive(ids)
 
     def _derive(self, ids: Indices) -> None:
         """What follows from the fields; wheels give way alike in whatever direction they were turned last."""

@@ -38,7 +38,9 @@ class Partner:
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
         ahead = np.array([0.5 * thing.size[0] if thing else 0.0 for thing in things])
         above = np.array([scene.grasp.height if scene.kind == "lift" else 0.0 for scene in scenes])
-        self._handle = np.stack([ahead, np.zeros(n), above], axis=1)
+        self._places = np.zeros((n, 2, 3))
+        """The handle and the centre of mass on the object, object frame [m]."""
+        self._places[:, 0, 0], self._places[:, 0, 2] = ahead, above
         slowest = np.array([inertia_per_mass(thing)[1:].min() if thing else 1.0 for thing in things])
         self._felt = 1.0 / (1.0 + (ahead * ahead + above * above) / slowest)
         self._line = DelayLine(n, FEED, recipe.delay.high / period)
@@ -47,12 +49,12 @@ class Partner:
         self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)
         self._present, self._height = np.zeros(n), np.full(n, np.nan)
         self._heading, self._offset = np.zeros((n, 2)), np.zeros((n, 2))
-        self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 3))
+        self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), self._places[:, 1]
         self._at, self._speed, self._arm = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._force, self._energy = np.zeros((n, 3)), np.zeros(n)
         self._keep = float(np.exp(-period / recipe.noise_time))
         self._keep_share = float(np.exp(-period / recipe.drift_time))
-        self._any = False
+        self._derive()
 
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """New partners for some environments, at rest at the handle."""
@@ -87,7 +89,13 @@ class Partner:
         away = (self._at - state.base_position)[which]
         self._offset[which, 0] = forward[:, 0] * away[:, 0] + forward[:, 1] * away[:, 1]
         self._offset[which, 1] = forward[:, 0] * away[:, 1] - forward[:, 1] * away[:, 0]
+        self._derive()
+
+    def _derive(self) -> None:
+        """What follows from the shares that were drawn."""
         self._any = bool(self._present.any())
+        sign = np.sign(self._share)
+        self._least, self._most = np.minimum(0.0, sign), np.maximum(0.0, sign)
 
     def wrench(self, commanded: Array, gust: Array, state: SimulationState, out: Array) -> None:
         """Force and torque about the object's centre of mass, written to `out` (n, 6), of the period to come.
@@ -127,15 +135,15 @@ class Partner:
         """The share wanders about the one drawn; it neither changes sign nor passes one."""
         self._wandering *= self._keep_share
         self._wandering += self._drift * chance
-        low, high = np.minimum(0.0, np.sign(self._share)), np.maximum(0.0, np.sign(self._share))
-        state.partner_share[:] = (self._share + self._wandering).clip(low, high) * self._present
+        state.partner_share[:] = (self._share + self._wandering).clip(self._least, self._most) * self._present
 
     def _path(self, commanded: Array) -> Array:
         """Velocity of the path at the handle, (n, 3) [m/s], after the partner's delay; turns the path's heading."""
-        risen = np.nan_to_num(commanded[:, 3] - self._height) / self._period
-        self._height[:] = commanded[:, 3]
         heard = commanded.copy()
-        heard[:, 3] = risen
+        risen = commanded[:, 3] - self._height
+        risen[np.isnan(risen)] = 0.0
+        np.divide(risen, self._period, out=heard[:, 3])
+        self._height[:] = commanded[:, 3]
         self._line.push(heard)
         wanted = self._line.read()
         cosine, sine = self._heading.T
@@ -170,10 +178,11 @@ class Partner:
         state.partner_energy[:] = self._energy
 
     def _observe(self, state: SimulationState) -> None:
-        out = rotations.rotate(state.object_quaternion, self._handle)
+        places = rotations.rotate(state.object_quaternion[:, None], self._places)
+        out = places[:, 0]
         self._at = state.object_position + out
         self._speed = state.object_linear_velocity + rotations.cross(state.object_angular_velocity, out)
-        self._arm = out - rotations.rotate(state.object_quaternion, self._centre)
+        self._arm = out - places[:, 1]
 
     def handle(self, env: int) -> Array:
         """The far handle of one environment's object, (3,) [m]."""
@@ -187,7 +196,7 @@ class Partner:
 
     def restored(self) -> None:
         """To be called after the memory was written from outside."""
-        self._any = bool(self._present.any())
+        self._derive()
         self._line.restored()
 
 

@@ -182,7 +182,8 @@ class Simulation:
         state = self.state
         state.diverged[which] = False
         for world, ids, chosen in self._parts(which):
-            drawn = {name: values[world.rows[ids]] for name, values in self.drawn.items()}
+            rows = which[chosen]
+            drawn = {name: values[rows] for name, values in self.drawn.items()}
             world.reset(ids, joint_position[chosen], pitch[chosen], heading[chosen], drawn)
             world.gather(state)
             self._robot_mass[world.place] = world.robot_mass
@@ -236,7 +237,7 @@ class Simulation:
     def _hand_over(self, wrench: Array) -> None:
         """Bears at first the robot's part of a held object's weight between its hands, less and less:
         f = (1 - share) m g (1 - t / T)."""
-        if np.any(self.clock < self._handover):
+        if (self.clock < self._handover).any():
             left = np.maximum(self._handover - self.clock, 0.0) / np.maximum(self._handover, 1.0)
             drawn, lifted = self.drawn, np.zeros((self.n, 3))
             lifted[:, 2] = GRAVITY * left * (1.0 - drawn["partner_share"]) * drawn["object_mass"]
@@ -250,9 +251,10 @@ class Simulation:
         self._sensing.deliver(self._noise[:, : self._sensing.noise_width])
 
     def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
-        """Worlds that some environments belong to, with their indices in the world and in `which`."""
+        """Worlds that some environments belong to, with their indices in the world, rising, and in `which`."""
+        order = np.argsort(which)
         for world in self.worlds:
-            chosen = np.flatnonzero(np.isin(which, world.rows))
+            chosen = order[np.isin(which[order], world.rows)]
             if len(chosen):
                 yield world, np.searchsorted(world.rows, which[chosen]), chosen
 

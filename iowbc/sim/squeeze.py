@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import Array, Indices, as_slice
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 
@@ -14,7 +14,8 @@ class Squeeze:
 
     def __init__(self, robot: Robot, batch: Any, places: str, hands: slice | Indices) -> None:
         """`places`: the field of MuJoCo's data where the points lie with which `hands` press."""
-        self._hands, self._arms = hands, robot.interaction
+        self._hands, self._arms = hands, as_slice(robot.interaction)
+        self._hinges = as_slice(robot.interaction + 1)
         self._anchor, self._axis, self._place = batch.bind("xanchor"), batch.bind("xaxis"), batch.bind(places)
         self._compliance = 1.0 / robot.kp[robot.interaction]
 
@@ -24,9 +25,8 @@ class Squeeze:
         points = self._place[:, self._hands]
         inward = points[:, ::-1] - points
         inward *= (force[:, None] / np.sqrt(np.vecdot(inward, inward)))[..., None]
-        hinges = self._arms + 1
-        half = len(hinges) // 2
-        lever = np.repeat(points, half, axis=1) - self._anchor[:, hinges]
-        torque = self._axis[:, hinges] * rotations.cross(lever, np.repeat(inward, half, axis=1))
-        target[:, self._arms] += torque.sum(axis=2) * self._compliance
+        by_arm = (len(points), 2, -1, 3)
+        lever = points[:, :, None] - self._anchor[:, self._hinges].reshape(by_arm)
+        torque = self._axis[:, self._hinges].reshape(by_arm) * rotations.cross(lever, inward[:, :, None])
+        target[:, self._arms] += torque.sum(axis=3).reshape(len(points), -1) * self._compliance
         return inward, points

@@ -87,11 +87,11 @@ class World:
         self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
-        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate before them."""
-        order = np.argsort(ids)
-        ids, joint_position, pitch, yaw = ids[order], joint_position[order], pitch[order], yaw[order]
+        """Robot in the posture, lowest sole corner on the ground; object in the hands or crate before them.
+
+        `ids` (k,) rise; all else has a row for each.
+        """
         self.batch.reset(ids, stage=NOTHING)
-        drawn = {name: values[order] for name, values in drawn.items()}
         self.fields.write(ids, drawn)
         self.qpos[ids, :3] = (0.0, 0.0, 1.0)
         self.qpos[ids, 3:7] = rotations.from_euler(np.zeros_like(pitch), pitch, yaw)
@@ -189,7 +189,7 @@ class World:
         """Marks what warned, or moves too fast or not in numbers, and puts it back to the start of the period."""
         counts, fastest = self._warning_counts, self.physics.fastest
         calm = self.qvel.max() < fastest and self.qvel.min() > -fastest
-        if calm and np.array_equal(counts, self._warnings) and not diverged.any():
+        if calm and (counts == self._warnings).all() and not diverged.any():
             return
         diverged |= (counts != self._warnings).any(axis=1)
         diverged |= ~(np.abs(self.qvel).max(axis=1) < fastest)

@@ -86,7 +86,7 @@ class Batch:
             period=period,
         )
         self._pushes = PlannedPushes(schedule.pushes, period)
-        self.observer = Observer(self.robot, self.layout, n)
+        self.observer = Observer(self.robot, self.layout, self.simulation, self.memory)
         self._bound, self._divergences = task.action.bound, divergences
 
     @property
@@ -112,12 +112,11 @@ class Batch:
         if self._schedule.repeats:
             self.memory.episode[:] = 0
             self.simulation.episode[:] = 0
-        self.begin(np.arange(self.n))
+        moved = self.begin(np.arange(self.n))
         for name in ("reward", "done", "truncated", "terminal_observation"):
             self.buffers[name][:] = 0
-        moved, nothing = self.judge.motion(self.simulation.state), Ending.none(self.n)
         self._observe(moved)
-        write_signals(self.buffers, self.simulation.state, moved, self.memory, nothing, self.period)
+        write_signals(self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period)
 
     def step(self) -> None:
         """One control step of every environment; those that end begin anew."""
@@ -125,7 +124,8 @@ class Batch:
         action = self.buffers["action"].astype(np.float64).clip(-self._bound, self._bound)
         simulation.target[:] = self.targets(action)
         simulation.feed[:, :3] = memory.command[:, VELOCITY]
-        simulation.feed[:, 3] = memory.command[:, HEIGHT] + memory.command[:, OFFSET][:, 2::3].mean(axis=1)
+        left, right = memory.command[:, OFFSET][:, 2::3].T
+        simulation.feed[:, 3] = memory.command[:, HEIGHT] + 0.5 * (left + right)
         if self._pushes.any:
             simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)
         simulation.step()
@@ -161,11 +161,11 @@ class Batch:
         count_endings(buffers, ending, self._schedule.causes(ending), which)
         self._schedule.promote(ending, which)
         keep_divergences(self.simulation.divergences, self._divergences)
-        self.begin(which)
-        self._observe(self.judge.motion(self.simulation.state), which)
+        self._observe(self.begin(which), which)
 
-    def begin(self, which: Indices) -> None:
-        """Starts new episodes in some environments, (k,): commands, references, robot and object."""
+    def begin(self, which: Indices) -> Motion:
+        """Starts new episodes in some environments, (k,): commands, references, robot and object. Returns the motion of
+        all."""
         memory = self.memory
         key = self._schedule.start(which)
         joints, pitch = self.guidance.start(which, memory, key)
@@ -180,9 +180,10 @@ class Batch:
         memory.object_place[which] = 0.0
         away = moved.object_offset - self.guidance.object_place(memory)
         memory.object_place[which] = away[which] * self._holding[which, None]
+        return moved
 
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
-        self.observer.write(self.buffers["observation"], self.simulation, moved, self.memory, which)
+        self.observer.write(self.buffers["observation"], moved, which)
 
     def __len__(self) -> int:
         return self.n

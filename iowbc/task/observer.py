@@ -19,25 +19,21 @@ EVERY = slice(None)
 
 
 class Observer:
-    """Writes what policy and critic see of n environments."""
+    """Writes what policy and critic see of a simulation's environments."""
 
-    def __init__(self, robot: Robot, layout: FullLayout, n: int) -> None:
+    def __init__(self, robot: Robot, layout: FullLayout, simulation: Simulation, memory: Memory) -> None:
         self._layout, self._support, self._arms = layout, as_slice(robot.support), as_slice(robot.interaction)
-        self._joint_reference = np.tile(robot.default_position, (n, 1))
+        self._simulation, self._memory = simulation, memory
+        self._measured = Measured.of(simulation.measured)
+        self._joint_reference = np.tile(robot.default_position, (simulation.n, 1))
 
-    def write(
-        self,
-        rows: NDArray[np.float32],
-        simulation: Simulation,
-        moved: Motion,
-        memory: Memory,
-        which: Indices | slice = EVERY,
-    ) -> None:
+    def write(self, rows: NDArray[np.float32], moved: Motion, which: Indices | slice = EVERY) -> None:
         """Writes the rows of some environments among all, (n, layout.size)."""
+        memory, simulation = self._memory, self._simulation
         self._joint_reference[:, self._support] = memory.support
         self._joint_reference[:, self._arms] = memory.arms
         sensed = Sensed(
-            measured=Measured.of(simulation.measured),
+            measured=self._measured,
             command=memory.command,
             heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],
             joint_reference=self._joint_reference,

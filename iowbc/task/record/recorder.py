@@ -76,16 +76,17 @@ def count_step(buffers: Buffers, judgement: Judgement, memory: Memory) -> None:
     counters, scored = buffers["counters"], judgement.scored
     buffers["terms"][:] += scored.terms
     counters[:, COLUMN["steps"]] += 1.0
-    counters[:, COLUMN["tracking"]] += scored.tracking.mean(axis=1)
+    counters[:, COLUMN["tracking"]] += scored.tracking.sum(axis=1) / scored.tracking.shape[1]
     moved, command = judgement.motion, judgement.command
     errors = np.empty((len(command), 1 + len(ERRORS)))
     errors[:, 0] = 1.0
-    errors[:, 1] = np.linalg.norm(memory.filtered_velocity[:, :YAW_RATE] - command[:, :YAW_RATE], axis=1)
+    away = memory.filtered_velocity[:, :YAW_RATE] - command[:, :YAW_RATE]
+    errors[:, 1] = np.sqrt(np.square(away).sum(axis=1))
     errors[:, 2] = judgement.heading_error
     errors[:, 3] = moved.height - command[:, HEIGHT]
     errors[:, 4] = moved.torso_pitch - command[:, PITCH]
     np.abs(errors, out=errors)
-    walking = np.any(command[:, VELOCITY], axis=1, keepdims=True)
+    walking = command[:, VELOCITY].any(axis=1, keepdims=True)
     counters[:, STANDING] += errors * ~walking
     counters[:, WALKING] += errors * walking
 

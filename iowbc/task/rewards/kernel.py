@@ -7,7 +7,7 @@ from iowbc.arrays import Array
 
 def kernel(squared_error: Array, width: float | Array) -> Array:
     """exp(−e²/width²), (n,) or (n, k): 1 without error, 0.37 at an error of `width`, one or (k,)."""
-    score: Array = np.exp(squared_error / -np.square(width))
+    score: Array = np.exp(squared_error / -(width * width))
     return score
 
 

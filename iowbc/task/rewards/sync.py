@@ -35,14 +35,14 @@ def progress(velocity: Array, command: Array) -> Array:
     """
     speed = np.hypot(command[:, 0], command[:, 1])
     along = np.vecdot(velocity, command) / np.maximum(speed, SLOW)
-    clipped: Array = np.clip(along, -speed, speed)
+    clipped: Array = along.clip(-speed, speed)
     return clipped
 
 
 def turning(rate: Array, command: Array) -> Array:
     """Yaw rate towards the commanded one, no more than commanded, (n,) [rad/s]."""
     limit = np.abs(command)
-    clipped: Array = np.clip(rate * np.sign(command), -limit, limit)
+    clipped: Array = (rate * np.sign(command)).clip(-limit, limit)
     return clipped
 
 
