@@ -93,7 +93,7 @@ def findings(runs: Runs) -> Iterator[Finding]:
     """Everything that is looked at, essential things first."""
     yield _python()
     yield from _packages()
-    yield _robot()
+    yield from _robots()
     yield _process("crocoddyl and pin", CONTACT_MODEL, _contact_verdict)
     yield _process("pictures", PICTURE, _picture_verdict)
     yield _cores()
@@ -129,14 +129,20 @@ def _packages() -> Iterator[Finding]:
     yield Finding("packages", "good", ", ".join(fitting))
 
 
-def _robot() -> Finding:
-    from iowbc.robot.description import load_robot, robot_folder
+def _robots() -> Iterator[Finding]:
+    """Every robot that a recipe can name."""
+    from iowbc.robot.description import load_robot, robot_folders
 
-    try:
-        robot = load_robot(robot_folder("g1"))
-    except (OSError, ValueError) as error:
-        return Finding("robot", "bad", str(error))
-    return Finding("robot", "good", f"{robot.name} with {len(robot.joints)} joints in {robot.folder}")
+    folders = robot_folders()
+    if not folders:
+        yield Finding("robot", "bad", "no description of any robot is there; install iowbc again")
+    for folder in folders.values():
+        try:
+            robot = load_robot(folder)
+        except (OSError, ValueError) as error:
+            yield Finding(f"robot {folder.name}", "bad", str(error))
+        else:
+            yield Finding(f"robot {robot.name}", "good", f"{len(robot.joints)} joints, {folder}")
 
 
 def _process(name: str, script: str, verdict: Callable[[int, str, str], tuple[Verdict, str]]) -> Finding:

@@ -1,10 +1,13 @@
 """What `iowbc play` plays: a recipe's policy, one artifact, or an exported folder."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from iowbc.commands.filming import Filming
+from iowbc.commands.in_training import InTraining, in_training
 from iowbc.commands.named import named
 from iowbc.commands.training import require_training
 from iowbc.errors import Damaged, Interrupted, UsageError
@@ -15,6 +18,7 @@ from iowbc.pipeline.store.store import Store
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
+    from iowbc.task.specification import Specification
 
 POLICIES = ("export", "distill", "teacher")
 """Stages that leave a policy, the one to prefer first."""
@@ -25,21 +29,13 @@ CONTRACT = "contract.json"
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
-    artifact = None if (Path(word) / CONTRACT).is_file() else playable(store, word, stage)
-    generator = None
-    if artifact is not None:
-        generator = generator_of(store, artifact)
-        for read in filter(None, (artifact, generator)):
-            _check_whole(store, read)
+    source = _named_source(store, console, word, stage)
 
-    from iowbc.evaluation.play import exported_source, play
+    from iowbc.evaluation.play import play
 
     try:
-        if artifact is None or artifact.manifest.stage == "export":
-            source = exported_source(artifact.folder if artifact is not None else Path(word))
-        else:
-            source = _source(artifact, generator)
-        shown = play(source, request)
+        with Filming(console, request.video) as filming:
+            shown = play(source, request, progress=filming)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return 0
@@ -47,6 +43,24 @@ def play_word(store: Store, console: Console, word: str, stage: str | None, requ
     text = f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}"
     console.print(text, markup=False, highlight=False, soft_wrap=True)
     return 0
+
+
+def _named_source(store: Store, console: Console, word: str, stage: str | None) -> "Source":
+    """What a word and `--stage` name. Raises `UsageError`."""
+    from iowbc.evaluation.play import exported_source
+
+    if (Path(word) / CONTRACT).is_file():
+        return exported_source(Path(word))
+    training = in_training(store, word, stage)
+    if training is not None:
+        console.print(training.text, markup=False, highlight=False, soft_wrap=True)
+        if training.recipe is not None:
+            return _training_source(store, training, training.recipe)
+    artifact = playable(store, word, stage)
+    generator = generator_of(store, artifact)
+    for read in filter(None, (artifact, generator)):
+        _check_whole(store, read)
+    return exported_source(artifact.folder) if artifact.manifest.stage == "export" else _source(artifact, generator)
 
 
 def playable(store: Store, word: str, stage: str | None) -> Artifact:
@@ -78,14 +92,19 @@ def generator_of(store: Store, artifact: Artifact) -> Artifact | None:
 
 def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
     """What an artifact was made from; None where it read nothing of that stage. Raises `UsageError` if it is gone."""
-    digest = artifact.ingredients.get("inputs", {}).get(stage)
+    manifest = artifact.manifest
+    return _made_from(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
+
+
+def _made_from(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
+    """The artifact of a stage among the ingredients of a key."""
+    digest = ingredients.get("inputs", {}).get(stage)
     if digest is None:
         return None
     found = next((one for one in store.artifacts(stage) if one.manifest.digest == digest), None)
     if found is None:
         raise UsageError(
-            f"the {stage} (content {digest[:12]}) that {artifact.manifest.stage} "
-            f"{artifact.manifest.key[:12]} was made from is no longer stored; run its recipe again"
+            f"the {stage} (content {digest[:12]}) that {what} was made from is no longer stored; run its recipe again"
         )
     return found
 
@@ -93,11 +112,23 @@ def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
 def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
     from iowbc.evaluation.play import Source
+
+    return Source(_world(artifact.recipe, generator), artifact.folder)
+
+
+def _training_source(store: Store, training: InTraining, recipe: Mapping[str, Any]) -> "Source":
+    """The newest checkpoint of a training, with the world of its recipe."""
+    from iowbc.evaluation.play import Source
+
+    generator = _made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
+    return Source(_world(recipe, generator), training.checkpoint, training.key)
+
+
+def _world(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specification":
+    """The world that a resolved recipe describes."""
     from iowbc.recipe.recipe import Recipe
     from iowbc.robot.description import robot_folder
     from iowbc.task.specification import Specification
 
-    recipe = Recipe.model_validate(artifact.recipe)
-    folder = robot_folder(recipe.robot)
-    world = Specification(recipe, folder, generator.folder if generator is not None else None)
-    return Source(world, artifact.folder)
+    recipe = Recipe.model_validate(resolved)
+    return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from iowbc.control.action import action_mirror
 from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
@@ -17,7 +18,9 @@ from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script,
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.viewer import play_in_viewer, require_display
 from iowbc.learning.acting import load_policy
+from iowbc.learning.unfinished import unfinished_teacher
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import load_robot
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -29,7 +32,9 @@ class Source:
 
     world: Specification
     policy: Path
-    """Artifact of `teacher` or `distill`, or an exported folder."""
+    """Artifact of `teacher` or `distill`, an exported folder, or the checkpoint of a teacher that is being trained."""
+    key: str = ""
+    """That the checkpoint is bound to."""
 
     def environment(self, episode: Episode) -> VectorEnv:
         """One environment, in this process, that plays an episode."""
@@ -60,8 +65,15 @@ class Shown:
     """Pictures of the film; 0 in the viewer."""
 
 
-def play(source: Source, request: PlayRequest, interrupted: Callable[[], bool] = lambda: False) -> Shown:
+def play(
+    source: Source,
+    request: PlayRequest,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float, float], None] = lambda seconds, duration: None,
+) -> Shown:
     """Play one episode; in the viewer, or with `request.video` into that mp4 file (no display needed).
+
+    progress: is told how much of a film is drawn, and how long it is to be [s].
 
     Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
     """
@@ -71,13 +83,18 @@ def play(source: Source, request: PlayRequest, interrupted: Callable[[], bool] =
         require_display()
     environment = source.environment(episode)
     try:
-        policy = open_policy(source.policy, environment)
+        policy = open_policy(source, environment)
         if request.video is None:
             return Shown(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
         with EpisodeFilm(environment, Film(request.video, settings.fps), settings, title) as film:
-            outcome = play_in(environment, policy, interrupted, look=film.look)[0]
+
+            def look(seconds: float) -> None:
+                film.look(seconds)
+                progress(seconds, episode.duration)
+
+            outcome = play_in(environment, policy, interrupted, look=look)[0]
         return Shown(outcome, episode.duration, film.frames)
     finally:
         environment.close()
@@ -92,8 +109,11 @@ def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
     return Condition(request.scene, script, fixed).episode(request.object_mass, request.seed)
 
 
-def open_policy(folder: Path, environment: VectorEnv) -> Acting:
-    """The policy in a folder: an exported controller where there is a contract, else a trained network."""
-    if (folder / contract.CONTRACT).is_file():
-        return ExportedPolicy(Controller.load(folder, robots=environment.num_envs), environment)
-    return load_policy(folder)
+def open_policy(source: Source, environment: VectorEnv) -> Acting:
+    """The policy of a source: an exported controller where there is a contract, else a network."""
+    if (source.policy / contract.CONTRACT).is_file():
+        return ExportedPolicy(Controller.load(source.policy, robots=environment.num_envs), environment)
+    if source.policy.is_dir():
+        return load_policy(source.policy)
+    mirrors = (environment.layout.mirror, action_mirror(load_robot(source.world.robot)))
+    return unfinished_teacher(source.policy, source.key, source.world.recipe.teacher, mirrors)

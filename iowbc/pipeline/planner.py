@@ -45,7 +45,7 @@ class Step:
     damage: str = ""
     """What is wrong with the stored artifact with this key."""
     expected: float | None = None
-    """Time that it took with the same values, the seed aside [s]; None where it never ran with them."""
+    """Time that it takes at the rate of a stored artifact or of its last attempt [s]; None where no rate is known."""
     code: Mapping[str, str] = field(default_factory=dict)
     predecessor: Artifact | None = None
     """The stored artifact that it would go on from."""
@@ -128,7 +128,7 @@ class Planner:
             "robot": self.robot_digest,
         }
         former = self._closest(stage.name, ingredients)
-        expected = former.manifest.seconds if former and _as_long(former.ingredients, ingredients) else None
+        expected = None if former is None else _reckoned(stage, former, ingredients)
         if unknown:
             reasons = self._reasons(ingredients, former, unknown)
             return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
@@ -160,9 +160,11 @@ class Planner:
         predecessor = None
         if found:
             notes.extend(self._checkpoint(stage, key))
+            expected = self._rest(stage, key, expected)
             predecessor = None if stage.name in self.options.force else self._predecessor(stage, ingredients)
             if predecessor is not None:
                 notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
+                expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)
         return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code, predecessor)
 
     def _predecessor(self, stage: Stage, ingredients: Mapping[str, Any]) -> Artifact | None:
@@ -192,11 +194,21 @@ class Planner:
             if of_stage and MISSING not in (old, new) and stage.name not in self.options.force:
                 yield f"{path} is {_shown(old)} in it; `--force {stage.name}` makes it with {_shown(new)}"
 
+    def _attempt(self, stage: Stage, key: str) -> dict[str, Any]:
+        """The record of an attempt that this run would go on from; empty where there is none."""
+        record = Workspace(self.store.runs, stage.name, key).record
+        return record if record.get("forced") or stage.name not in self.options.force else {}
+
+    def _rest(self, stage: Stage, key: str, expected: float | None) -> float | None:
+        """The time that is left where an earlier attempt has left something, at its own rate [s]."""
+        record = self._attempt(stage, key)
+        done, total = float(record.get("done", 0.0)), float(record.get("total", 0.0))
+        return float(record["seconds"]) * max(0.0, total / done - 1.0) if done and total else expected
+
     def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
         """What an earlier attempt has left."""
-        record = Workspace(self.store.runs, stage.name, key).record
-        forced = stage.name in self.options.force
-        if record and (record.get("forced") or not forced):
+        record = self._attempt(stage, key)
+        if record:
             total = float(record.get("total", 0.0))
             share = f", {100 * float(record.get('done', 0.0)) / total:.0f} %" if total else ""
             yield f"goes on from attempt {record.get('attempts', 1)}{share}"
@@ -246,10 +258,20 @@ def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) 
     return artifact, ""
 
 
-def _as_long(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Whether a stage takes about the time that it took with other ingredients: only the seed and contents differ."""
-    changed = differences(nested(old.get("recipe", {})), nested(new["recipe"]))
-    return old.get("version") == new["version"] and all(path == "seed" for path, _, _ in changed)
+def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> float | None:
+    """The time that a stage takes at the rate of a stored artifact [s]; None where more differs than seed and counts.
+
+    It is proportional to each of the stage's counts.
+    """
+    old, seconds = former.ingredients, former.manifest.seconds
+    if old.get("version") != ingredients["version"]:
+        return None
+    for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
+        if path in stage.counts and MISSING not in (before, after) and before:
+            seconds *= after / before
+        elif path != "seed":
+            return None
+    return seconds
 
 
 def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:

@@ -134,6 +134,7 @@ class Runner:
         assert key is not None
         earlier = workspace.record.get("code", step.code)
         resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code))
+        workspace.describe(step.ingredients or {}, as_yaml(self.loaded.recipe))
         view.metric, view.curve = workspace.curve
         view.began = time.monotonic() - workspace.seconds
         view.state, view.note = "runs", short(step.notes or step.reasons, 1)

@@ -13,14 +13,26 @@ def require_writable_runs(runs: Runs) -> None:
     parts = (runs.store, *runs.store.glob("*"), runs.work, runs.damaged, runs.locks, runs.recipes, runs.tracking)
     reason = _obstacle(runs.root) or next(filter(None, map(_closed, parts)), "")
     if reason:
-        raise UsageError(f"{runs.root} cannot be written: {reason}; give another folder with --runs")
+        raise UsageError(f"{runs.root} cannot be written: {reason}; {_remedy(runs.root, '--runs')}")
 
 
 def require_writable(folder: Path, option: str) -> None:
     """Make a folder that an option names. Raises `UsageError` where it cannot be written."""
     reason = _obstacle(folder)
     if reason:
-        raise UsageError(f"{folder} cannot be written: {reason}; give another folder with {option}")
+        raise UsageError(f"{folder} cannot be written: {reason}; {_remedy(folder, option)}")
+
+
+def _remedy(folder: Path, option: str) -> str:
+    """What to do about a folder that cannot be written: another user's is to be given to this one."""
+    there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    owner, user = there.stat().st_uid, os.geteuid()
+    if owner == user or there != folder or not folder.is_dir():
+        return f"give another folder with {option}"
+    return (
+        f"it belongs to user {owner} and this is user {user}: on the machine that it lies on (not inside a container) "
+        f"say `sudo chown -R {user} {folder.name}`, or give another folder with {option}"
+    )
 
 
 def _obstacle(folder: Path) -> str:

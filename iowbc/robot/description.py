@@ -84,16 +84,25 @@ def robot_folder(name: str) -> Path:
     """
     if Path(name).name != name and (Path(name) / DESCRIPTION).is_file():
         return Path(name)
+    found = robot_folders()
+    if name not in found:
+        raise FileNotFoundError(
+            f"no robot {name!r}: looked for {name}/robot.yaml in {', '.join(str(root) for root in _roots())}; "
+            f"known robots: {', '.join(found) or 'none'}"
+        )
+    return found[name]
+
+
+def robot_folders() -> dict[str, Path]:
+    """The folder of every robot that a name finds, alphabetically."""
+    found = {path.parent.name: path.parent for root in reversed(_roots()) for path in root.glob(f"*/{DESCRIPTION}")}
+    return dict(sorted(found.items()))
+
+
+def _roots() -> list[Path]:
+    """Where robots are looked for, the first place first."""
     package = Path(__file__).resolve().parents[1]
-    roots = [Path.cwd() / "robots", package.parent / "robots", package / "robots"]
-    for root in roots:
-        if (root / name / DESCRIPTION).is_file():
-            return root / name
-    known = sorted({found.parent.name for root in roots for found in root.glob("*/robot.yaml")})
-    raise FileNotFoundError(
-        f"no robot {name!r}: looked for {name}/robot.yaml in {', '.join(str(root) for root in roots)}; "
-        f"known robots: {', '.join(known) or 'none'}"
-    )
+    return [Path.cwd() / "robots", package.parent / "robots", package / "robots"]
 
 
 def load_robot(folder: Path) -> Robot:

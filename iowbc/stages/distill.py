@@ -77,4 +77,5 @@ STAGE = Stage(
     run=run,
     results=("student.safetensors", "student.json"),
     packages=("stages.distill", "stages.training", "learning", *ENVIRONMENTS),
+    counts=("distill.steps",),
 )

@@ -102,4 +102,5 @@ STAGE = Stage(
     problems=problems,
     results=("trials.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
+    counts=("eval.trials",),
 )

@@ -123,4 +123,5 @@ STAGE = Stage(
     run=run,
     results=("dataset.npz", LABELLED),
     packages=("reference", "control", "robot"),
+    counts=("rg.sampling.samples",),
 )

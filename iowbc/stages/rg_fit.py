@@ -88,4 +88,5 @@ STAGE = Stage(
     run=run,
     results=("rg.safetensors", "rg.json", "feasible.npz"),
     packages=("reference", "control", "robot"),
+    counts=("rg.sampling.samples", "rg.fit.epochs"),
 )

@@ -123,4 +123,5 @@ STAGE = Stage(
     results=("teacher.safetensors", "teacher.json"),
     packages=("stages.teacher", "stages.training", "learning", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",
+    counts=("teacher.steps",),
 )

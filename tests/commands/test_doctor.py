@@ -23,3 +23,13 @@ def test_a_crash_of_the_contact_model_is_essential(
     console = Console(record=True, width=200)
     assert doctor.examine(Runs(tmp_path / "runs"), console) == 1
     assert "pip install crocoddyl==3.2.1 pin==4.0.0" in console.export_text()
+
+
+def test_every_robot_is_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robots" / "r2d2").mkdir(parents=True)
+    (tmp_path / "robots" / "r2d2" / "robot.yaml").write_text("name: r2d2\n")
+    monkeypatch.chdir(tmp_path)
+    found = {finding.name: finding for finding in doctor._robots()}
+    assert found["robot g1"].verdict == "good"
+    assert found["robot r2d2"].verdict == "bad"
+    assert "missing mjcf" in found["robot r2d2"].text

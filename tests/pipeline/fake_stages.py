@@ -50,13 +50,15 @@ def counting(name: str) -> Callable[[Job], None]:
     return run
 
 
-def stage(name: str, reads: tuple[str, ...], slice: tuple[str, ...], version: int = 1) -> Stage:
+def stage(
+    name: str, reads: tuple[str, ...], slice: tuple[str, ...], version: int = 1, counts: tuple[str, ...] = ()
+) -> Stage:
     """A counting stage that reads the others that its recipe has."""
 
     def known(recipe: Recipe) -> tuple[str, ...]:
         return tuple(read for read in reads if read in recipe.stages)
 
-    return Stage(name, version, slice, reads=known, run=counting(name), results=("result.json",))
+    return Stage(name, version, slice, reads=known, run=counting(name), results=("result.json",), counts=counts)
 
 
 STAGES = {
@@ -64,9 +66,9 @@ STAGES = {
     for made in (
         stage("rg-dataset", (), ("seed", "rg")),
         stage("rg-fit", ("rg-dataset",), ("seed", "rg")),
-        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher")),
+        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), counts=("teacher.steps",)),
         stage("distill", ("rg-fit", "teacher"), ("distill",)),
-        stage("eval", ("distill",), ("eval",)),
+        stage("eval", ("distill",), ("eval",), counts=("eval.trials",)),
         stage("export", ("distill",), ("name", "export")),
     )
 }

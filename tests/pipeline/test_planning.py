@@ -11,6 +11,7 @@ from iowbc.errors import RecipeError
 from iowbc.pipeline import planner as planning
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.store.digests import canonical_json, code_digests, data_digest
+from iowbc.pipeline.store.workspace import Workspace
 
 
 def test_a_first_plan_says_that_nothing_is_stored(workplace: Workplace) -> None:
@@ -168,9 +169,28 @@ def test_the_expected_time_is_that_of_the_last_run_with_the_same_values(workplac
     assert workplace.plan("seed=4")["teacher"].expected == made["teacher"].manifest.seconds
 
 
+def test_a_changed_count_is_reckoned_from_the_stored_rate(workplace: Workplace) -> None:
+    made = {name: artifact.manifest.seconds for name, artifact in workplace.run().items()}
+    steps = workplace.plan("teacher.steps=40960", "eval.trials=20", "seed=4")
+    assert steps["teacher"].expected == pytest.approx(10 * made["teacher"])
+    assert steps["eval"].expected == pytest.approx(4 * made["eval"])
+    assert workplace.plan("teacher.steps=40960", "teacher.gamma=0.9")["teacher"].expected is None
+
+
+def test_what_is_left_of_an_interrupted_stage_is_reckoned_from_its_own_rate(workplace: Workplace) -> None:
+    workplace.run(until="rg-fit")
+    key = workplace.plan()["teacher"].key
+    assert key is not None
+    workspace = Workspace(workplace.store.runs, "teacher", key)
+    workspace.begin("small", False, {})
+    workspace.progress(25, 100, "")
+    workspace.write()
+    assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.record["seconds"])
+
+
 def test_no_time_is_promised_for_other_values_nor_behind_them(workplace: Workplace) -> None:
     workplace.run()
-    steps = workplace.plan("teacher.steps=8192")
+    steps = workplace.plan("teacher.gamma=0.9")
     assert {name for name, step in steps.items() if not step.cached and step.expected is None} == {
         "teacher",
         "distill",

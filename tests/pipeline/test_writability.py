@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from iowbc.errors import UsageError
+from iowbc.pipeline import writability
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.writability import require_writable_runs
 
@@ -30,3 +31,21 @@ def test_a_file_above_it_or_in_place_of_a_part_is_refused(tmp_path: Path) -> Non
 def test_a_folder_where_the_system_lets_nobody_write_is_refused() -> None:
     with pytest.raises(UsageError, match="/proc/v1 cannot be written: "):
         require_writable_runs(Runs(Path("/proc/v1")))
+
+
+def test_anothers_folder_is_to_be_given_to_this_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of `runs/` that the container's root made, seen by its ordinary user."""
+    runs = tmp_path / "runs"
+    runs.mkdir()
+
+    def refuse(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(writability.tempfile, "NamedTemporaryFile", refuse)
+    owner = runs.stat().st_uid
+    monkeypatch.setattr(writability.os, "geteuid", lambda: owner + 1000)
+    with pytest.raises(UsageError, match=rf"belongs to user {owner} and .* `sudo chown -R {owner + 1000} runs`"):
+        require_writable_runs(Runs(runs))
+    monkeypatch.setattr(writability.os, "geteuid", lambda: owner)
+    with pytest.raises(UsageError, match="Permission denied; give another folder with --runs"):
+        require_writable_runs(Runs(runs))

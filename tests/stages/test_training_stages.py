@@ -2,11 +2,14 @@
 
 import dataclasses
 import json
+import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from safetensors.numpy import load_file
+from stable_baselines3 import PPO
 from stage_jobs import make_job
 from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
@@ -16,7 +19,10 @@ from iowbc.learning.storage import load_student, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import distill, teacher
+from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +101,16 @@ def test_both_trained_networks_obey_the_mirror_of_the_robot(trained: Path) -> No
         action = network(given)
         mirrored = network(mirror_tensor(mirror, given))
         torch.testing.assert_close(mirrored, mirror_tensor(action_mirror(robot), action), rtol=0, atol=1e-5)
+
+
+def test_the_teachers_sb3_zip_plays_as_the_teacher_does_without_any_normalisation_around_it(trained: Path) -> None:
+    out = trained / "teacher" / "out"
+    example = runpy.run_path(str(EXAMPLES / "teacher_in_sb3.py"))
+    zipped, own = PPO.load(out / "teacher_sb3.zip", device="cpu"), load_policy(out)
+    environment = Environment("lift", small_recipe())
+    seen = np.stack([environment.reset(seed=seed)[0] for seed in range(4)])
+    state = full_layout(small_recipe(), load_robot(robot_folder("g1"))).state.size
+    actions, _ = zipped.predict(seen, deterministic=True)
+    np.testing.assert_allclose(actions, own.act(seen[:, :state], seen[:, state:]), rtol=0, atol=1e-6)
+    assert abs(seen).max() > 10.0, "what the environment gives is not normalised"
+    assert example["hold"](out / "teacher_sb3.zip", environment) > 5

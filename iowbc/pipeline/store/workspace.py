@@ -4,12 +4,13 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from iowbc.files import write_whole
 from iowbc.pipeline.machine import host
+from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE
 from iowbc.pipeline.store.runs import Runs, read_json
 
 PROGRESS = "progress.json"
@@ -66,6 +67,11 @@ class Workspace:
         }
         self.write()
         return bool(earlier)
+
+    def describe(self, ingredients: Mapping[str, Any], recipe: str) -> None:
+        """Write what the key was computed from, and the recipe, as the artifact will have them beside it."""
+        write_whole(self.root / INGREDIENTS, json.dumps(ingredients, indent=1, sort_keys=True))
+        write_whole(self.root / RECIPE, recipe)
 
     @property
     def attempts(self) -> int:

@@ -1,0 +1,48 @@
+"""Who plays a stage that is being trained is told so; a film says how far it is."""
+
+import io
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from iowbc.commands import filming
+from iowbc.commands.filming import Filming
+from iowbc.commands.in_training import in_training
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.workspace import Workspace
+
+
+def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
+    store = Store(Runs(folder / "runs"))
+    assert in_training(store, "first/teacher", None) is None
+    workspace = Workspace(store.runs, "teacher", "f" * 64)
+    workspace.begin("first", False, {})
+    workspace.progress(42, 100, "")
+    workspace.write()
+    told = in_training(store, "first/teacher", None)
+    assert told is not None
+    assert told.text == "teacher of first was interrupted, 42 % done; this is a finished one"
+    assert told.recipe is None
+    (workspace.scratch / "training.checkpoint").write_bytes(b"")
+    workspace.describe({"inputs": {}}, "name: first\n")
+    playable = in_training(store, "first", "teacher")
+    assert playable is not None
+    assert playable.recipe == {"name": "first"}
+    assert playable.text.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 0.")
+    assert in_training(store, "first", None) is None
+    assert in_training(store, "second/teacher", None) is None
+    assert in_training(store, "first/distill", None) is None
+
+
+def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(filming, "INTERVAL", 0.0)
+    stream = io.StringIO()
+    with Filming(Console(file=stream), Path("box.mp4")) as told:
+        told(5.0, 40.0)
+    assert stream.getvalue() == "box.mp4: sets up the simulation\nbox.mp4: 5 of 40 s\n"
+    silent = io.StringIO()
+    with Filming(Console(file=silent), None) as told:
+        told(5.0, 40.0)
+    assert silent.getvalue() == ""
