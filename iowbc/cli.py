@@ -1,5 +1,6 @@
 """The commands. Nothing heavy is imported before a command needs it, so that `iowbc --help` answers at once."""
 
+import contextlib
 import os
 import signal
 import sys
@@ -8,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from iowbc.commands.unforeseen import prepare_streams, told
+from iowbc.commands.streams import let_go, outlasting_readers, prepare_streams
+from iowbc.commands.unforeseen import told
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +78,8 @@ def run(
     if dry_run:
         print_plan(request, STAGES, _console())
     else:
-        raise typer.Exit(run_recipe(request, STAGES, _console()))
+        with outlasting_readers():
+            raise typer.Exit(run_recipe(request, STAGES, _console()))
 
 
 @app.command()
@@ -317,14 +320,21 @@ def main(arguments: list[str] | None = None) -> None:
     signal.signal(signal.SIGINT, _leave)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     prepare_streams()
+    code: str | int | None = 1
     try:
-        app(arguments, prog_name="iowbc")
+        try:
+            app(arguments, prog_name="iowbc")
+        except SystemExit as ended:
+            code = ended.code
+            sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # a reader that has gone away, as of `| head`
-        sys.exit(1)
+        code = 1  # a reader that has gone away, as of `| head`
     except Exception as error:
         from iowbc.errors import IowbcError
 
         foreseen = isinstance(error, IowbcError)
-        print(error if foreseen else told(error, arguments or sys.argv[1:]), file=sys.stderr)
-        sys.exit(error.exit_code if isinstance(error, IowbcError) else 1)
+        code = error.exit_code if isinstance(error, IowbcError) else 1
+        with contextlib.suppress(OSError):
+            print(error if foreseen else told(error, arguments or sys.argv[1:]), file=sys.stderr)
+    let_go()
+    sys.exit(code)

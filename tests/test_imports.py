@@ -9,7 +9,7 @@ import pytest
 import iowbc
 
 PACKAGE = Path(iowbc.__file__).parent
-GROUND = {"errors", "files", "arrays", "counter_random", "processes"}
+GROUND = {"errors", "files", "arrays", "counter_random", "processes", "full_disk"}
 """Modules beside the rooms that any of them may use."""
 DESCRIPTIONS = GROUND | {"recipe", "robot"}
 SHARED = DESCRIPTIONS | {"control"}
@@ -18,13 +18,14 @@ MAY_IMPORT = {
     "errors": set(),
     "files": {"errors"},
     "arrays": set(),
+    "full_disk": set(),
     "processes": set(),
     "counter_random": {"recipe", "errors", "arrays"},
     "recipe": {"errors", "files"},
     "robot": GROUND - {"counter_random"},
     "control": DESCRIPTIONS,
     "deploy": SHARED,
-    "pipeline": {"recipe", "errors", "files", "processes"},
+    "pipeline": {"recipe", "errors", "files", "processes", "full_disk"},
     "sim": SHARED,
     "reference": WORLD,
     "learning": SHARED,

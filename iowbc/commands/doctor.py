@@ -202,7 +202,8 @@ def _disk(runs: Runs) -> Finding:
 
 
 def _tracking(runs: Runs) -> Finding:
-    from iowbc.pipeline.tracking.tracker import backlog, tracking_uri
+    from iowbc.pipeline.tracking.delivery import tracking_uri
+    from iowbc.pipeline.tracking.tracker import backlog
 
     waiting = len(backlog(runs))
     text = (tracking_uri() or str(runs.database)) + (f"; {waiting} runs are not sent whole yet" if waiting else "")

@@ -1,6 +1,6 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -49,25 +49,27 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console) -> in
 def _run(planner: Planner, robot: Path, request: Request, console: Console) -> int:
     """Run one recipe; returns the exit code."""
     loaded = planner.loaded
-    tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
+    tracker: Tracker | None = None
     runner: Runner | None = None
     status, code, closing, delivered = "KILLED", INTERRUPTED, "", True
     try:
         with StopRequest(shown=console.is_terminal) as stop:
-            runner = Runner(planner, robot, _display(loaded, console, stop), tracker, stop)
             try:
+                tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
+                display = _display(loaded, console, stop)
+                runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
                 runner.run()
                 status, code = "FINISHED", DONE
                 if tracker is not None:
                     tracker.describe(described(runner.artifacts))
             except PipelineFailed as error:
                 status, code = "FAILED", STAGE_FAILED
-                closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, runner)}"
+                closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"
             except Interrupted as error:
                 closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
             finally:
                 if tracker is not None:
-                    wait = bool(runner.made) and not stop()
+                    wait = bool(_made(runner)) and not stop()
                     delivered = tracker.close(status, wait) or not wait
     except KeyboardInterrupt:
         code, closing = INTERRUPTED, _resumption(request, runner)
@@ -81,12 +83,15 @@ def _run(planner: Planner, robot: Path, request: Request, console: Console) -> i
 
 
 def _resumption(request: Request, runner: Runner | None) -> str:
-    return f"interrupted; to go on:\n{_rest(request, runner)}"
+    return f"interrupted; to go on:\n{_rest(request, _made(runner))}"
 
 
-def _rest(request: Request, runner: Runner | None) -> str:
+def _made(runner: Runner | None) -> list[str]:
+    return runner.made if runner is not None else []
+
+
+def _rest(request: Request, made: Sequence[str]) -> str:
     """The command that makes what is missing."""
-    made = runner.made if runner is not None else []
     return request.command([name for name in request.options.force if name not in made])
 
 

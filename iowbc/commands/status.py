@@ -17,14 +17,20 @@ from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
+from iowbc.pipeline.tracking.delivery import DAMAGED_LINE
 from iowbc.pipeline.tracking.tracker import backlog
 
 
 def print_status(store: Store, console: Console) -> None:
     """What runs, what was left unfinished, what the recipes have, and what MLflow lacks."""
     going_on = unfinished(store.runs)
+    stopped: list[str] = []
     for folder, record in going_on:
         _print_work(store, console, folder, record)
+        if not holder(store.runs, folder.name) and record.get("command"):
+            stopped.append(str(record["command"]))
+    for command in dict.fromkeys(stopped):
+        console.print(f"to go on: {command}", markup=False, highlight=False, soft_wrap=True)
     recipes = known_recipes(store)
     if recipes:
         table = plain_table("recipe", "finished stages", "last")
@@ -35,6 +41,12 @@ def print_status(store: Store, console: Console) -> None:
         console.print(table)
     if not (going_on or recipes):
         console.print(f"nothing has run in {store.runs.root} yet; `iowbc run RECIPE` starts", highlight=False)
+    aside = sorted(store.runs.damaged.glob(f"{DAMAGED_LINE}*"))
+    if aside:
+        console.print(
+            f"{len(aside)} damaged lines of MLflow's journals were put aside, as {shown_path(aside[-1])}",
+            highlight=False,
+        )
     waiting = backlog(store.runs)
     if waiting:
         console.print(

@@ -1,19 +1,21 @@
 """What is said when a command meets what nobody foresaw: one sentence, where the details are, and what to type next."""
 
-import errno
+import os
 import shlex
-import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
+
+from iowbc.full_disk import nothing_fits, what_is_full
 
 
 def told(error: Exception, arguments: Sequence[str]) -> str:
     """The sentence. Needs no disk: where the details cannot be written they follow it."""
     again = f"to go on: {shlex.join(['iowbc', *arguments])}"
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        place = f" at {error.filename}" if error.filename else ""
-        return f"no space is left on the disk{place}; make some (`iowbc gc` removes what you name), and then\n{again}"
+    if nothing_fits(error):
+        full = what_is_full(error, (Path("runs"), Path(os.environ.get("TMPDIR", "/tmp"))))
+        return f"no space is left: {full}; make some (`iowbc gc` removes what you name), and then\n{again}"
     summary = " ".join(f"{type(error).__name__}: {error}".split())[:300]
     details = "".join(traceback.format_exception(error))
     try:
@@ -23,13 +25,3 @@ def told(error: Exception, arguments: Sequence[str]) -> str:
     except OSError:
         where = f"the details could not be written:\n{details.rstrip()}"
     return f"iowbc met something that nobody foresaw: {summary}; {where}\n{again}"
-
-
-def prepare_streams() -> None:
-    """Let every text be written somehow: characters that the terminal does not know, and streams that are closed."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open("/dev/null", "w", encoding="utf-8"))  # noqa: SIM115 (for the whole process)
-        elif hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")

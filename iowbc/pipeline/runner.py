@@ -1,13 +1,13 @@
 """Runs the stages of a recipe: reuses what is stored, makes the rest, loses nothing."""
 
 import contextlib
-import errno
 import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 
 from iowbc.errors import Damaged, Interrupted, PipelineFailed, StageFailed
+from iowbc.full_disk import nothing_fits, what_is_full
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
 from iowbc.pipeline.machine import host, versions
@@ -22,9 +22,6 @@ from iowbc.pipeline.tracking.tracker import Tracker
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.writing import as_yaml
 
-FULL = (errno.ENOSPC, errno.EDQUOT)
-"""Errors that say that nothing more can be written."""
-
 
 class Runner:
     """One run of a recipe."""
@@ -36,7 +33,9 @@ class Runner:
         display: Display,
         tracker: Tracker | None,
         interrupted: Callable[[], bool],
+        command: Callable[[list[str]], str] = lambda made: "",
     ) -> None:
+        """`command`: what goes on with this run once the stages named were made; kept with a stage while it is made."""
         self.planner = planner
         self.loaded = planner.loaded
         self.store = planner.store
@@ -45,6 +44,7 @@ class Runner:
         self.display = display
         self.tracker = tracker
         self.interrupted = interrupted
+        self.command = command
         self.views = {stage.name: StageView(stage.name) for stage in planner.stages}
         self.artifacts: dict[str, Artifact] = {}
         self.made: list[str] = []
@@ -57,11 +57,22 @@ class Runner:
             for stage in self.planner.stages:
                 if self.interrupted():
                     raise Interrupted
-                self.artifacts[stage.name] = self._artifact(stage)
-                remember(self.store.runs, self.loaded, self.artifacts[stage.name])
+                self._bring_about(stage)
         finally:
             self.display.end()
         return self.artifacts
+
+    def _bring_about(self, stage: Stage) -> None:
+        try:
+            self.artifacts[stage.name] = self._artifact(stage)
+            remember(self.store.runs, self.loaded, self.artifacts[stage.name])
+        except Exception as error:
+            if isinstance(error, (PipelineFailed, Interrupted)) or not nothing_fits(error):
+                raise
+            raise PipelineFailed(
+                f"{stage.name} failed: no space is left: {what_is_full(error, (self.store.runs.root,))}. "
+                "Its last checkpoint is kept; make some (`iowbc gc` removes what you name)"
+            ) from error
 
     def _artifact(self, stage: Stage, *, whole: bool = False) -> Artifact:
         """The stage's artifact: the stored one where it can be used, else a new one.
@@ -133,7 +144,8 @@ class Runner:
         stage, key = step.stage, step.key
         assert key is not None
         earlier = workspace.record.get("code", step.code)
-        resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code))
+        command = self.command(self.made)
+        resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code), command)
         workspace.describe(step.ingredients or {}, as_yaml(self.loaded.recipe))
         view.metric, view.curve = workspace.curve
         view.began = time.monotonic() - workspace.seconds
@@ -169,13 +181,9 @@ class Runner:
             self._ended(workspace, view, "failed", "FAILED", str(error))
             raise PipelineFailed(f"{stage.name} failed: {error}") from error
         except Exception as error:
-            if isinstance(error, OSError) and error.errno in FULL:
+            if nothing_fits(error):
                 self._ended(workspace, view, "failed", "FAILED", "no space left")
-                place = error.filename or workspace.root
-                raise PipelineFailed(
-                    f"{stage.name} failed: no space is left on the disk at {place}; its last checkpoint is kept. "
-                    "Make some: `iowbc gc` removes what you name"
-                ) from error
+                raise
             details = workspace.root / "error.txt"
             with contextlib.suppress(OSError):
                 details.write_text(traceback.format_exc(), encoding="utf-8")

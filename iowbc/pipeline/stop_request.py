@@ -1,5 +1,10 @@
-"""SIGINT, SIGTERM and SIGHUP: the first asks the stage to stop after a checkpoint, the second aborts."""
+"""SIGINT, SIGTERM and SIGHUP: the first asks the stage to stop after a checkpoint, the second aborts.
 
+SIGHUP says that the terminal is gone. It never aborts, for it comes twice where a shell passes it on and then ends, and
+it means nothing to a run that was started to go on without a terminal (`nohup`).
+"""
+
+import contextlib
 import os
 import signal
 from types import FrameType, TracebackType
@@ -30,7 +35,8 @@ class StopRequest:
 
     def __enter__(self) -> Self:
         for number in SIGNALS:
-            self._former[number] = signal.signal(number, self._received)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                self._former[number] = signal.signal(number, self._received)
         return self
 
     def __exit__(
@@ -41,7 +47,9 @@ class StopRequest:
 
     def _received(self, number: int, frame: FrameType | None) -> None:
         """Writes past Python's buffers, which the interrupted code may be using."""
-        if self.signal is not None:
+        if number == signal.SIGHUP and self.signal is not None:
+            return
+        if self.signal not in (None, signal.SIGHUP):
             self._write("aborting")
             raise KeyboardInterrupt
         self.signal = signal.Signals(number)
@@ -49,4 +57,5 @@ class StopRequest:
 
     def _write(self, text: str) -> None:
         if not self.shown:
-            os.write(2, f"\n{text}\n".encode())
+            with contextlib.suppress(OSError):  # of a terminal that is gone
+                os.write(2, f"\n{text}\n".encode())

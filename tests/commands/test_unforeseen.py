@@ -45,7 +45,7 @@ def test_an_unforeseen_error_is_told_in_one_sentence_with_its_details_kept(tmp_p
 
 def test_a_full_disk_is_named_with_the_command_that_goes_on() -> None:
     text = told(OSError(errno.ENOSPC, "No space left on device", "runs/store/x"), ["run", "a b.yaml"])
-    assert text.startswith("no space is left on the disk at runs/store/x")
+    assert text.startswith("no space is left: runs/store/x cannot be written: No space left on device; make some")
     assert text.endswith("\nto go on: iowbc run 'a b.yaml'")
 
 

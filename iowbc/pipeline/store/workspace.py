@@ -38,10 +38,10 @@ class Workspace:
         """What the last attempt recorded; empty where there was none."""
         return _record(self.root)
 
-    def begin(self, recipe: str, forced: bool, code: dict[str, str]) -> bool:
+    def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> bool:
         """Make room for an attempt; returns whether it continues an earlier one.
 
-        A forced attempt continues only one that was forced too.
+        A forced attempt continues only one that was forced too. `command`: what goes on with it when it is stopped.
         """
         earlier = self.record
         if forced and not earlier.get("forced"):
@@ -64,6 +64,7 @@ class Workspace:
             "metric": str(earlier.get("metric", "")),
             "curve": earlier.get("curve", []),
             "code": code,
+            "command": command,
         }
         self.write()
         return bool(earlier)

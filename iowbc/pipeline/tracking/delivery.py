@@ -1,6 +1,10 @@
-"""One journal on its way to MLflow."""
+"""One journal on its way to MLflow: each event at least once, and to no other effect when it comes twice.
+
+A line that is damaged is put aside in `runs/damaged/` and named; the others go on.
+"""
 
 import contextlib
+import os
 import shutil
 import sqlite3
 import time
@@ -12,8 +16,8 @@ from iowbc.pipeline.store.locks import named_lock
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.journal import (
     close_orphaned,
-    events,
     header,
+    lines,
     lives,
     mark_sent,
     note_status,
@@ -22,10 +26,15 @@ from iowbc.pipeline.tracking.journal import (
     statuses,
     unsent,
 )
+from iowbc.recipe.execution import Execution
 
 if TYPE_CHECKING:
+    from mlflow.entities import Run
     from mlflow.tracking import MlflowClient
 
+DAMAGED_LINE = "journal-"
+"""Begins the name of a file with a line that was put aside."""
+URI_VARIABLE = "MLFLOW_TRACKING_URI"
 MAXIMUM_METRICS = 1000
 """Metrics that MLflow takes in one call."""
 MAXIMUM_PARAMETERS = 100
@@ -47,8 +56,8 @@ class Delivery:
         self.runs, self.path = runs, path
         self.offset, self.ids = sent(path)
         self.statuses = statuses(path, self.offset)
-        self.repeats = True
-        """Whether the next event may have been sent by a sender that died before it could say so."""
+        self.refused: set[str] = set()
+        """Runs that MLflow did not make; nothing is told of them."""
         self._checked = -1
         self._client: MlflowClient | None = None
         self._embedded = False
@@ -76,7 +85,6 @@ class Delivery:
                 sent_path(self.path).unlink(missing_ok=True)
         except Exception as error:
             print(f"{time.strftime('%F %T')} {self.path.name}: {type(error).__name__}: {error}", flush=True)
-            self.repeats = True
             return False
         return True
 
@@ -89,25 +97,31 @@ class Delivery:
     def _connect(self) -> None:
         if self._client is None:
             first = header(self.path)
-            own = embedded_uri(self.runs)
-            made = client(str(first["uri"]) or own)
-            self._embedded = first["uri"] in ("", own)
+            own, uri = embedded_uri(self.runs), str(first.get("uri", tracking_uri()))
+            made = client(uri or own)
+            self._embedded = uri in ("", own)
+            name = first.get("experiment") or Execution.model_fields["experiment"].default
             with set_up(self.runs):
                 if self._embedded:
                     let_files_move(self.runs)
-                self._experiment = experiment(made, str(first["experiment"]), self.runs)
+                self._experiment = experiment(made, str(name), self.runs)
             self._client = made
 
     def _send(self) -> None:
         """Send event by event; neighbouring metrics of a run go in one call."""
         gathered: list[dict[str, Any]] = []
         position = self.offset
-        for event, behind in events(self.path, self.offset):
-            note_status(self.statuses, event)
+        for event, behind in lines(self.path, self.offset):
             if gathered and not _fits(gathered, event):
                 self._metrics(gathered)
                 self._mark(position)
                 gathered = []
+            if event is None:
+                self._put_aside(position, behind)
+                self._mark(behind)
+                position = behind
+                continue
+            note_status(self.statuses, event)
             if event["event"] == "metrics":
                 gathered.append(event)
             else:
@@ -121,11 +135,20 @@ class Delivery:
     def _mark(self, offset: int) -> None:
         """All before this offset has been sent."""
         self.offset = offset
-        self.repeats = False
         mark_sent(self.path, offset, self.ids)
 
+    def _put_aside(self, start: int, end: int) -> None:
+        """Keep a damaged line where `status` and `gc --damaged` find it."""
+        with self.path.open("rb") as file:
+            file.seek(start)
+            line = file.read(end - start)
+        self.runs.damaged.mkdir(parents=True, exist_ok=True)
+        aside = self.runs.damaged / f"{DAMAGED_LINE}{self.path.stem}-{start}.txt"
+        aside.write_bytes(line)
+        print(f"{self.path.name}: the line at byte {start} is damaged and put aside in {aside}", flush=True)
+
     def _one(self, event: Mapping[str, Any]) -> None:
-        if event["event"] == "journal" or self._unknown(event):
+        if event["event"] == "journal" or (event["event"] != "run" and not self._known(event)):
             return
         with _refusals_noted(self.path, event):
             if event["event"] == "run":
@@ -142,25 +165,35 @@ class Delivery:
             elif event["event"] == "end":
                 self.client.set_terminated(self.ids[event["id"]], event["status"], event["time"])
 
-    def _unknown(self, event: Mapping[str, Any]) -> bool:
-        """Whether an event belongs to a run that MLflow refused to make; it is left out."""
-        return event["event"] != "run" and event["id"] not in self.ids
+    def _known(self, event: Mapping[str, Any]) -> bool:
+        """Whether MLflow has the run of an event. One whose beginning was damaged is made with what is known of it."""
+        run = event["id"]
+        if run not in self.ids and run not in self.refused:
+            with _refusals_noted(self.path, event):
+                parent = next(iter(self.ids), None)
+                self._run({"id": run, "parent": parent, "name": run, "tags": {}, "params": {}, "time": event["time"]})
+        return run in self.ids
 
     def _run(self, event: Mapping[str, Any]) -> None:
         tags = {**event["tags"], ORIGIN_TAG: f"{self.path.stem}/{event['id']}"}
         if event["parent"] in self.ids:
             tags["mlflow.parentRunId"] = self.ids[event["parent"]]
-        if self.repeats:
-            condition = f"tags.`{ORIGIN_TAG}` = '{tags[ORIGIN_TAG]}'"
-            made = self.client.search_runs([self._experiment], condition, max_results=1)
-            if made:
-                self.ids[event["id"]] = made[0].info.run_id
-                return
-        run = self.client.create_run(
-            self._experiment, start_time=event["time"], tags=_cut(tags), run_name=event["name"]
-        ).info.run_id
-        self.ids[event["id"]] = run
+        condition = f"tags.`{ORIGIN_TAG}` = '{tags[ORIGIN_TAG]}'"
+        found = self.client.search_runs([self._experiment], condition, max_results=1)
+        made = found[0] if found else self._created(event, tags)
+        self.ids[event["id"]] = made.info.run_id
         self._batch(event["id"], params=event["params"])
+
+    def _created(self, event: Mapping[str, Any], tags: Mapping[str, str]) -> "Run":
+        from mlflow.exceptions import MlflowException
+
+        start, name = event["time"], event["name"]
+        try:
+            return self.client.create_run(self._experiment, start_time=start, tags=_cut(tags), run_name=name)
+        except MlflowException as error:
+            if error.error_code in REFUSALS:
+                self.refused.add(event["id"])
+            raise
 
     def _text(self, event: Mapping[str, Any]) -> None:
         run = self.ids[event["id"]]
@@ -190,7 +223,7 @@ class Delivery:
     def _metrics(self, gathered: list[dict[str, Any]]) -> None:
         from mlflow.entities import Metric
 
-        if self._unknown(gathered[0]):
+        if not self._known(gathered[0]):
             return
         with _refusals_noted(self.path, gathered[0]):
             metrics = [
@@ -212,6 +245,11 @@ class Delivery:
             self.client.log_batch(self.ids[run], params=chunk)
         if tags:
             self.client.log_batch(self.ids[run], tags=[RunTag(name, text) for name, text in _cut(tags).items()])
+
+
+def tracking_uri() -> str:
+    """The tracking server that the environment names; empty stands for the database in `runs`, wherever that is."""
+    return os.environ.get(URI_VARIABLE, "")
 
 
 @contextlib.contextmanager
@@ -262,9 +300,9 @@ def let_files_move(runs: Runs) -> None:
         )
 
 
-def _fits(gathered: list[dict[str, Any]], event: Mapping[str, Any]) -> bool:
+def _fits(gathered: list[dict[str, Any]], event: Mapping[str, Any] | None) -> bool:
     """Whether an event can go in one call with these metrics."""
-    if event["event"] != "metrics":
+    if event is None or event["event"] != "metrics":
         return False
     count = sum(len(earlier["values"]) for earlier in gathered) + len(event["values"])
     return gathered[0]["id"] == event["id"] and count <= MAXIMUM_METRICS

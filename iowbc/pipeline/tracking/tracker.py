@@ -3,6 +3,7 @@
 It is written to a journal at once; a process of its own sends it, so that nothing here waits for a server.
 """
 
+import contextlib
 import os
 import re
 import subprocess
@@ -10,13 +11,14 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from iowbc.pipeline.machine import boot, host
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.delivery import tracking_uri
 from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
 from iowbc.processes import SINGLE_THREADED
 from iowbc.recipe.execution import Execution
@@ -31,12 +33,6 @@ CHECKING_TIME = 1.0
 """Seconds within which a sender that looks at a journal has let go of it again."""
 DESCRIPTION = "mlflow.note.content"
 """Tag that MLflow shows as a run's description."""
-URI_VARIABLE = "MLFLOW_TRACKING_URI"
-
-
-def tracking_uri() -> str:
-    """The tracking server that the environment names; empty stands for the database in `runs`, wherever that is."""
-    return os.environ.get(URI_VARIABLE, "")
 
 
 class Tracker:
@@ -147,8 +143,9 @@ class Tracker:
         """
         if self._open is None:
             return True
-        self._journal.write("end", id=PARENT, status=status)
         path = self._journal.path
+        with contextlib.suppress(OSError):  # the run has ended as it did, whether or not that can be written
+            self._journal.write("end", id=PARENT, status=status)
         self._journal.close()
         self.send()
         limit = time.monotonic() + (self.patience if wait else 0.0)
@@ -161,7 +158,8 @@ class Tracker:
     def send(self) -> None:
         """See to it that a sender is at work; it outlives this process."""
         if self._sender is None or self._sender.poll() is not None:
-            self._sender = start_sender(self.runs)
+            with contextlib.suppress(OSError):  # without a sender the journal waits for that of the next run
+                self._sender = start_sender(self.runs)
 
 
 def record_figures(runs: Runs, name: str, figures: Mapping[str, float]) -> None:
@@ -190,7 +188,7 @@ def parameters(resolved: Mapping[str, Any]) -> dict[str, str]:
 def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
     """Start the process that sends the journals, in a session of its own so that Ctrl-C does not reach it."""
     runs.tracking.mkdir(parents=True, exist_ok=True)
-    with (runs.tracking / "sender.log").open("ab") as log:
+    with _log(runs) as log:
         return subprocess.Popen(
             [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root.absolute())],
             stdin=subprocess.DEVNULL,
@@ -199,6 +197,14 @@ def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
             start_new_session=True,
             env=os.environ | SINGLE_THREADED,
         )
+
+
+def _log(runs: Runs) -> BinaryIO:
+    """What the sender writes to: its log, or nothing where that cannot be written."""
+    try:
+        return (runs.tracking / "sender.log").open("ab")
+    except OSError:
+        return open(os.devnull, "wb")
 
 
 def backlog(runs: Runs) -> list[Path]:

@@ -178,7 +178,8 @@ def _bury(worker: _Worker, book: _Book) -> None:
 
 
 def _work(task: Task, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for ignored in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     die_with_parent(parent, bound=bound)
     number = None

@@ -21,7 +21,7 @@ whether to die with the thread that started the worker; and the descriptors of p
 def main() -> None:
     """Entry point of the process; see `iowbc.task.vector.workers` for the other end."""
     parent, bound, pipe, memory, log = (int(argument) for argument in sys.argv[1:])
-    for ignored in (signal.SIGINT, signal.SIGTERM):
+    for ignored in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(ignored, signal.SIG_IGN)
     die_with_parent(parent, bound=bool(bound))
     with contextlib.suppress(OSError):  # a worker that wakes must not keep its parent from waking the others

@@ -182,14 +182,14 @@ class WorkerProcesses:
 
 
 def _start(memory: int) -> WorkerProcess:
-    """A new worker process; SIGINT and SIGTERM are blocked from its first moment, for the parent decides the end."""
+    """A new worker process; signals to stop are blocked from its first moment, for the parent decides the end."""
     ours, theirs = socket.socketpair()
     log = os.memfd_create("iowbc-worker-log", os.MFD_CLOEXEC)
     bound = threading.current_thread() is threading.main_thread()
     descriptors = (theirs.fileno(), memory, log)
     environment = os.environ | SINGLE_THREADED
     arguments = [json.dumps(sys.path), os.getpid(), int(bound), *descriptors]
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
         popen = subprocess.Popen(
             [sys.executable, "-c", worker.ASKED, *map(str, arguments)],

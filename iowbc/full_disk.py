@@ -1,0 +1,51 @@
+"""Whether an error says that nothing more can be written, and what it is that is full."""
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a disk without room, of a used-up quota, and of a limit on the size of files."""
+TEXTS = ("No space left on device", "Disk quota exceeded", "File too large", "PytorchStreamWriter failed writing")
+"""What libraries say that turn such an error into one of their own."""
+ROOM = 100_000
+"""Free bytes below which a disk counts as full."""
+
+
+def nothing_fits(error: BaseException) -> bool:
+    """Whether an error, or one that led to it, says that nothing more can be written."""
+    return any(
+        (isinstance(found, OSError) and found.errno in FULL) or any(text in str(found) for text in TEXTS)
+        for found in _chain(error)
+    )
+
+
+def what_is_full(error: BaseException, places: Sequence[Path]) -> str:
+    """What has no room: the disk of one of the places, with what is free there, else the file that an error names."""
+    files = [str(found.filename) for found in _chain(error) if isinstance(found, OSError) and found.filename]
+    for place in (*(Path(file).parent for file in files), *places):
+        if (free := _free(place)) is not None and free < ROOM:
+            return f"the disk of {place} is full ({free:,} bytes are free)"
+    for found in _chain(error):
+        if isinstance(found, OSError) and found.errno in FULL:
+            file = f"{found.filename} cannot be written" if found.filename else "a file cannot be written"
+            return f"{file}: {found.strerror}"
+    return "a file cannot be written: no space is left"
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
+
+
+def _free(place: Path) -> int | None:
+    """Bytes that this user can still write on the disk of a place or of the nearest folder above it."""
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    try:
+        return 0 if os.statvfs(place).f_favail == 0 < os.statvfs(place).f_files else shutil.disk_usage(place).free
+    except OSError:
+        return None
