@@ -63,12 +63,12 @@ class Commands(Section):
     """Height of the nominal posture [m], taken when a command leaves the posture alone."""
     nominal_pitch: float = 0.0
     """Torso pitch of the nominal posture [rad]."""
-    standing_episodes: float = Field(default=0.3, ge=0.0, le=1.0)
+    standing_episodes: float = Field(default=0.2, ge=0.0, le=1.0)
     """Part of the episodes that never walk: there balance, posture and loads are practised while walking is not learnt
     yet; 1 trains standing alone."""
-    standing_share: float = Field(default=0.3, ge=0.0, le=1.0)
-    """Part of the commands of the other episodes that ask for standing still, so that about half of all walk."""
-    straight_share: float = Field(default=0.4, ge=0.0, le=1.0)
+    standing_share: float = Field(default=0.25, ge=0.0, le=1.0)
+    """Part of the commands of the other episodes that ask for standing still, so that six in ten of all walk."""
+    straight_share: float = Field(default=0.5, ge=0.0, le=1.0)
     """Part of the walking commands without yaw rate and lateral velocity."""
     turning_share: float = Field(default=0.2, ge=0.0, le=1.0)
     """Part of the commands with a yaw rate that turn on the spot."""

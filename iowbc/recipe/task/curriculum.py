@@ -45,8 +45,9 @@ class Curriculum(Section):
     fixed_level: float = Field(default=1.0, ge=0.0, le=2.0)
     """Level of every axis without a curriculum; also that of evaluation and of single environments. 1 is the recipe's
     own ranges."""
-    velocity: Scale = Scale(start=0.6, full=1.0, extreme=1.3)
-    """Factor on the range of v_x, by the level of locomotion: even at the start walking is fast enough for a step."""
+    velocity: Scale = Scale(start=1.0, full=1.0, extreme=1.3)
+    """Factor on the range of v_x, by the level of locomotion: the recipe's own range from the start. At 0.6 of it, a
+    robot that steps in place follows so closely that it hardly learns to walk."""
     turning: Scale = Scale(start=0.2, full=1.0, extreme=1.3)
     """Factor on the ranges of v_y and yaw rate, by the level of locomotion: walking is learnt straight ahead first."""
     posture: Scale = Scale(start=0.2, full=1.0, extreme=1.0)

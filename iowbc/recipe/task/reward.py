@@ -81,7 +81,7 @@ class GaitConstraint(Section):
     """Weight of the fraction of feet whose contact is what the phase asks for, counted from −1 to 1."""
     swing_height: Kernel = Kernel(weight=1.5, width=0.04)
     """Height of the swinging foot against the gait prior's profile [m]; only while a foot swings."""
-    foot_slip: float = -2.0
+    foot_slip: float = -1.0
     """Weight of the speed at which the soles slide, averaged by the weight that each bears [m/s]. Squared, a slide of
     0.1 m/s cost next to nothing, and feet that walked slid 0.3 m a metre."""
     standing: float = -1.0
