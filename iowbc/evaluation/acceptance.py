@@ -1,37 +1,80 @@
-"""The trial that accepts an exported controller: it, not the torch student, carries the load in the simulation."""
+"""The trials that accept an exported controller: it, not the torch student, carries the load in the simulation."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
+from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
 from iowbc.evaluation.trials.rollout import play_in
+from iowbc.evaluation.trials.table import held_weight, measure_of
 from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
+from iowbc.robot.description import load_robot
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 
+@dataclass(frozen=True)
+class Accepted:
+    """How the trials of one `export.acceptance` went."""
+
+    asked: Acceptance
+    seconds: tuple[float, ...]
+    """How long each lasted [s]."""
+    survived: int
+    """Trials without a fall or a drop."""
+    passed: int
+    """Of these, the trials with the weight in the hands and the way covered."""
+    weight_in_hands: float
+    """Mean part of the weight that rested in the hands; NaN where nothing is held."""
+    transport: float
+    """Mean part of the commanded way that the robot covered; NaN where none was commanded."""
+
+    @property
+    def enough(self) -> bool:
+        """Whether as many trials passed as the recipe asks for."""
+        return self.passed >= self.asked.minimum
+
+    @property
+    def sentence(self) -> str:
+        """What was asked and how it went."""
+        asked, last = self.asked, sum(segment.duration for segment in self.asked.sequence)
+        held = "" if np.isnan(self.weight_in_hands) else f", {self.weight_in_hands:.0%} of its weight in the hands"
+        way = "" if np.isnan(self.transport) else f", {self.transport:.0%} of the way covered"
+        return (
+            f"the exported controller kept a {asked.mass:g} kg object ({asked.scene}) for {last:g} s "
+            f"in {self.survived} of {asked.trials} trials{held}{way}; {self.passed} passed"
+        )
+
+
 def acceptance_episodes(recipe: Recipe) -> list[Episode]:
-    """The trials of `export.acceptance`; without it one that stands, unloaded, long enough for the golden vectors."""
+    """The trials of `export.acceptance`; without any, one that stands, unloaded, for as long as the golden vectors."""
     settings, commands = recipe.export, recipe.task.commands
-    if settings.acceptance is None:
+    if not settings.acceptance:
         duration = settings.golden_steps / recipe.task.control_frequency
         script = command_script([Segment(duration=duration, ramp=0.0)], commands)
         return [Condition(FREE, script, UNDISTURBED).episode(0.0, recipe.seed)]
-    asked = settings.acceptance
-    fixed = UNDISTURBED | {"partner_share": asked.partner_share}
-    condition = Condition(asked.scene, command_script(asked.sequence, commands), fixed)
-    return [condition.episode(asked.mass, asked.seed + number) for number in range(asked.trials)]
+    return [
+        condition.episode(asked.mass, asked.seed + number)
+        for asked in settings.acceptance
+        for fixed in [UNDISTURBED | {"partner_share": asked.partner_share}]
+        for condition in [Condition(asked.scene, command_script(asked.sequence, commands), fixed)]
+        for number in range(asked.trials)
+    ]
 
 
 def try_out(
     world: Specification, exported: Path, interrupted: Callable[[], bool]
-) -> tuple[ExportedPolicy, list[Outcome]]:
+) -> tuple[ExportedPolicy, list[Accepted]]:
     """Let the controller in the folder `exported` play the trials. Raises Interrupted when interrupted.
 
     Returns the driver, which holds the golden vectors and the difference of targets, and how the trials went.
@@ -44,4 +87,30 @@ def try_out(
         outcomes = play_in(environment, policy, interrupted)
     finally:
         environment.close()
-    return policy, outcomes
+    played = iter(zip(episodes, outcomes, strict=True))
+    asked = world.recipe.export.acceptance
+    measure = measure_of(world.recipe, load_robot(world.robot).joints)
+    return policy, [judged(world.recipe, measure, one, [next(played) for _ in range(one.trials)]) for one in asked]
+
+
+def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
+    """Which of the trials that were asked for pass: survived, the weight in the hands, the way covered."""
+    hands, ways, passed = [], [], 0
+    for episode, outcome in trials:
+        assert episode.script is not None
+        weight = held_weight(recipe, episode, outcome)
+        metrics = trial_metrics(outcome.trace, episode.script, measure, weight)
+        moved = [metrics["transport_robot"], metrics["transport_object"]]
+        hands.append(metrics["weight_in_hands"])
+        ways.append(moved[0])
+        carried = np.isnan(hands[-1]) or hands[-1] >= asked.weight_in_hands
+        transported = all(np.isnan(way) or way >= asked.transport for way in moved)
+        passed += bool(outcome.survived and carried and transported)
+    return Accepted(
+        asked,
+        seconds=tuple(outcome.seconds for _, outcome in trials),
+        survived=sum(outcome.survived for _, outcome in trials),
+        passed=passed,
+        weight_in_hands=float(np.mean(hands)),
+        transport=float(np.mean(ways)),
+    )

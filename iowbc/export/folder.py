@@ -68,7 +68,7 @@ def write_folder(
 
 def world_of(recipe: Recipe) -> Recipe:
     """The recipe reduced to what the export depends on; all else at its default, but for the commands to play."""
-    asked = recipe.export.acceptance
+    played = recipe.export.acceptance[:1]
     return Recipe(
         name=recipe.name,
         seed=recipe.seed,
@@ -76,7 +76,7 @@ def world_of(recipe: Recipe) -> Recipe:
         rg=ReferenceGenerator(height=recipe.rg.height),
         simulation=recipe.simulation,
         task=recipe.task,
-        eval=Evaluation() if asked is None else Evaluation(sequence=asked.sequence),
+        eval=Evaluation(sequence=played[0].sequence) if played else Evaluation(),
         export=recipe.export,
     )
 

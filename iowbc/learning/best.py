@@ -23,11 +23,14 @@ class Best:
         """What the desired KL divergence is multiplied by."""
         self.rollbacks = 0
         """Since the last better policy."""
+        self.low = 0
+        """Scores in a row that were far below the best."""
 
     def collapsed(self, score: float) -> bool:
-        """Whether a score says that the training got lost."""
-        notable = self.score >= self.settings.notable
-        return notable and score < (1.0 - self.settings.collapse) * self.score
+        """Whether this score, after those before, says that the training got lost."""
+        far_below = self.score >= self.settings.notable and score < (1.0 - self.settings.collapse) * self.score
+        self.low = self.low + 1 if far_below else 0
+        return self.low >= self.settings.patience
 
     def offer(self, score: float, learner: Arrays) -> None:
         """Keeps what has been learnt where it scores at least as well as ever."""
@@ -43,6 +46,7 @@ class Best:
                 "teacher.learning_rate, or raise teacher.check.rollbacks"
             )
         self.caution *= self.settings.caution
+        self.low = 0
         return self.learner
 
     def arrays(self) -> Arrays:
@@ -50,11 +54,11 @@ class Best:
         return {
             **prefixed("learner", self.learner),
             "score": np.array([self.score, self.caution]),
-            "rollbacks": np.array([self.rollbacks]),
+            "rollbacks": np.array([self.rollbacks, self.low]),
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `arrays`."""
         self.learner = under("learner", arrays)
         self.score, self.caution = arrays["score"].tolist()
-        self.rollbacks = int(arrays["rollbacks"][0])
+        self.rollbacks, self.low = arrays["rollbacks"].tolist()

@@ -33,8 +33,11 @@ class Check(Section):
     """Commands of a trial, in order."""
     collapse: float = Field(default=1 / 3, gt=0, lt=1)
     """Part of the best score whose loss counts as a collapse: the training goes back to its best policy."""
-    notable: float = Field(default=0.2, ge=0, lt=1)
-    """Best score from which a fall of it can be a collapse; below, scores are mostly chance."""
+    notable: float = Field(default=0.4, ge=0, lt=1)
+    """Best score from which a fall of it can be a collapse. Below, scores are mostly chance, and fall while a policy
+    that stood learns to walk."""
+    patience: int = Field(default=3, ge=1)
+    """Checks in a row that must say so: one of eight trials more or less moves the score by a tenth."""
     caution: float = Field(default=0.5, gt=0, lt=1)
     """What the desired KL divergence and the step size are multiplied by after each collapse."""
     rollbacks: int = Field(default=6, ge=0)

@@ -24,8 +24,13 @@ class Acceptance(Section):
     """Number of trials."""
     seed: int = Field(default=2000, ge=0, lt=2**32)
     """Seed of the first trial."""
+    weight_in_hands: float = Field(default=0.95, ge=0, le=1)
+    """Part of a held object's weight, less the partner's share, that must rest in the hands on average; the rest lies
+    on thighs or torso."""
+    transport: float = Field(default=0.5, ge=0, le=1)
+    """Part of the commanded displacement that robot and object must cover, where the commands ask for any."""
     minimum: int = Field(default=1, ge=0)
-    """Trials that must survive, or the stage fails; 0 only reports."""
+    """Trials that must be survived with the object carried and transported, or the stage fails; 0 only reports."""
 
     @model_validator(mode="after")
     def _reachable(self) -> Self:
@@ -48,5 +53,5 @@ class Export(Section):
     """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
     timing_steps: int = Field(default=500, ge=1, json_schema_extra=COSMETIC)
     """Inferences timed for the report."""
-    acceptance: Acceptance | None = Acceptance()
-    """The trial that accepts the exported controller; empty leaves it out."""
+    acceptance: tuple[Acceptance, ...] = (Acceptance(),)
+    """The trials that accept the exported controller, all of which must pass; empty leaves them out."""

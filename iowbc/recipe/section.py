@@ -8,6 +8,9 @@ from pydantic.fields import FieldInfo
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Extra of a field that changes how a stage is carried out or shown, and none of its results."""
+LATER: dict[str, Any] = {"later": True}
+"""Extra of a field that came after artifacts were published. At its default, which is what the program did before, it
+decides nothing, so that their keys hold."""
 
 
 class Section(BaseModel):
@@ -17,16 +20,17 @@ class Section(BaseModel):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """What decides results: a section's values as JSON data, without its cosmetic fields, however deep."""
+    """What decides results: a section's values as JSON data, however deep, without its cosmetic fields and without
+    later ones at their default."""
     kept: dict[str, Any] = _deciding(section, section.model_dump(mode="json"))
     return kept
 
 
 def _deciding(value: Any, plain: Any) -> Any:
-    """A value's JSON data without cosmetic fields."""
     if isinstance(value, BaseModel):
         fields = type(value).model_fields.items()
-        return {name: _deciding(getattr(value, name), plain[name]) for name, field in fields if not cosmetic(field)}
+        kept = [name for name, field in fields if not _left_out(field, getattr(value, name))]
+        return {name: _deciding(getattr(value, name), plain[name]) for name in kept}
     if isinstance(value, Mapping):
         return {name: _deciding(item, plain[name]) for name, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -34,6 +38,7 @@ def _deciding(value: Any, plain: Any) -> Any:
     return plain
 
 
-def cosmetic(field: FieldInfo) -> bool:
-    """Whether a field is marked as cosmetic."""
-    return isinstance(field.json_schema_extra, Mapping) and bool(field.json_schema_extra.get("cosmetic"))
+def _left_out(field: FieldInfo, value: Any) -> bool:
+    marks = field.json_schema_extra if isinstance(field.json_schema_extra, Mapping) else {}
+    usual: Any = field.get_default(call_default_factory=True)
+    return bool(marks.get("cosmetic")) or (bool(marks.get("later")) and bool(value == usual))

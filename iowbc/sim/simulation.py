@@ -28,6 +28,17 @@ from iowbc.sim.world import World
 TINY = 1e-9
 """Keeps a division by the friction of an absent object from dividing by zero."""
 
+STARTS_AT_ZERO = (
+    "joint_acceleration",
+    "slipped",
+    "partner_force",
+    "partner_energy",
+    "partner_share",
+    "external_force",
+    "push_force",
+)
+"""Parts of the state that an episode begins without."""
+
 
 class Simulation:
     """The environments of one process. Set `target` and `feed`, call `step`, read `state` and `measured`."""
@@ -187,7 +198,7 @@ class Simulation:
             world.reset(ids, joint_position[chosen], pitch[chosen], heading[chosen], drawn)
             world.gather(state)
             self._robot_mass[world.place] = world.robot_mass
-        for name in ("slipped", "partner_force", "partner_energy", "partner_share", "external_force", "push_force"):
+        for name in STARTS_AT_ZERO:
             getattr(state, name)[which] = 0
         state.grasped[which] = state.has_object[which, None]
         self._borne[which] = 0.0

@@ -39,7 +39,7 @@ class SimulationState(_Arrays):
     joint_velocity: Array
     """(n, joints) [rad/s]."""
     joint_acceleration: Array
-    """(n, joints) [rad/s²]."""
+    """Mean over the control period, (n, joints) [rad/s²]."""
     joint_torque: Array
     """Torque of the motors, (n, joints) [N·m]."""
     torque_limit: Array

@@ -50,7 +50,7 @@ class World:
         bind = self.batch.bind
         self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
-        self._acceleration, self._torque, self._external = bind("qacc"), bind("actuator_force"), bind("cfrc_ext")
+        self._torque, self._external = bind("actuator_force"), bind("cfrc_ext")
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
         kept, count, history = timing.kept_targets, len(rows), bind("history")
@@ -229,8 +229,9 @@ class World:
         state.base_linear_velocity[place] = qvel[:, BASE_LINEAR]
         state.base_angular_velocity[place] = qvel[:, BASE_ANGULAR]
         state.joint_position[place] = qpos[:, layout.joints]
-        state.joint_velocity[place] = qvel[:, layout.joint_speeds]
-        state.joint_acceleration[place] = self._acceleration[:, layout.joint_speeds]
+        speed = qvel[:, layout.joint_speeds]
+        state.joint_acceleration[place] = (speed - state.joint_velocity[place]) / self.timing.period
+        state.joint_velocity[place] = speed
         state.joint_torque[place] = self._torque
         ranges = self.fields.torque_range
         limit = np.where(self._torque < 0.0, -ranges[..., 0], ranges[..., 1])

@@ -13,7 +13,7 @@ from iowbc.robot.description import Robot
 
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
-    return Recipe.model_validate({"name": "test", "export": {"acceptance": None, "golden_steps": 5}})
+    return Recipe.model_validate({"name": "test", "export": {"acceptance": [], "golden_steps": 5}})
 
 
 @pytest.fixture(scope="session")

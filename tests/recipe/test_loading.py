@@ -167,9 +167,8 @@ def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -
 
 
 def test_an_override_reaches_into_a_list_that_is_a_default(tmp_path: Path) -> None:
-    acceptance = loaded(tmp_path, "seed: 1\n", "export.acceptance.sequence.0.duration=1.25").recipe.export.acceptance
-    assert acceptance is not None
-    (segment,) = acceptance.sequence
+    acceptance = loaded(tmp_path, "seed: 1\n", "export.acceptance.0.sequence.0.duration=1.25").recipe.export.acceptance
+    (segment,) = acceptance[0].sequence
     assert (segment.duration, segment.ramp) == (1.25, 0.0)
 
 

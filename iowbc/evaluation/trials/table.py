@@ -24,14 +24,18 @@ def measure_of(recipe: Recipe, joints: tuple[str, ...]) -> Measure:
     return Measure(task.control_frequency, task.references.gait, task.commands, recipe.eval.foot_load, joints)
 
 
+def held_weight(recipe: Recipe, episode: Episode, outcome: Outcome) -> float:
+    """Weight of the object in the hands [N]; 0 without one."""
+    held = getattr(recipe.simulation.scenes, episode.scene).kind == "lift"
+    return GRAVITY * float(outcome.drawn["object_mass"][0]) if held else 0.0
+
+
 def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) -> dict[str, Any]:
     """One row of the long table: what was tried, how it ended, the metrics, everything drawn, and how to replay it."""
     episode, fixed = trial.episode, trial.episode.fixed
     if episode.script is None:
         raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
-    held = getattr(recipe.simulation.scenes, episode.scene).kind == "lift"
-    weight = GRAVITY * float(outcome.drawn["object_mass"][0]) if held else 0.0
-    metrics = trial_metrics(outcome.trace, episode.script, measure, weight)
+    metrics = trial_metrics(outcome.trace, episode.script, measure, held_weight(recipe, episode, outcome))
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
