@@ -13,7 +13,7 @@ from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.check import Check
 from iowbc.recipe.teacher import Teacher
 
-CHECK = Check(every=1, rollbacks=2)
+CHECK = Check(every=1, rollbacks=2, patience=1)
 
 
 class Scores:
@@ -75,6 +75,18 @@ def test_a_score_that_falls_by_a_third_brings_the_best_policy_back_with_smaller_
     assert some.model.learning_rate < 0.75 * rate
     assert some.update()["rollbacks"] == 0.0, "a policy as good as the best ends the count"
     assert some.best.caution == 0.5
+
+
+def test_only_low_scores_in_a_row_are_a_collapse_across_an_interruption_too() -> None:
+    patient = CHECK.model_copy(update={"patience": 2})
+    some, lines = training(Scores(0.6, 0.1, 0.5, 0.1), check=patient)
+    for _ in range(4):
+        some.update()
+    assert lines == []
+    resumed, more = training(Scores(0.1), check=patient)
+    resumed.restore(some.arrays())
+    resumed.update()
+    assert "the score fell from 0.600 to 0.100" in more[0]
 
 
 def test_low_scores_at_the_beginning_are_no_collapse() -> None:

@@ -13,7 +13,7 @@ from iowbc.task.endings import dropped, fallen, lagging
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
-RECIPE = Termination()
+RECIPE = Termination(lag=0.5)
 
 
 def moved(**values: float) -> Any:
