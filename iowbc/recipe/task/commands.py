@@ -63,21 +63,22 @@ class Commands(Section):
     """Height of the nominal posture [m], taken when a command leaves the posture alone."""
     nominal_pitch: float = 0.0
     """Torso pitch of the nominal posture [rad]."""
-    standing_episodes: float = Field(default=0.2, ge=0.0, le=1.0)
+    standing_episodes: float = Field(default=0.1, ge=0.0, le=1.0)
     """Part of the episodes that never walk: there balance, posture and loads are practised while walking is not learnt
     yet; 1 trains standing alone."""
-    standing_share: float = Field(default=0.25, ge=0.0, le=1.0)
-    """Part of the commands of the other episodes that ask for standing still, so that six in ten of all walk."""
+    standing_share: float = Field(default=0.15, ge=0.0, le=1.0)
+    """Part of the commands of the other episodes that ask for standing still, so that three in four of all walk.
+    With two in four a robot learnt to step in place, and stayed there."""
     straight_share: float = Field(default=0.5, ge=0.0, le=1.0)
     """Part of the walking commands without yaw rate and lateral velocity."""
-    turning_share: float = Field(default=0.2, ge=0.0, le=1.0)
+    turning_share: float = Field(default=0.1, ge=0.0, le=1.0)
     """Part of the commands with a yaw rate that turn on the spot."""
     nominal_share: float = Field(default=0.4, ge=0.0, le=1.0)
     """Part of the commands with nominal height, pitch and wrists."""
     holding_start: float = Field(default=0.3, ge=0.0, le=1.0)
     """Part of a drawn posture's distance from the nominal one at which an episode with a held object begins; at 1 a
     third of the objects would begin inside thighs or torso. The command then approaches the drawn posture."""
-    smallest_speed: float = Field(default=0.2, ge=0.0)
+    smallest_speed: float = Field(default=0.25, ge=0.0)
     """Planar speed [m/s] under which a drawn walking velocity is lengthened, so that walking is worth a step."""
     smallest_yaw_rate: float = Field(default=0.2, ge=0.0)
     """Yaw rate [rad/s] under which a turn on the spot is quickened, for the same reason."""
