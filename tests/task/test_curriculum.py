@@ -123,10 +123,10 @@ def test_without_a_curriculum_levels_stay() -> None:
     assert set(moved(WELL, LEVEL, off).values()) == {0.0}
 
 
-def test_levels_go_from_slow_walking_with_light_loads_to_more_than_the_recipes_ranges() -> None:
+def test_levels_go_from_light_loads_near_the_nominal_posture_to_more_than_the_recipes_ranges() -> None:
     levels = np.array([[0.0] * 4, [1.0] * 4, [1.5] * 4, [2.0] * 4])
     scales = difficulty(Curriculum(), levels)
-    assert scales.velocity.tolist() == pytest.approx([0.6, 1.0, 1.15, 1.3])
+    assert scales.velocity.tolist() == pytest.approx([1.0, 1.0, 1.15, 1.3])
     assert scales.turning.tolist() == pytest.approx([0.2, 1.0, 1.15, 1.3])
     assert scales.load.tolist() == pytest.approx([0.15, 1.0, 1.15, 1.3])
     assert scales.disturbance.tolist() == pytest.approx([0.0, 1.0, 1.25, 1.5])
@@ -183,14 +183,14 @@ def test_the_levels_set_load_and_disturbances(make: Make) -> None:
     assert drawn["push_scale"].tolist() == pytest.approx([0.0, 1.5])
 
 
-def test_about_half_of_the_commands_ask_for_steps_from_the_first_episode_on(make: Make) -> None:
+def test_two_of_three_steps_walk_from_the_first_episode_on(make: Make) -> None:
     env = make(num_envs=48, changes={"task.scenes.lift": 0.0, "task.episode_duration": (1.0, 1.0)})
     env.reset()
     walking = []
     for step in range(150):
         env.step(actions(step, 48, 0.1))
         walking.append(env.signals["commanded_velocity"].any(axis=1).mean())
-    assert 0.35 < np.mean(walking) < 0.6
+    assert 0.6 < np.mean(walking) < 0.8
 
 
 def test_at_the_highest_level_three_of_ten_pushes_and_more_cannot_be_made_and_the_share_is_told(make: Make) -> None:

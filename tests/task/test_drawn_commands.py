@@ -27,7 +27,7 @@ def goals(level: float, count: int = 4000, *, pushing: bool = False, commands: C
 
 
 def test_goals_at_level_one_fill_the_recipes_ranges_and_do_not_leave_them() -> None:
-    drawn = goals(1.0, commands=COMMANDS.model_copy(update={"deep_share": 0.0}))
+    drawn = goals(1.0, commands=COMMANDS.model_copy(update={"deep_share": 0.0, "smallest_speed": 0.0}))
     ranges = (COMMANDS.velocity_x, COMMANDS.velocity_y, COMMANDS.yaw_rate, COMMANDS.height, COMMANDS.pitch)
     for column, (low, high) in enumerate(ranges):
         values = drawn[:, column]
@@ -71,7 +71,7 @@ def test_deep_leans_reach_the_papers_range_and_stand() -> None:
     drawn = goals(1.0)
     low, high = COMMANDS.pitch
     deep = (drawn[:, PITCH] < low) | (drawn[:, PITCH] > high)
-    assert 0.01 < deep.mean() < COMMANDS.deep_share
+    assert 0.005 < deep.mean() < COMMANDS.deep_share
     assert drawn[deep, PITCH].max() > 1.3
     assert not drawn[deep][:, VELOCITY].any()
 
@@ -82,10 +82,9 @@ def test_turns_on_the_spot_are_worth_a_step() -> None:
     assert np.abs(turns[turns != 0.0]).min() >= COMMANDS.smallest_yaw_rate
 
 
-def test_at_the_start_of_the_curriculum_some_walk_slowly_and_postures_are_near_nominal() -> None:
+def test_at_the_start_of_the_curriculum_most_walk_and_postures_are_near_nominal() -> None:
     drawn = goals(0.0)
-    assert 0.6 < drawn[:, VELOCITY].any(axis=1).mean() < 0.8
-    assert drawn[:, 0].max() <= 0.6 * COMMANDS.velocity_x[1] + 1e-9
+    assert 0.8 < drawn[:, VELOCITY].any(axis=1).mean() < 0.9
     nominal = nominal_command(COMMANDS)
     reach = 0.2 * max(nominal[HEIGHT] - COMMANDS.height[0], COMMANDS.height[1] - nominal[HEIGHT])
     assert np.abs(drawn[:, HEIGHT] - nominal[HEIGHT]).max() <= reach + 1e-9

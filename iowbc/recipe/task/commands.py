@@ -79,7 +79,8 @@ class Commands(Section):
     """Part of a drawn posture's distance from the nominal one at which an episode with a held object begins; at 1 a
     third of the objects would begin inside thighs or torso. The command then approaches the drawn posture."""
     smallest_speed: float = Field(default=0.25, ge=0.0)
-    """Planar speed [m/s] under which a drawn walking velocity is lengthened, so that walking is worth a step."""
+    """Planar speed [m/s] under which a drawn walking velocity is lengthened, out of its range if need be, so that
+    walking is worth a step."""
     smallest_yaw_rate: float = Field(default=0.2, ge=0.0)
     """Yaw rate [rad/s] under which a turn on the spot is quickened, for the same reason."""
     resampling: Range = (3.0, 7.0)
