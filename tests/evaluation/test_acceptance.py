@@ -24,7 +24,7 @@ def played(*, in_hands: float = 1.0, covered: float = 0.0, fallen: bool = False)
     grip, path = signals.grip_force.copy(), signals.base_position.copy()
     grip[:, [2, 5]] = -0.5 * in_hands * MASS * GRAVITY
     path[:, 0] = covered * WALK[0] * MEASURE.control_frequency**-1 * np.arange(STEPS)
-    moved = replace(signals, grip_force=grip, base_position=path, object_position=path + [0.3, 0.0, 1.0])
+    moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, 0.0, 1.0]))
     drawn = {"object_mass": np.array([MASS])}
     outcome = Outcome(moved, 8.0, fallen=fallen, dropped=False, finished=not fallen, drawn=drawn)
     commands = script(8.0, WALK if covered else (0.0, 0.0, 0.0))
