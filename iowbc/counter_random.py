@@ -14,8 +14,8 @@ from iowbc.arrays import Array, Keys
 from iowbc.recipe.simulation.distribution import Distribution
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-MULTIPLIERS = (np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
-SHIFTS = (np.uint64(30), np.uint64(27), np.uint64(31))
+FIRST, SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+THIRTY, TWENTY_SEVEN, THIRTY_ONE = np.uint64(30), np.uint64(27), np.uint64(31)
 MANTISSA_SHIFT = np.uint64(11)
 UNIT = 2.0**-53
 
@@ -23,10 +23,11 @@ UNIT = 2.0**-53
 def mix(value: Keys) -> Keys:
     """SplitMix64's output function (Steele, Lea, Flood 2014) of value + golden ratio: a scattering bijection."""
     z = value + GOLDEN
-    for shift, multiplier in zip(SHIFTS[:2], MULTIPLIERS, strict=True):
-        z ^= z >> shift
-        z *= multiplier
-    z ^= z >> SHIFTS[2]
+    z ^= z >> THIRTY
+    z *= FIRST
+    z ^= z >> TWENTY_SEVEN
+    z *= SECOND
+    z ^= z >> THIRTY_ONE
     return z
 
 

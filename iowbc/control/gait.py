@@ -25,7 +25,7 @@ def foot_phase(xp: Any, phase: Array) -> Array:
     In NumPy or in torch, whichever `xp` is.
     """
     other = phase + 0.5
-    both: Array = xp.stack([phase, other - xp.floor(other)], -1)
+    both: Array = xp.concatenate([phase[:, None], (other - xp.floor(other))[:, None]], -1)
     return both
 
 

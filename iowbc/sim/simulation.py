@@ -74,6 +74,10 @@ class Simulation:
             World(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
             for name in self._scenes
         )
+        self._owner, self._index = np.empty(n, np.int64), np.empty(n, np.int64)
+        """World of each environment, and its place there, (n,)."""
+        for number, world in enumerate(self.worlds):
+            self._owner[world.rows], self._index[world.rows] = number, np.arange(len(world.rows))
         self._draws = Draws(recipe, models, robot)
         self.hold(fixed or {})
         self._key = random.environment_key(seed, self.envs)
@@ -159,7 +163,7 @@ class Simulation:
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self._draws.names))}")
         for name, values in fixed.items():
-            self.fixed[name] = np.broadcast_to(np.asarray(values, np.float64), (self.n,)).copy()
+            self.fixed.setdefault(name, np.empty(self.n))[:] = values
 
     def reseed(self, key: NDArray[np.uint64]) -> None:
         """All that is random starts anew, from the next reset on; `key` (n,) as from `random.environment_key`."""
@@ -264,10 +268,11 @@ class Simulation:
     def _parts(self, which: Indices) -> Iterator[tuple[World, Indices, Indices]]:
         """Worlds that some environments belong to, with their indices in the world, rising, and in `which`."""
         order = np.argsort(which)
-        for world in self.worlds:
-            chosen = order[np.isin(which[order], world.rows)]
+        owner = self._owner[which[order]]
+        for number, world in enumerate(self.worlds):
+            chosen = order[owner == number]
             if len(chosen):
-                yield world, np.searchsorted(world.rows, which[chosen]), chosen
+                yield world, self._index[which[chosen]], chosen
 
     def _squeeze(self) -> Array:
         """Force with which the arms press each hand against a held object, (n,) [N]: always the same where friction
@@ -333,11 +338,9 @@ class Simulation:
 
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""
-        for world in self.worlds:
-            found = np.flatnonzero(world.rows == env)
-            if len(found):
-                return world, int(found[0])
-        raise IndexError(f"no environment {env}; there are {self.n}")
+        if not 0 <= env < self.n:
+            raise IndexError(f"no environment {env}; there are {self.n}")
+        return self.worlds[self._owner[env]], int(self._index[env])
 
     def physics_model(self, env: int) -> tuple[Any, Any]:
         """Copies of the MuJoCo model and data with which an environment is stepped."""

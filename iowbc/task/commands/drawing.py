@@ -41,7 +41,7 @@ def _velocities(commands: Commands, key: Keys, difficulty: Difficulty, pushing: 
     u = random.uniform(key, "command/velocity", 6)
     ranges = np.array([commands.velocity_x, commands.velocity_y, commands.yaw_rate])
     behind = np.array([commands.pushing.velocity_x, commands.pushing.velocity_y, commands.pushing.yaw_rate])
-    low, high = np.moveaxis(np.where(pushing[:, None, None], behind, ranges), -1, 0)
+    low, high = np.where(pushing[:, None], behind.T[:, None], ranges.T[:, None])
     velocity = low + (high - low) * u[:, :3]
     velocity[:, 0] *= difficulty.velocity
     velocity[:, 1:] *= difficulty.turning[:, None]
