@@ -184,6 +184,20 @@ def compare(
 
 
 @app.command()
+def report(
+    recipes: Annotated[list[str], typer.Argument(help="Recipes that have run, one or more.", metavar="RECIPE...")],
+    output: Annotated[Path | None, typer.Option(help="HTML file to write; runs/report/RECIPE.html.")] = None,
+    runs: RunsFolder = None,
+) -> None:
+    """Write one HTML page about runs: tables, interactive curves, films, differences; it opens without a network."""
+    from iowbc.commands.report import report as write_report
+
+    store = _store(runs)
+    name = "-".join(Path(recipe).stem for recipe in recipes)
+    write_report(store, _console(), recipes, output or store.runs.reports / f"{name}.html")
+
+
+@app.command()
 def gc(
     unused: Annotated[bool, typer.Option("--unused", help="Artifacts that no recipe ever used.")] = False,
     recipe: Annotated[

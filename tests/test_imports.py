@@ -33,8 +33,10 @@ MAY_IMPORT = {
     "evaluation": WORLD | {"task", "reference", "learning", "deploy"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
+    "report": {"pipeline", "recipe", "errors"},
     "stages": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
-    "commands": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
+    "commands": WORLD
+    | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""

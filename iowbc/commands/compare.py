@@ -1,5 +1,6 @@
 """`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
 
+import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,11 +8,13 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.named import Named, named
 from iowbc.commands.play import input_of
 from iowbc.commands.results import shown_path
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
+from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
@@ -19,7 +22,11 @@ from iowbc.pipeline.writability import require_writable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from iowbc.report.runs import Group
+
 TRIALS = "trials.parquet"
+CURVE_WIDTH = 40
+"""Characters of a learning curve."""
 
 
 def compare(store: Store, console: Console, words: Sequence[str], output: Path, film: bool = False) -> None:
@@ -41,22 +48,59 @@ def compare(store: Store, console: Console, words: Sequence[str], output: Path, 
     elif film:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     for path in (output / "metrics.md", *sorted((output / "tables").glob("*.md"))):
-        console.print(path.read_text(encoding="utf-8"), markup=False, highlight=False, soft_wrap=True)
+        cells = read_table(path.read_text(encoding="utf-8"))
+        console.print(drawn(cells, console.width) if cells.rows else "no metric differs")
+        console.print()
+    _print_curves(found, console)
     for path in sorted(output.rglob("*.*")):
         console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
 
 
 def metrics_table(found: Sequence[Named]) -> str:
-    """All metrics of all stages as a Markdown table, a column for each run."""
-    names = dict.fromkeys(
-        (stage, metric) for run in found for stage, artifact in run.artifacts.items() for metric in artifact.metrics
-    )
-    rows = ["| stage | metric | " + " | ".join(run.word for run in found) + " |", "|---|---|" + "---:|" * len(found)]
-    for stage, metric in names:
-        values = [run.artifacts[stage].metrics.get(metric) if stage in run.artifacts else None for run in found]
-        cells = ["" if value is None else f"{value:.4g}" for value in values]
-        rows.append(f"| {stage} | {metric} | " + " | ".join(cells) + " |")
+    """The metrics that differ as a Markdown table: a column for each recipe, seeds together, and Δ to the first."""
+    from iowbc.report.runs import metric_rows
+
+    groups = _groups(found)
+    heads = [groups[0].label, *(name for group in groups[1:] for name in (group.label, f"Δ {group.label}"))]
+    rows = ["| stage | metric | " + " | ".join(heads) + " |", "|---|---|" + "---:|" * len(heads)]
+    for row in metric_rows(groups):
+        if row.differs:
+            cells = [row.cells[0], *(text for pair in zip(row.cells[1:], row.deltas, strict=True) for text in pair)]
+            rows.append(f"| {row.stage} | {row.name} | " + " | ".join(cells) + " |")
     return "\n".join(rows) + "\n"
+
+
+def _groups(found: Sequence[Named]) -> "list[Group]":
+    from iowbc.report.runs import Run, grouped
+
+    return grouped([Run(run.word, run.artifacts, run.recipe or {}) for run in found])
+
+
+def _print_curves(found: Sequence[Named], console: Console) -> None:
+    """The main learning curves of each recipe, one line each; `iowbc report` has them at full size."""
+    from iowbc.report.curves import LEARNING, learning_panels
+
+    groups = _groups(found)
+    for stage in LEARNING:
+        for panel in learning_panels(groups, stage)[0]:
+            console.print(f"{stage}: {panel.title}", markup=False, highlight=False)
+            for trace in panel.traces:
+                values = [value for value in trace["y"] if value is not None]
+                if trace.get("showlegend", True) and values:
+                    text = f"  {sparkline(values, CURVE_WIDTH)} {values[-1]:.4g}  {trace['name']}"
+                    console.print(text, markup=False, highlight=False, no_wrap=True, overflow="ellipsis")
+
+
+def joined_tables(found: Sequence[Named]) -> dict[str, str]:
+    """Result tables in Markdown by name: of one run its own, of several those over all their trials."""
+    tried = [run for run in found if _trials(run).is_file()]
+    with tempfile.TemporaryDirectory() as folder:
+        tables = Path(folder, "tables")
+        if len(tried) > 1:
+            _report(tried, Path(folder))
+        elif tried:
+            tables = tried[0].artifacts["eval"].folder / "tables"
+        return {path.stem: path.read_text(encoding="utf-8") for path in sorted(tables.glob("*.md"))}
 
 
 def _trials(run: Named) -> Path:

@@ -18,9 +18,13 @@ from iowbc.recipe.reading.loading import load_recipe
 def diff(store: Store, console: Console, first: str, second: str) -> None:
     """Print the differences. Each of the two is whatever `show` takes, or a recipe file that has not run."""
     a, b = _either(store, first), _either(store, second)
-    lines = [*_recipes(a, b), *_stages(a, b)]
-    for line in lines or ["no difference"]:
+    for line in difference_lines(a, b) or ["no difference"]:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def difference_lines(a: Named, b: Named) -> list[str]:
+    """How two recipes or artifacts differ, a line each; empty where they do not."""
+    return [*_recipes(a, b), *_stages(a, b)]
 
 
 def _either(store: Store, word: str) -> Named:

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-INTERVAL = re.compile(r" ± [\d.]+")
+INTERVAL = re.compile(r" ± [\d.]+(?:e[-+]\d+)?")
 """Half an interval behind a mean."""
 PAPER = "paper "
 """What the head of a column begins with that holds the paper's own figure."""
@@ -53,7 +53,8 @@ def drawn(cells: Cells, width: int) -> Group:
         table.add_row(*map(Text, row))
     left_out = ", ".join(name for name in cells.head if name not in head)
     below = [Text(f"(wider terminals show {left_out})", style="dim")] if left_out else []
-    return Group(Text(title, style="italic"), table, *below)
+    above = [Text(title, style="italic")] if title else []
+    return Group(*above, table, *below)
 
 
 def _width(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int:

@@ -52,7 +52,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
             _line(console, f"controller  {shown_path(folder)}")
     if artifacts:
         _line(console, "next:")
-        for command in next_commands(runs, artifacts, word):
+        for command in next_commands(runs, recipe, artifacts, word):
             _line(console, f"  {command}")
 
 
@@ -70,11 +70,11 @@ def described(artifacts: Mapping[str, Artifact]) -> str:
     return "\n".join(path.read_text(encoding="utf-8") for path in chosen)
 
 
-def next_commands(runs: Runs, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
+def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
     """What a user would type next: to see the robot, where there is a policy, and to read about the run."""
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
     seen = ["iowbc", "play", word] if {"teacher", "distill", "export"} & artifacts.keys() else ["iowbc", "show", word]
-    return [shlex.join([*words, *elsewhere]) for words in (seen, ["iowbc", "ls"])]
+    return [shlex.join([*words, *elsewhere]) for words in (seen, ["iowbc", "report", recipe])]
 
 
 def _print_tables(folder: Path, console: Console) -> None:

@@ -128,10 +128,22 @@ def test_diff_names_fields_keys_and_metrics(folder: Path, command: Command, key:
     assert "seed: 3 -> 8" in command("diff", "first", "third.yaml").stdout
 
 
-def test_compare_puts_metrics_side_by_side(folder: Path, command: Command) -> None:
+def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves(
+    folder: Path, command: Command, key: Key
+) -> None:
+    for name, count in (("first", 3.0), ("second", 5.0)):
+        artifact = folder / "runs" / "store" / "teacher" / key(name, "teacher")
+        summary = {"metrics": {"count": count, "same": 1.0}}
+        (artifact / "summary.json").write_text(json.dumps(summary))
+        (artifact / "tables" / "learning_curves.csv").write_text(f"step,reward\n1,0\n2,{count}\n")
     done = command("compare", "first", "second")
-    assert done.returncode == 0
-    assert "| teacher | count | 3 | 3 |" in (folder / "runs" / "compare" / "metrics.md").read_text()
+    assert done.returncode == 0, done.stderr
+    table = (folder / "runs" / "compare" / "metrics.md").read_text()
+    assert table.splitlines()[0] == "| stage | metric | first | second | Δ second |"
+    assert table.splitlines()[2:] == ["| teacher | count | 3 | 5 | +2 |"]
+    assert "|" not in done.stdout
+    assert done.stdout.index("teacher: reward of a step") < done.stdout.index("▁█ 3  first")
+    assert "▁█ 5  second" in done.stdout
 
 
 def test_gc_removes_what_it_is_told_to_and_nothing_else(folder: Path, command: Command, key: Key) -> None:

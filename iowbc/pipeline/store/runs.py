@@ -60,7 +60,13 @@ class Runs:
             self.tracking,
             self.tracked_files,
             self.root / "compare",
+            self.reports,
         )
+
+    @property
+    def reports(self) -> Path:
+        """HTML pages about runs."""
+        return self.root / "report"
 
     @property
     def database(self) -> Path:

@@ -1,0 +1,173 @@
+"""Interactive curves as plotly's own plain figures: learning curves over steps, errors over masses."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.report.runs import Group
+
+Values = NDArray[np.float64]
+
+MOST_POINTS = 400
+"""Points of a curve; a longer one is averaged over neighbours."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
+"""Colours that colour-blind readers tell apart (Okabe and Ito), one for each group."""
+BAND = "33"
+"""Opacity of a band, as the last two digits of its colour."""
+LEARNING: Mapping[str, Mapping[str, str]] = {
+    "teacher": {
+        "reward": "reward of a step",
+        "episode_seconds": "length of an episode [s]",
+        "terminations/fallen": "episodes that end in a fall",
+        "curriculum_level": "level of the curriculum",
+        "check/score": "score of the check",
+        "check/E_v": "E_v in the check [m/s]",
+    },
+    "distill": {
+        "kl": "KL divergence to the teacher",
+        "action_agreement": "agreement with the teacher's action",
+        "episode_seconds": "length of an episode [s]",
+    },
+}
+"""The curves of each stage that are always shown, and what they are called; all others can be unfolded."""
+ERRORS = {
+    "rate": "success rate",
+    "E_v": "E_v [m/s]",
+    "E_psi": "E_ψ [rad]",
+    "E_alpha": "E_α [rad]",
+    "E_h": "E_h [m]",
+}
+SWEPT = 2
+"""Masses from which on a suite has a curve."""
+
+
+@dataclass
+class Panel:
+    """One small figure."""
+
+    title: str
+    traces: list[dict[str, Any]] = field(default_factory=list)
+    across: str = "million environment steps"
+
+    @property
+    def figure(self) -> dict[str, Any]:
+        """What plotly draws; the page adds the colours of light and dark."""
+        return {
+            "data": self.traces,
+            "layout": {"title": {"text": self.title, "font": {"size": 14}}, "xaxis": {"title": {"text": self.across}}},
+        }
+
+
+def learning_panels(groups: Sequence[Group], stage: str) -> tuple[list[Panel], list[Panel]]:
+    """The main learning curves of a stage, and all others."""
+    found = [
+        [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
+    ]
+    names = dict.fromkeys(name for group in found for columns in group for name in columns if name != "step")
+    titles = LEARNING.get(stage, {})
+    panels = {name: Panel(titles.get(name, name)) for name in [*titles, *names] if name in names}
+    for name, panel in panels.items():
+        for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
+            curves = [_thinned(columns["step"] / 1e6, columns[name]) for columns in runs if name in columns]
+            panel.traces += _band(group.label, place, *_joined(curves)) if curves else []
+    return [panel for name, panel in panels.items() if name in titles], [
+        panel for name, panel in panels.items() if name not in titles
+    ]
+
+
+def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
+    """Success and errors over the mass, for each suite that sweeps it."""
+    panels: dict[tuple[str, str], Panel] = {}
+    for place, group in enumerate(groups):
+        folders = [run.artifacts["eval"].folder for run in group.runs if "eval" in run.artifacts]
+        for suite in dict.fromkeys(suite for folder in folders for suite in _suites(folder)):
+            sweeps = [found[suite] for folder in folders if suite in (found := _suites(folder))]
+            for name, title in ERRORS.items():
+                curves = [sweep[name] for sweep in sweeps]
+                joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
+                panel = panels.setdefault((suite, name), Panel(f"{suite}: {title}", across="mass [kg]"))
+                panel.traces += _band(group.label, place, *joined, mode="lines+markers")
+    return list(panels.values())
+
+
+def _columns(folder: Path) -> dict[str, Values]:
+    """The columns of an artifact's learning curves; a value that a row lacks is NaN."""
+    path = folder / "tables" / "learning_curves.csv"
+    if not path.is_file():
+        return {}
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in (rows[0] if rows else ())}
+
+
+def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
+    """By suite that sweeps the mass, and by error: masses, means, and both ends of the interval."""
+    path = folder / "tables" / "summary.csv"
+    if not path.is_file():
+        return {}
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = {}
+    for suite in dict.fromkeys(row["suite"] for row in rows):
+        own = sorted(
+            (row for row in rows if row["suite"] == suite and row["case"] == suite), key=lambda row: float(row["mass"])
+        )
+        mass = _numbers(own, "mass")
+        if len(set(mass)) < SWEPT:
+            continue
+        found[suite] = {"rate": (mass, _numbers(own, "rate"), _numbers(own, "rate_low"), _numbers(own, "rate_high"))}
+        for name in list(ERRORS)[1:]:
+            mean, half = _numbers(own, name), np.nan_to_num(_numbers(own, f"{name}_half"))
+            found[suite][name] = mass, mean, mean - half, mean + half
+    return found
+
+
+def _numbers(rows: Sequence[Mapping[str, str]], name: str) -> Values:
+    return np.array([float(row.get(name) or "nan") for row in rows])
+
+
+def _thinned(across: Values, values: Values) -> tuple[Values, Values]:
+    """A curve of few points: means of neighbours, without what is missing."""
+    known = np.isfinite(values)
+    across, values = across[known], values[known]
+    if len(values) <= MOST_POINTS:
+        return across, values
+    parts = [np.array_split(row, MOST_POINTS) for row in (across, values)]
+    return np.array([part.mean() for part in parts[0]]), np.array([part.mean() for part in parts[1]])
+
+
+def _joined(curves: Sequence[tuple[Values, Values]]) -> tuple[Values, Values, Values, Values]:
+    """Mean, least and greatest of several curves, over the part of the axis that all of them have."""
+    longest = max(curves, key=lambda curve: len(curve[0]))[0]
+    curves = [curve for curve in curves if len(curve[0])]
+    if not curves:
+        return longest, longest, longest, longest
+    common = longest[(longest >= max(c[0][0] for c in curves)) & (longest <= min(c[0][-1] for c in curves))]
+    values = np.stack([np.interp(common, *curve) for curve in curves])
+    return common, values.mean(axis=0), values.min(axis=0), values.max(axis=0)
+
+
+def _band(
+    label: str, place: int, across: Values, mean: Values, low: Values, high: Values, mode: str = "lines"
+) -> list[dict[str, Any]]:
+    """A line, and behind it the band between two others where they differ."""
+    colour = COLOURS[place % len(COLOURS)]
+    shown = {"name": label, "legendgroup": label, "x": _plain(across)}
+    traces: list[dict[str, Any]] = []
+    if not np.array_equal(low, high):
+        edge = {**shown, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+        traces = [
+            {**edge, "y": _plain(low)},
+            {**edge, "y": _plain(high), "fill": "tonexty", "fillcolor": colour + BAND},
+        ]
+    return [*traces, {**shown, "y": _plain(mean), "mode": mode, "line": {"color": colour, "width": 2}}]
+
+
+def _plain(values: Values) -> list[float | None]:
+    """Numbers for JSON, of six digits; what is no number is left out of a line."""
+    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in values]

@@ -1,0 +1,107 @@
+"""The page itself: one HTML file with everything in it, which asks no network for anything."""
+
+import base64
+import html
+import json
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+
+from iowbc.pipeline.console.wording import KEY_LENGTH, duration
+from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
+from iowbc.report.curves import Panel, evaluation_panels, learning_panels
+from iowbc.report.runs import Group, Run, metric_rows
+
+TRAINED = ("teacher", "distill")
+"""Stages with learning curves."""
+KINDS = {".png": "image/png", ".mp4": "video/mp4"}
+FIRST_PICTURES = ("postures.png", "comparison.png")
+"""Pictures that are shown at once; all others can be unfolded."""
+
+
+def write_page(
+    path: Path,
+    runs: Sequence[Run],
+    groups: Sequence[Group],
+    tables: Mapping[str, str],
+    differences: Sequence[str],
+) -> None:
+    """Write the page about some runs.
+
+    tables: result tables in Markdown, by name. differences: lines that say how the runs differ.
+    """
+    from jinja2 import Environment, select_autoescape
+    from plotly.offline import get_plotlyjs
+
+    template = Environment(
+        autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True
+    ).from_string(files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8"))
+    curves: dict[str, Panel] = {}
+    learning = []
+    for stage in TRAINED:
+        main, others = learning_panels(groups, stage)
+        learning.append((stage, _numbered(curves, main), _numbered(curves, others)))
+    evaluation = _numbered(curves, evaluation_panels(groups))
+    text = template.render(
+        title=" · ".join(run.label for run in runs),
+        made=time.strftime("%Y-%m-%d %H:%M"),
+        version=version("iowbc"),
+        runs=runs,
+        groups=groups,
+        rows=[row for row in metric_rows(groups) if row.differs],
+        tables={name: _table(markdown) for name, markdown in tables.items()},
+        learning=[entry for entry in learning if entry[1] or entry[2]],
+        evaluation=evaluation,
+        films=list(_media(runs, "videos")),
+        pictures=list(_media(runs, "figures")),
+        first_pictures=FIRST_PICTURES,
+        differences=differences,
+        provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
+        key_shown=KEY_LENGTH,
+        duration=duration,
+    )
+    figures = json.dumps({name: panel.figure for name, panel in curves.items()}).replace("</", "<\\/")
+    text = text.replace("@FIGURES@", figures).replace("@PLOTLY@", get_plotlyjs().replace("</script", "<\\/script"))
+    path.write_text(text, encoding="utf-8")
+
+
+def _numbered(curves: dict[str, Panel], panels: Sequence[Panel]) -> list[str]:
+    """Names of panels on the page, which are added to its curves."""
+    names = [f"curve{len(curves) + place}" for place in range(len(panels))]
+    curves.update(zip(names, panels, strict=True))
+    return names
+
+
+def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
+    """Whose it is, name, and content as a data address of every film or picture, each artifact once."""
+    seen = set()
+    for run in runs:
+        for stage, artifact in run.artifacts.items():
+            if artifact.manifest.key in seen:
+                continue
+            seen.add(artifact.manifest.key)
+            for path in sorted((artifact.folder / folder).glob("*")):
+                if path.suffix in KINDS:
+                    content = base64.b64encode(path.read_bytes()).decode()
+                    yield f"{run.label}, {stage}", path.name, f"data:{KINDS[path.suffix]};base64,{content}"
+
+
+def _beside(artifact: Artifact) -> list[tuple[str, str]]:
+    """What the key was computed from, and the recipe."""
+    paths = [artifact.folder / name for name in (INGREDIENTS, RECIPE)]
+    return [(path.name, path.read_text(encoding="utf-8")) for path in paths if path.is_file()]
+
+
+def _table(markdown: str) -> str:
+    """A Markdown table as HTML, with its caption."""
+    lines = markdown.splitlines()
+    caption = next((line.strip("*") for line in lines if line.startswith("*")), "")
+    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines if line.startswith("|")]
+    parts = [f"<caption>{html.escape(caption)}</caption>"]
+    for place, row in enumerate(rows):
+        if place != 1:
+            kind = "th" if place == 0 else "td"
+            parts.append("<tr>" + "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in row) + "</tr>")
+    return f"<table>{''.join(parts)}</table>"

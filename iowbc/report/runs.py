@@ -1,0 +1,97 @@
+"""Runs side by side: those that differ in their seed alone belong together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.pipeline.store.artifact import Artifact
+
+NAMING = ("seed", "name", "description", "execution")
+"""Parts of a recipe in which runs of one group may differ."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a recipe has, under the name by which the user called it."""
+
+    label: str
+    artifacts: Mapping[str, Artifact]
+    """By stage."""
+    recipe: Mapping[str, Any]
+    """Resolved."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs of one recipe with different seeds."""
+
+    label: str
+    runs: tuple[Run, ...]
+
+    def values(self, stage: str, metric: str) -> NDArray[np.float64]:
+        """A stage's metric in each run that has it."""
+        found = [run.artifacts[stage].metrics.get(metric) for run in self.runs if stage in run.artifacts]
+        return np.array([value for value in found if value is not None], np.float64)
+
+
+@dataclass(frozen=True)
+class MetricRow:
+    """A metric of all groups."""
+
+    stage: str
+    name: str
+    cells: tuple[str, ...]
+    """A mean with half the spread over the seeds, a cell for each group; empty where it has none."""
+    deltas: tuple[str, ...]
+    """Of each further group to the first."""
+    differs: bool
+
+
+def grouped(runs: Sequence[Run]) -> list[Group]:
+    """Runs by recipe, seeds together, in order of appearance; a group of several is called by its first run."""
+    found: list[list[Run]] = []
+    for run in runs:
+        own = _compared(run)
+        group = next((group for group in found if own == _compared(group[0]) and own), None)
+        if group is None:
+            found.append([run])
+        else:
+            group.append(run)
+    return [
+        Group(group[0].label if len(group) == 1 else f"{group[0].label} ({len(group)} seeds)", tuple(group))
+        for group in found
+    ]
+
+
+def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
+    """Every metric of every stage."""
+    names = dict.fromkeys(
+        (stage, metric)
+        for group in groups
+        for run in group.runs
+        for stage, artifact in run.artifacts.items()
+        for metric in artifact.metrics
+    )
+    return [_row(groups, stage, metric) for stage, metric in names]
+
+
+def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
+    values = [group.values(stage, metric) for group in groups]
+    first = float(values[0].mean()) if len(values[0]) else None
+    deltas = tuple("" if first is None or not len(own) else f"{own.mean() - first:+.3g}" for own in values[1:])
+    differs = any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:])
+    return MetricRow(stage, metric, tuple(map(_cell, values)), deltas, differs or len(groups) == 1)
+
+
+def _cell(values: NDArray[np.float64]) -> str:
+    if not len(values):
+        return ""
+    spread = f" ± {np.ptp(values) / 2:.2g}" if len(values) > 1 else ""
+    return f"{values.mean():.4g}{spread}"
+
+
+def _compared(run: Run) -> dict[str, Any]:
+    return {name: value for name, value in run.recipe.items() if name not in NAMING}

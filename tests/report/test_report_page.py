@@ -1,0 +1,138 @@
+"""A report is one file that opens offline in a browser and holds the curves of all runs."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iowbc.pipeline.store.artifact import Manifest, write_manifest
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.report.curves import MOST_POINTS, evaluation_panels, learning_panels
+from iowbc.report.page import write_page
+from iowbc.report.runs import Run, grouped, metric_rows
+
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+STEPS = 1000
+MANIFEST = Manifest(
+    stage="teacher",
+    version=1,
+    key="key",
+    digest="content",
+    files={},
+    results=(),
+    beside={},
+    recipe="first",
+    made=0.0,
+    seconds=60.0,
+    attempts=1,
+    workers=2,
+    host="here",
+    code={"task": "c" * 64},
+    versions={"python": "3.11"},
+)
+
+
+def make_run(root: Path, name: str, seed: int, gamma: float, score: float) -> Run:
+    """A run with a teacher and an evaluation, as their stages leave them."""
+    store = Store(Runs(root / "runs"))
+    artifacts = {}
+    for stage in ("teacher", "eval"):
+        key = f"{name}-{stage}"
+        folder = store.folder(stage, key)
+        (folder / "tables").mkdir(parents=True)
+        (folder / "figures").mkdir()
+        (folder / "figures" / "comparison.png").write_bytes(b"\x89PNG")
+        (folder / "summary.json").write_text(json.dumps({"metrics": {"score": score, "same": 1.0}}))
+        (folder / "recipe.yaml").write_text(f"name: {name} </script><b>\n")
+        write_manifest(folder, MANIFEST.model_copy(update={"stage": stage, "key": key, "recipe": name}))
+        found = store.find(stage, key)
+        assert found is not None
+        artifacts[stage] = found
+    rows = "".join(f"{step},{score * step},{'' if step % 2 else 0.5}\n" for step in range(1, STEPS + 1))
+    (artifacts["teacher"].folder / "tables" / "learning_curves.csv").write_text("step,reward,check/score\n" + rows)
+    (artifacts["eval"].folder / "tables" / "summary.csv").write_text(
+        "suite,case,mass,rate,rate_low,rate_high,E_v,E_v_half\n"
+        f"lifting,lifting,0,1,0.6,1,{score},0.01\nlifting,lifting,4,0.8,0.4,1,,\n"
+    )
+    return Run(name, artifacts, {"name": name, "seed": seed, "teacher": {"gamma": gamma}})
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> list[Run]:
+    """Two seeds of one recipe, and another recipe."""
+    return [
+        make_run(tmp_path, "first", 0, 0.99, 1.0),
+        make_run(tmp_path, "again", 1, 0.99, 3.0),
+        make_run(tmp_path, "other", 0, 0.9, 5.0),
+    ]
+
+
+def test_seeds_belong_together_and_rows_that_are_alike_are_left_out(runs: list[Run]) -> None:
+    groups = grouped(runs)
+    assert [(group.label, len(group.runs)) for group in groups] == [("first (2 seeds)", 2), ("other", 1)]
+    rows = {(row.stage, row.name): row for row in metric_rows(groups)}
+    assert rows["teacher", "score"].cells == ("2 ± 1", "5")
+    assert rows["teacher", "score"].deltas == ("+3",)
+    assert rows["teacher", "score"].differs
+    assert not rows["teacher", "same"].differs
+
+
+def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) -> None:
+    main, others = learning_panels(grouped(runs), "teacher")
+    assert [panel.title for panel in main] == ["reward of a step", "score of the check"]
+    assert others == []
+    low, high, mean, other = main[0].traces
+    assert (low["line"]["width"], high["fill"], mean["name"], other["name"]) == (
+        0,
+        "tonexty",
+        "first (2 seeds)",
+        "other",
+    )
+    assert len(mean["x"]) == MOST_POINTS
+    np.testing.assert_allclose(mean["y"], 2.0 * 1e6 * np.array(mean["x"]), rtol=1e-4)
+    np.testing.assert_allclose(high["y"], 3.0 * 1e6 * np.array(mean["x"]), rtol=1e-4)
+
+
+def test_errors_over_the_mass_have_their_intervals_and_gaps_where_nobody_survived(runs: list[Run]) -> None:
+    panels = {panel.title: panel for panel in evaluation_panels(grouped(runs[:1]))}
+    low, _, mean = panels["lifting: E_v [m/s]"].traces
+    assert (mean["x"], mean["y"]) == ([0.0, 4.0], [1.0, None])
+    assert low["y"] == [0.99, None]
+    assert panels["lifting: success rate"].traces[2]["y"] == [1.0, 0.8]
+
+
+def test_a_page_asks_no_network_and_no_content_ends_its_scripts(runs: list[Run], tmp_path: Path) -> None:
+    text = written(runs, tmp_path).read_text()
+    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", own)
+    assert "</script><b>" not in own
+    assert html.escape("first </script><b>") in own
+    json.loads(re.search(r'id="curves">(.*?)</script>', text, re.DOTALL).group(1))  # type: ignore[union-attr]
+
+
+def written(runs: list[Run], folder: Path) -> Path:
+    path = folder / "page.html"
+    tables = {"lifting": "*A caption.*\n\n| a | b |\n|---|---|\n| 1 | <2> |\n"}
+    write_page(path, runs, grouped(runs), tables, ["teacher.gamma: 0.99 -> 0.9"])
+    return path
+
+
+@pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
+def test_a_dark_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: Path) -> None:
+    assert BROWSER is not None
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--host-resolver-rules=MAP * ~NOTFOUND"]
+    words += ["--window-size=390,6000", "--virtual-time-budget=8000", f"--user-data-dir={tmp_path / 'profile'}"]
+    command = [BROWSER, *words, "--force-dark-mode", "--dump-dom", written(runs, tmp_path).as_uri()]
+    drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    assert 'data-theme="dark"' in drawn
+    assert "data-error" not in drawn.partition(">")[0] + drawn.partition("<html")[2].partition(">")[0]
+    places = re.findall(r'class="curve[^"]*"[^>]*', drawn)
+    assert len(places) == 2 + 5
+    assert all('data-drawn="yes"' in place for place in places)
+    assert drawn.count('class="main-svg"') >= len(places)
