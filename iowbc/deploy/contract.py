@@ -3,7 +3,10 @@
 import hashlib
 import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from textwrap import shorten
 from typing import Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
@@ -25,6 +28,8 @@ ROBOT = "robot"
 """Folder with the robot's description inside the exported folder."""
 GENERATOR = "rg"
 """Folder with the reference generator: its feasible map clamps commands; its network is in the graph already."""
+LARGEST_CONTRACT = 1_000_000
+"""Bytes of the largest contract that is read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
 
 
@@ -63,9 +68,9 @@ class Contract(Section):
     """SHA-256 of every other file of the folder, by its path in the folder."""
     opset: int
     """ONNX operator set."""
-    control_frequency: float
+    control_frequency: float = Field(gt=0)
     """Rate at which the graph is to be called [Hz]."""
-    physics_frequency: float
+    physics_frequency: float = Field(gt=0)
     """Rate of the joints' PD loop in training [Hz]."""
     inputs: tuple[PortEntry, ...]
     outputs: tuple[PortEntry, ...]
@@ -93,7 +98,7 @@ class Contract(Section):
     """Radians per unit of action; already inside the graph."""
     action_bound: float
     """Bound of the action; already inside the graph."""
-    history: int
+    history: int = Field(ge=1)
     """Length K of the observation history."""
     observation: tuple[PartEntry, ...]
     """Parts of s_t, in order; the graph builds it."""
@@ -139,6 +144,18 @@ def seal(contract: Contract, folder: Path) -> Contract:
     return sealed
 
 
+@contextmanager
+def readable(part: Path) -> Iterator[None]:
+    """Turn whatever a library says of a file that is not what its name says into `ContractBroken` with the file."""
+    try:
+        yield
+    except ContractBroken:
+        raise
+    except Exception as error:
+        reason = shorten(f"{type(error).__name__}: {error}", 300)
+        raise ContractBroken(f"{part}: cannot be used: {reason}; export again") from error
+
+
 def exported_folder(word: Path | str) -> Path:
     """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`."""
     folder = Path(word)
@@ -152,6 +169,8 @@ def read_contract(folder: Path | str) -> Contract:
     if not (folder / CONTRACT).is_file():
         raise ContractBroken(f"{folder}: no exported policy, {CONTRACT} missing; give the folder that `export` made")
     try:
+        if (size := (folder / CONTRACT).stat().st_size) > LARGEST_CONTRACT:
+            raise ContractBroken(f"{folder / CONTRACT}: has {size:,} bytes, which no contract has; export again")
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
     except ValidationError as error:
         raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 2: {error}; export again") from error

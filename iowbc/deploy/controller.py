@@ -19,7 +19,7 @@ from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, exported_folder, read_contract
+from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, exported_folder, read_contract, readable
 from iowbc.deploy.guard import TargetGuard
 from iowbc.deploy.session import Values, open_session, run
 from iowbc.errors import ContractBroken
@@ -131,19 +131,24 @@ class Controller:
         """
         folder = exported_folder(folder)
         contract = read_contract(folder)
-        robot = load_robot(folder / ROBOT)
+        with readable(folder / ROBOT):
+            robot = load_robot(folder / ROBOT)
         if robot.joints != contract.joints:
             raise ContractBroken(
                 f"{folder / ROBOT}: joints {robot.joints} differ from the contract's {contract.joints}; export again"
             )
-        session = open_session(folder / GRAPH)
-        found = {port.name: tuple(port.shape[1:]) for port in session.get_inputs()}
+        with readable(folder / GRAPH):
+            session = open_session(folder / GRAPH)
+            found = {port.name: tuple(port.shape[1:]) for port in session.get_inputs()}
         if found != (said := {port.name: port.shape for port in contract.inputs}):
             raise ContractBroken(f"{folder / GRAPH}: inputs are {found}, the contract says {said}; export again")
         map_file = f"{GENERATOR}/{FEASIBLE}"
-        feasible = FeasibleMap.load(folder / map_file) if map_file in contract.files else None
-        controller = cls(contract, robot, session, feasible, robots)
-        broken = [name for name, value in run(session, controller._blank).items() if not np.isfinite(value).all()]
+        with readable(folder / map_file):
+            feasible = FeasibleMap.load(folder / map_file) if map_file in contract.files else None
+        with readable(folder / GRAPH):
+            controller = cls(contract, robot, session, feasible, robots)
+            outputs = run(session, controller._blank)
+        broken = [name for name, value in outputs.items() if not np.isfinite(value).all()]
         if broken:
             raise ContractBroken(
                 f"{folder / GRAPH}: {', '.join(broken)} not finite: the weights are no numbers; export again"

@@ -1,6 +1,7 @@
 """Plays one episode for the eye: in MuJoCo's viewer where there is a display, or into a film."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,20 +38,23 @@ class Source:
     """That the checkpoint is bound to."""
 
     def environment(self, episode: Episode) -> VectorEnv:
-        """One environment, in this process, that plays an episode."""
-        return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
+        """One environment, in this process, that plays an episode. Raises ContractBroken for a world that is none."""
+        exported = (self.policy / contract.CONTRACT).is_file()
+        with contract.readable(self.policy) if exported else nullcontext():
+            return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
 
 
 def exported_source(folder: Path) -> Source:
     """The source in an exported folder, which holds all it needs. Raises ContractBroken."""
-    contract.read_contract(folder)
+    Controller.load(folder)
     path = folder / contract.RECIPE
     try:
         recipe = Recipe.model_validate_json(path.read_bytes())
     except (FileNotFoundError, ValidationError) as error:
         raise ContractBroken(f"{path}: missing or not a recipe of this version: {error}; export again") from error
     generator = folder / contract.GENERATOR
-    world = Specification(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None)
+    with contract.readable(folder):
+        world = Specification(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None)
     return Source(world, folder)
 
 

@@ -4,6 +4,9 @@ import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+from iowbc.files import write_whole
 
 OUTLIERS = (1.0, 99.0)
 """Percentiles between which a panel's values always lie inside of it."""
@@ -20,14 +23,14 @@ class Curves:
         self.path = path
         self.rows: list[dict[str, float]] = []
         if path.is_file():
-            for line in path.read_text().splitlines():
+            for line in path.read_bytes().splitlines():
                 try:
                     row = json.loads(line)
-                except json.JSONDecodeError:
-                    break
-                if row["step"] <= step:
+                except (ValueError, RecursionError):
+                    continue
+                if _whole(row) and row["step"] <= step:
                     self.rows.append(row)
-        path.write_text("".join(json.dumps(row) + "\n" for row in self.rows))
+        write_whole(path, "".join(json.dumps(row) + "\n" for row in self.rows))
 
     def append(self, step: int, values: Mapping[str, float]) -> None:
         """Add a row; step in environment steps."""
@@ -74,5 +77,10 @@ class Curves:
         (out / "figures").mkdir()
         self.write_csv(out / "tables" / "learning_curves.csv")
         self.write_figure(out / "figures" / "learning_curves.png", title, [*panels, *terms])
-        last = self.rows[-1]
+        last = self.rows[-1] if self.rows else {}
         return {name: last[name] for name in ("step", *panels, "steps_per_second") if name in last}
+
+
+def _whole(row: Any) -> bool:
+    """Whether a line is a row of numbers with its step."""
+    return isinstance(row, dict) and "step" in row and all(isinstance(value, (int, float)) for value in row.values())

@@ -25,7 +25,7 @@ class Check(Section):
     """Masses in the scene `lift` [kg], where the task plays it; 0 is the scene without an object."""
     pushing: tuple[NonNegativeFloat, ...] = (30.0,)
     """Masses in the scene `push` [kg], where the task plays it."""
-    trials: int = Field(default=2, ge=1)
+    trials: int = Field(default=2, ge=1, le=1000)
     """Trials at each mass."""
     seed: int = Field(default=5000, ge=0, lt=2**32)
     """Seed of the first trial: apart from those of training, evaluation and export."""
@@ -40,5 +40,5 @@ class Check(Section):
     """Checks in a row that must say so: one of eight trials more or less moves the score by a tenth."""
     caution: float = Field(default=0.5, gt=0, lt=1)
     """What the desired KL divergence and the step size are multiplied by after each collapse."""
-    rollbacks: int = Field(default=6, ge=0)
+    rollbacks: int = Field(default=6, ge=0, le=1000)
     """Collapses without a better policy between them after which the stage gives up."""

@@ -2,31 +2,31 @@
 
 from typing import Literal, Self
 
-from pydantic import Field, PositiveInt, model_validator
+from pydantic import Field, model_validator
 
-from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.section import COSMETIC, DEEPEST, Section, Width
 
 
 class Distillation(Section):
     """On-policy distillation of the teacher into the student."""
 
-    steps: int = Field(default=4_000_000, ge=1)
+    steps: int = Field(default=4_000_000, ge=1, le=10**12)
     """Environment steps, summed over the environments."""
-    environments: int = Field(default=96, ge=1)
+    environments: int = Field(default=96, ge=1, le=100_000)
     """Parallel environments."""
-    rollout: int = Field(default=32, ge=1)
+    rollout: int = Field(default=32, ge=1, le=10_000)
     """Control steps between two rounds of gradient steps."""
-    history: int = Field(default=25, ge=1)
+    history: int = Field(default=25, ge=1, le=1000)
     """Length of the observation history H_t (paper Table I)."""
     encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
     """What turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
     recurrent unit. Where the teacher is symmetric by construction, so is the student: the encoder has half the latent's
     size and reads the history and its mirror image."""
-    frame_features: int = Field(default=32, ge=1)
+    frame_features: int = Field(default=32, ge=1, le=16_384)
     """Features to which one observation of the history is projected, with the same weights for all."""
-    latent: int = Field(default=64, ge=1)
+    latent: int = Field(default=64, ge=1, le=16_384)
     """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
-    hidden: tuple[PositiveInt, ...] = (512, 256, 128)
+    hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers behind the encoder (paper Table I)."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of the hidden layers."""
@@ -34,11 +34,11 @@ class Distillation(Section):
     """Adam's step size at the start; it falls to a tenth along a cosine."""
     gradient_norm: float = Field(default=1.0, gt=0)
     """Largest norm of a gradient step."""
-    batch: int = Field(default=1024, ge=1)
+    batch: int = Field(default=1024, ge=1, le=10_000_000)
     """Samples of a gradient step, drawn from the whole buffer."""
-    gradient_steps: int = Field(default=12, ge=1)
+    gradient_steps: int = Field(default=12, ge=1, le=100_000)
     """Gradient steps of one round."""
-    buffer: int = Field(default=300_000, ge=1)
+    buffer: int = Field(default=300_000, ge=1, le=100_000_000)
     """Samples that are kept, the newest."""
     teacher_share: float = Field(default=0.1, ge=0, le=1)
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
@@ -50,7 +50,7 @@ class Distillation(Section):
     auxiliary: float = Field(default=0.1, ge=0)
     """Weight of the squared error with which the object's mass and the base's velocity are read from the latent, each
     in its standard deviations; 0 leaves it out. It makes the latent hold what the history tells of the load."""
-    checkpoint_every: int = Field(default=50, ge=1, json_schema_extra=COSMETIC)
+    checkpoint_every: int = Field(default=50, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Rounds between two checkpoints."""
 
     @model_validator(mode="after")

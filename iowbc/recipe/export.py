@@ -20,7 +20,7 @@ class Acceptance(Section):
     """Share of the weight that the partner bears; 0 leaves all of it to the robot."""
     sequence: tuple[Segment, ...] = Field(default=(Segment(duration=10.0, ramp=0.0),), min_length=1)
     """Commands of the trial, in order; standing by default."""
-    trials: int = Field(default=5, ge=1)
+    trials: int = Field(default=5, ge=1, le=10_000)
     """Number of trials."""
     seed: int = Field(default=2000, ge=0, lt=2**32)
     """Seed of the first trial."""
@@ -49,9 +49,9 @@ class Export(Section):
     target_tolerance: float = Field(default=1e-3, gt=0)
     """Largest difference between the controller's joint targets and those that the simulation computes for the same
     action [rad]; both round differently, by some 1e-6."""
-    golden_steps: int = Field(default=100, ge=1)
+    golden_steps: int = Field(default=100, ge=1, le=100_000)
     """Control steps of the rollout whose inputs and outputs are kept as golden vectors."""
-    timing_steps: int = Field(default=500, ge=1, json_schema_extra=COSMETIC)
+    timing_steps: int = Field(default=500, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Inferences timed for the report."""
     acceptance: tuple[Acceptance, ...] = (Acceptance(),)
     """The trials that accept the exported controller, all of which must pass; empty leaves them out."""

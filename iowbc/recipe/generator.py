@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import DEEPEST, Section, Width
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -101,7 +101,7 @@ class Problem(Section):
     """Part of the torque limits that a label may use."""
     stance_width: Positive = 0.237
     """Distance between the sole centres [m]: hip to hip, so that the default posture has straight hips."""
-    iterations: int = Field(default=40, ge=1)
+    iterations: int = Field(default=40, ge=1, le=10_000)
     """Most Gauss-Newton steps of the static method."""
     tolerance: Positive = 1e-4
     """The static method ends when no joint moves by more than this in a step [rad]."""
@@ -112,11 +112,11 @@ class Problem(Section):
 class OptimalControl(Section):
     """The multi-contact optimal control problem over a horizon, solved by BoxFDDP with the arms locked."""
 
-    nodes: int = Field(default=20, ge=4)
+    nodes: int = Field(default=20, ge=4, le=1000)
     """Intervals of the horizon."""
     step: Positive = 0.05
     """Length of an interval [s]."""
-    iterations: int = Field(default=60, ge=1)
+    iterations: int = Field(default=60, ge=1, le=10_000)
     """Most solver iterations."""
     label_at: Annotated[float, Field(gt=0, lt=1)] = 0.7
     """Fraction of the horizon whose node is the label: the terminal node is biased by the terminal cost."""
@@ -162,7 +162,7 @@ class LabelGates(Section):
 class CrossCheck(Section):
     """Static labels held against the optimal control problem."""
 
-    samples: int = Field(default=300, ge=0)
+    samples: int = Field(default=300, ge=0, le=2_000_000)
     """Labels that are solved again by optimal control; 0 leaves the check out. Without effect for `method: ocp`."""
     p90_limit: Positive = 0.02
     """The stage fails when one sample in ten differs by more in some joint [rad]."""
@@ -171,16 +171,16 @@ class CrossCheck(Section):
 class FeasibleRegion(Section):
     """The map of (height, pitch) that have a label, to which commands are clamped."""
 
-    heights: int = Field(default=31, ge=3)
+    heights: int = Field(default=31, ge=3, le=1000)
     """Grid points over the height range, labelled with two arm postures."""
-    pitches: int = Field(default=41, ge=3)
+    pitches: int = Field(default=41, ge=3, le=1000)
     """Grid points over the pitch range."""
     jump: Positive = 0.055
     """Largest move of a joint for one step of height or pitch (`fit.smoothness`) that the network makes in the map
     [rad]: near straight legs and at joint limits the reference leaps."""
     gentle_share: Share = 0.98
     """Share of the arm postures for which that must hold at a command."""
-    arms: int = Field(default=200, ge=1)
+    arms: int = Field(default=200, ge=1, le=100_000)
     """Arm postures of the dataset on which that is judged."""
     bound_slope: Positive = 1.0
     """Steepest change of the map's bounds with pitch [m/rad]: a clamped height does not leap when the pitch moves."""
@@ -188,7 +188,7 @@ class FeasibleRegion(Section):
     """A command needs this share of the samples around it, with any arms, to have a label."""
     window: tuple[Positive, Positive] = (0.02, 0.1)
     """Which samples are around a command: within this height [m] and pitch [rad]."""
-    enough: int = Field(default=20, ge=1)
+    enough: int = Field(default=20, ge=1, le=100_000)
     """Samples that there must be for their share to count; fewer leave it to the two arm postures of the grid."""
 
 
@@ -212,7 +212,7 @@ class FitGates(Section):
 class Smoothness(Section):
     """How the network's smoothness is measured: random lines through the feasible map, walked in small steps."""
 
-    lines: int = Field(default=1000, ge=1)
+    lines: int = Field(default=1000, ge=1, le=1_000_000)
     """Random lines."""
     height_step: Positive = 0.005
     """Step of the height [m]."""
@@ -223,7 +223,7 @@ class Smoothness(Section):
 class Fit(Section):
     """The network φ_RG and its training."""
 
-    hidden: tuple[int, ...] = Field(default=(128, 64), min_length=1)
+    hidden: tuple[Width, ...] = Field(default=(128, 64), min_length=1, max_length=DEEPEST)
     """Widths of the hidden layers (paper's order of size), ELU."""
     held_out: Annotated[float, Field(gt=0, lt=1)] = 0.1
     """Share of the samples kept for the gates; a sample and its mirror image are on the same side."""
@@ -231,13 +231,13 @@ class Fit(Section):
     """Share kept for early stopping, apart from the gates'."""
     mirror: bool = True
     """Train on the left-right mirror image of each sample as well."""
-    epochs: int = Field(default=150, ge=1)
+    epochs: int = Field(default=150, ge=1, le=1_000_000)
     """Most passes over the training samples."""
-    batch: int = Field(default=256, ge=1)
+    batch: int = Field(default=256, ge=1, le=2_000_000)
     """Samples in a gradient step."""
     learning_rate: Positive = 5e-3
     """Adam's first step size; it falls to a hundredth along a cosine."""
-    patience: int = Field(default=40, ge=1)
+    patience: int = Field(default=40, ge=1, le=1_000_000)
     """Epochs without a better validation loss before training ends."""
     task_weight: NonNegative = 4.0
     """Weight of the errors in feet, height and torso orientation beside the joints, in the units of `length_scale`."""

@@ -1,9 +1,9 @@
 """The base of every recipe section, and which of its values decide results."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
@@ -11,6 +11,11 @@ COSMETIC: dict[str, Any] = {"cosmetic": True}
 LATER: dict[str, Any] = {"later": True}
 """Extra of a field that came after artifacts were published. At its default, which is what the program did before, it
 decides nothing, so that their keys hold."""
+
+Width = Annotated[int, Field(gt=0, le=16_384)]
+"""Units of a hidden layer."""
+DEEPEST = 16
+"""Hidden layers of the deepest network."""
 
 
 class Section(BaseModel):

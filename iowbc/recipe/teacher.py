@@ -2,27 +2,30 @@
 
 from typing import Literal
 
-from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
 from iowbc.recipe.check import Check
-from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.section import COSMETIC, DEEPEST, Section, Width
+
+LARGEST_UPDATE = 10_000_000
+"""Samples that are kept in memory for one update."""
 
 
 class Teacher(Section):
     """PPO with privileged information."""
 
-    steps: int = Field(default=30_000_000, ge=1)
+    steps: int = Field(default=30_000_000, ge=1, le=10**12)
     """Environment steps of the whole training, summed over the environments. Nothing in it depends on this number but
     where it ends: a training that differs only by a greater one goes on from the finished one."""
-    environments: int = Field(default=96, ge=1)
+    environments: int = Field(default=96, ge=1, le=100_000)
     """Parallel environments (paper: 2048). Few environments with many updates learn from fewer samples."""
-    rollout: int = Field(default=48, ge=2)
+    rollout: int = Field(default=48, ge=2, le=10_000)
     """Control steps that each environment contributes to one update."""
-    minibatches: int = Field(default=4, ge=1)
+    minibatches: int = Field(default=4, ge=1, le=100_000)
     """Parts into which a rollout is split for the gradient steps; must divide environments x rollout."""
-    epochs: int = Field(default=5, ge=1)
+    epochs: int = Field(default=5, ge=1, le=1000)
     """Passes over a rollout."""
-    hidden: tuple[PositiveInt, ...] = (512, 256, 128)
+    hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
     """Adam's step size at the start (paper Table I)."""
@@ -67,18 +70,18 @@ class Teacher(Section):
     probability ratio explodes."""
     normalization_clip: float = Field(default=10.0, gt=0)
     """Normalised observations are clipped to this many standard deviations."""
-    statistics_until: int = Field(default=10_000_000, ge=1)
+    statistics_until: int = Field(default=10_000_000, ge=1, le=10**12)
     """Environment steps after which the statistics that normalise observations and rewards are kept as they are: late
     in training they move by less than a percent, and each move shifts what the policy has learnt."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """Numbers in which the hidden layers learn. `auto`: bfloat16 where the processor multiplies in it (avx512_bf16,
     amx), which is up to twice as fast; rollouts, values and the last layers are float32 in any case."""
-    parts: int = Field(default=2, ge=1)
+    parts: int = Field(default=2, ge=1, le=1000)
     """Parts of a minibatch that cores work on side by side while the environments rest; where there are fewer cores,
     one after another, with the same result."""
     check: Check = Check()
     """A small fixed evaluation that keeps the best policy and brings a lost training back to it."""
-    checkpoint_every: int = Field(default=20, ge=1, json_schema_extra=COSMETIC)
+    checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
     @model_validator(mode="after")
@@ -105,6 +108,8 @@ class Teacher(Section):
     @model_validator(mode="after")
     def _minibatches_divide(self) -> "Teacher":
         samples = self.environments * self.rollout
+        if samples > LARGEST_UPDATE:
+            raise ValueError(f"environments x rollout = {samples}: an update takes {LARGEST_UPDATE} samples at most")
         if samples % self.minibatches:
             raise ValueError(f"minibatches: {self.minibatches} does not divide environments x rollout = {samples}")
         return self

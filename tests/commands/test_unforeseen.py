@@ -113,3 +113,16 @@ def test_a_progress_of_other_types_is_no_progress(
     for words in (["status"], ["run", "first.yaml", "--force", "teacher"]):
         done = command(*words)
         assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "text", ["3", '{"recipe": [], "inputs": 3}', '{"recipe": {"seed": 1, "seed.x": NaN}}', "[" * 100_000]
+)
+def test_ingredients_of_other_types_are_damage(
+    folder: Path, command: Command, key: Callable[..., str], text: str
+) -> None:
+    (folder / "runs" / "store" / "teacher" / key("first", "teacher") / "key.json").write_text(text)
+    for words in (["plan", "first.yaml"], ["diff", "first", "second"]):
+        done = command(*words)
+        assert done.returncode == 0, done.stderr
+    assert "damaged: key.json has " in command("plan", "first.yaml").stdout.replace("\n", " ")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from stage_jobs import make_job
 
-from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, read_contract
+from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, Contract, read_contract, seal
 from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.play import exported_source, play
@@ -167,3 +167,13 @@ def test_without_a_display_the_viewer_says_what_to_do(done: Job, monkeypatch: py
         require_display()
     with pytest.raises(NoDisplay):
         play(exported_source(done.out), PlayRequest())
+
+
+def test_a_world_that_cannot_be_built_is_named(done: Job, tmp_path: Path) -> None:
+    """The robot's joints are right and its description is not MuJoCo's: only the simulation notices."""
+    folder = Path(shutil.copytree(done.out, tmp_path / "export"))
+    text = (folder / "robot" / "g1.xml").read_text()
+    (folder / "robot" / "g1.xml").write_text(text.replace("<worldbody>", "<worldbody><sofa/>", 1))
+    seal(Contract.model_validate_json((folder / CONTRACT).read_bytes()), folder)
+    with pytest.raises(ContractBroken, match=r"cannot be used: .*; export again"):
+        play(exported_source(folder), PlayRequest(video=tmp_path / "out.mp4"))

@@ -16,6 +16,24 @@ def test_rows_after_the_checkpoint_and_a_torn_last_line_are_dropped(tmp_path: Pa
     assert [row["reward"] for row in Curves(path, 99).rows] == [1.0, 2.0, 9.0]
 
 
+def test_a_damaged_line_costs_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "curves.jsonl"
+    damaged = [
+        "[]",
+        "3",
+        "null",
+        '{"reward": 1}',
+        '{"step": "1"}',
+        '{"step": 1, "reward": []}',
+        "{",
+        "\udcff",
+        "[" * 10**5,
+    ]
+    lines = ['{"step": 10, "reward": 1.0}', *damaged, '{"step": 20, "reward": 2.0}']
+    path.write_bytes("\n".join(lines).encode("utf-8", "surrogateescape"))
+    assert [row["step"] for row in Curves(path, 99).rows] == [10, 20]
+
+
 def test_the_figure_leaves_out_what_was_never_recorded(tmp_path: Path) -> None:
     curves = Curves(tmp_path / "curves.jsonl", 0)
     curves.append(10, {"reward": 1.0})

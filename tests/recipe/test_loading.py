@@ -58,6 +58,27 @@ def test_what_is_no_file_of_a_recipes_size_is_refused(tmp_path: Path) -> None:
     assert "has 1,000,001 bytes" in text
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "teacher: {environments: 1000000000}",
+        "teacher: {steps: 1e300}",
+        "teacher: {environments: 100000, rollout: 10000}",
+        "teacher: {hidden: [1000000000]}",
+        "teacher: {clip: 1e13}",
+        "distill: {buffer: 1000000000000}",
+        "rg: {fit: {hidden: [64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64]}}",
+        "rg: {feasible: {heights: 1000000}}",
+        "execution: {workers: 1000000}",
+        "seed: " + "9" * 5000,
+    ],
+)
+def test_absurd_sizes_are_refused_before_anything_runs(tmp_path: Path, line: str) -> None:
+    (text,) = problems(tmp_path, f"description: too large\n{line}\n")
+    assert text.startswith("mine.yaml:2:")
+    assert len(text) < 300
+
+
 def test_a_tab_is_named(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "teacher:\n\tsteps: 3\n")
     assert text == "mine.yaml:2:1: not valid YAML: a tab; indent with spaces"

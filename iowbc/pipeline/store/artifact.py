@@ -91,9 +91,12 @@ class Artifact:
 
     @property
     def ingredients(self) -> dict[str, Any]:
-        """What its key was computed from."""
+        """What its key was computed from; empty where that is not readable or does not give the key."""
         found = read_json(self.folder / INGREDIENTS)
-        return found if isinstance(found, dict) else {}
+        try:
+            return found if isinstance(found, dict) and data_digest(found) == self.manifest.key else {}
+        except ValueError:
+            return {}
 
     @property
     def recipe(self) -> dict[str, Any]:
@@ -137,7 +140,7 @@ class Artifact:
         for name, record in (manifest.files | manifest.beside).items():
             if name not in manifest.omitted:
                 _verify(self.folder / name, name, record)
-        if data_digest(self.ingredients) != manifest.key:
+        if not self.ingredients:
             raise Damaged(f"{INGREDIENTS} does not give the key")
 
 

@@ -76,7 +76,8 @@ def _record(path: Path) -> dict[str, Any] | None:
     if not isinstance(ever, dict) or not all(isinstance(moment, (int, float)) for moment in ever.values()):
         return None
     if not isinstance(stages, dict) or not all(
-        isinstance(use, dict) and {"key", "time"} <= use.keys() for use in stages.values()
+        isinstance(use, dict) and isinstance(use.get("key"), str) and isinstance(use.get("time"), (int, float))
+        for use in stages.values()
     ):
         return None
     return record

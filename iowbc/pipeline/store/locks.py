@@ -87,5 +87,8 @@ def named_lock(path: Path) -> Iterator[None]:
 
 
 def _read(path: Path) -> Holder:
-    data = read_json(path) or {}
-    return Holder(int(data.get("pid", 0)), str(data.get("host", "?")), float(data.get("since", time.time())))
+    """The holder that a lock file names; one that is being written, or was overwritten, names nobody."""
+    data = read_json(path)
+    pid, name, since = (data.get(key) if isinstance(data, dict) else None for key in ("pid", "host", "since"))
+    known = isinstance(pid, int) and isinstance(since, (int, float))
+    return Holder(pid, str(name), since) if known else Holder(0, "?", time.time())  # type: ignore[arg-type]

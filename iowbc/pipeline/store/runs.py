@@ -83,5 +83,5 @@ def read_json(path: Path) -> Any:
     """The content of a JSON file, or None where it is missing or not JSON."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None

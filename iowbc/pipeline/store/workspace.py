@@ -122,8 +122,13 @@ def _record(root: Path) -> dict[str, Any]:
         return {}
     curve = found.get("curve", [])
     numbers = all(isinstance(found.get(name, 0.0), (int, float)) for name in NUMBERS)
-    numbers &= isinstance(curve, list) and all(isinstance(point, list) and len(point) == 2 for point in curve)
+    numbers &= isinstance(curve, list) and all(_is_point(point) for point in curve)
     return found if numbers and isinstance(found.get("code", {}), dict) else {}
+
+
+def _is_point(point: Any) -> bool:
+    """Whether a point of a small curve is its step and value."""
+    return isinstance(point, list) and len(point) == 2 and all(isinstance(part, (int, float)) for part in point)
 
 
 def _finished(runs: Runs, root: Path) -> bool:

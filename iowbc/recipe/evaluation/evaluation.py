@@ -17,9 +17,9 @@ class Evaluation(Section):
 
     policy: Literal["student", "teacher"] = "student"
     """Which network acts: the deployable student, or the teacher with its privileged observation."""
-    label: str = Field(default="IO-WBC", min_length=1, json_schema_extra=COSMETIC)
+    label: str = Field(default="IO-WBC", min_length=1, max_length=200, json_schema_extra=COSMETIC)
     """Name of the variant in tables and figures; the paper's are IO-WBC, WBC, w/o RG, w/o Distill."""
-    trials: int = Field(default=5, ge=1)
+    trials: int = Field(default=5, ge=1, le=10_000)
     """Trials per mass; trial k of every mass and variant has the same seed."""
     seed: int = Field(default=1000, ge=0, lt=2**32)
     """Seed of the first trial; apart from the seed of training, so that no trial was met there."""
@@ -29,7 +29,7 @@ class Evaluation(Section):
     simulation: Simulation | None = None
     """The world of all trials; empty is the training's. Pinned (`{}` to the default), variants that were trained
     in other worlds meet the same trials."""
-    batch: int = Field(default=64, ge=1)
+    batch: int = Field(default=64, ge=1, le=10_000)
     """Trials played at once, over all workers. A policy computes in the shape of a whole batch, so that a trial is the
     same bit for bit when it is played again alone; another size rounds differently."""
     foot_load: float = Field(default=50.0, gt=0)

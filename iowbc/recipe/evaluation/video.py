@@ -8,7 +8,7 @@ from iowbc.recipe.section import Section
 class Video(Section):
     """Short films of trials."""
 
-    count: int = Field(default=2, ge=0)
+    count: int = Field(default=2, ge=0, le=1000)
     """Number of films, spread over the sweeps' masses; 0 makes none."""
     width: int = Field(default=640, ge=64, le=3840, multiple_of=16)
     """Width of a frame [pixel]; video codecs want multiples of 16."""

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from iowbc.errors import Problem, RecipeError
+from iowbc.errors import Problem, RecipeError, shown
 
 Scalar: TypeAlias = "str | int | float | bool | None"
 Tree: TypeAlias = "dict[str, Located] | list[Located] | Scalar"
@@ -146,7 +146,7 @@ class _Builder:
             if node.tag == _FLOAT:
                 return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
         except ValueError:
-            self._complain(node, f"{text!r} is not a {node.tag.split(':')[-1]}")
+            self._complain(node, f"{shown(text)} is not a {node.tag.split(':')[-1]}")
             return None
         return text
 

@@ -15,6 +15,8 @@ from iowbc.recipe.recipe import Recipe
 
 PROBLEMS_TOLD = 50
 """Problems of a recipe that are told; the others are counted."""
+LARGEST_NUMBER = 1e12
+"""No quantity, size or count of a recipe is larger."""
 
 
 def validate(tree: Located) -> Recipe:
@@ -32,8 +34,13 @@ def validate(tree: Located) -> Recipe:
         for path, found in leaves(tree)
         if isinstance(found.value, bool) and type(_value_at(recipe, path)) in (int, float)
     ]
-    if booleans:
-        raise RecipeError(booleans)
+    absurd = [
+        Problem(found.place, f"key '{'.'.join(path)}' = {shown(found.value)}: is larger than any number of a recipe")
+        for path, found in leaves(tree)
+        if isinstance(found.value, (int, float)) and abs(found.value) > LARGEST_NUMBER
+    ]
+    if booleans or absurd:
+        raise RecipeError(booleans + absurd)
     return recipe
 
 

@@ -58,7 +58,7 @@ class Randomization(Section):
     """Delay of joint and inertial measurements [control periods]."""
     object_latency: Distribution = Distribution(low=0.0, high=2.0, nominal=0.0)
     """Delay of the measured pose and rates of the object [control periods]."""
-    longest_latency: int = Field(default=4, ge=1)
+    longest_latency: int = Field(default=4, ge=1, le=100)
     """Length of the delay lines [control periods]; no latency may pass it."""
 
 

@@ -38,7 +38,7 @@ class Grasp(Section):
     that the lever arms share the weight as the carriers do."""
     height: float = 0.08
     """Height of the grips above the object's centre [m]; above the centre of mass, so that the object hangs stably."""
-    settling: int = Field(default=5, ge=0)
+    settling: int = Field(default=5, ge=0, le=1000)
     """Iterations in each physics step that take the creep out of a grasp by contact (MuJoCo's noslip solver, with the
     elliptic friction cone)."""
     handover: float = Field(default=0.5, ge=0.0)

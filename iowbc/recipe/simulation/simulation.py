@@ -26,10 +26,10 @@ class Physics(Section):
     """Friction cone: the pyramid inscribed in it, or the cone itself, with which a step costs half as much again."""
     solver: Literal["newton", "cg"] = "newton"
     """Constraint solver."""
-    iterations: int = Field(default=10, ge=1)
+    iterations: int = Field(default=10, ge=1, le=10_000)
     """Solver iterations at most. Ten give the trajectories of a hundred to machine precision at no cost, for the solver
     stops when it has converged; at five, joints are off by 0.1 rad after half a second."""
-    line_search_iterations: int = Field(default=20, ge=1)
+    line_search_iterations: int = Field(default=20, ge=1, le=10_000)
     """Line search iterations at most; as above."""
     body_contact: Literal["nothing", "object", "everything"] = "object"
     """What links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs and
@@ -40,7 +40,7 @@ class Physics(Section):
     """Force above which a foot counts as being on the ground, and a palm as touching an object [N]."""
     fastest: float = Field(default=200.0, gt=0.0)
     """Speed above which a simulation counts as diverged [m/s, rad/s]; the fastest joint reaches 37 rad/s."""
-    divergences_kept: int = Field(default=8, ge=0, json_schema_extra=COSMETIC)
+    divergences_kept: int = Field(default=8, ge=0, le=1000, json_schema_extra=COSMETIC)
     """How many diverged simulations are kept for replay."""
 
 

@@ -43,9 +43,9 @@ class Loads(Section):
 class ArmReference(Section):
     """Differential inverse kinematics of the arms (eq. 3)."""
 
-    settling: int = Field(default=5, ge=1)
+    settling: int = Field(default=5, ge=1, le=1000)
     """Iterations at the start of an episode that bring the arms near the grasp and to their rest posture."""
-    refining: int = Field(default=3, ge=0)
+    refining: int = Field(default=3, ge=0, le=1000)
     """Iterations after that which bring the wrists to their targets; without, arms creep in the first seconds."""
     settling_time: float = Field(default=0.3, gt=0.0)
     """Time that a settling iteration stands for [s]: the longer, the more it heeds the rest posture of the arms, and

@@ -1,0 +1,89 @@
+"""An exported folder that was made to deceive: sealed anew, with parts that are not what their names say."""
+
+import io
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iowbc.deploy.contract import CONTRACT, Contract, read_contract, seal
+from iowbc.deploy.controller import Controller
+from iowbc.errors import ContractBroken
+
+
+class Bomb:
+    """What unpickles to a command."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return exec, ("raise SystemExit('it was executed')",)
+
+
+def pickled() -> bytes:
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=True, pitch=np.array([Bomb()], dtype=object), low=np.zeros(1), high=np.zeros(1))
+    return file.getvalue()
+
+
+def sealed(exported: Path, place: Path, name: str, content: bytes) -> Path:
+    folder = Path(shutil.copytree(exported, place))
+    (folder / name).write_bytes(content)
+    seal(Contract.model_validate_json((folder / CONTRACT).read_bytes()), folder)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("policy.onnx", b"no graph"),
+        ("policy.onnx", b""),
+        ("robot/g1.xml", b"<mujoco>"),
+        ("robot/g1.xml", b"<mujoco/>"),
+        ("robot/robot.yaml", b"[]"),
+        ("robot/robot.yaml", b"!!python/object/apply:os.system [exit 1]"),
+        ("robot/robot.yaml", b"mjcf: ../../../etc/passwd"),
+        ("rg/feasible.npz", b""),
+        ("rg/feasible.npz", pickled()),
+    ],
+)
+def test_a_part_that_is_not_what_its_name_says_is_named(
+    exported: Path, tmp_path: Path, name: str, content: bytes
+) -> None:
+    folder = sealed(exported, tmp_path / "folder", name, content)
+    with pytest.raises(ContractBroken, match=r"cannot be used: .*; export again") as refused:
+        Controller.load(folder)
+    assert str(folder / Path(name).parts[0]) in str(refused.value)
+    assert refused.value.exit_code == 2
+    assert len(str(refused.value)) < 600
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {"control_frequency": 0},
+        {"control_frequency": -50},
+        {"physics_frequency": 0},
+        {"history": 0},
+        {"kp": [1e999] * 29},
+        {"inputs": []},
+        {"inputs": [{"name": "command", "shape": [10**9], "unit": "", "frame": "", "meaning": ""}]},
+        {"description": "x" * 2_000_000},
+    ],
+)
+def test_a_contract_that_no_export_writes_is_refused(exported: Path, tmp_path: Path, entries: dict[str, Any]) -> None:
+    folder = Path(shutil.copytree(exported, tmp_path / "folder"))
+    told = json.loads((folder / CONTRACT).read_text()) | entries
+    (folder / CONTRACT).write_text(json.dumps(told))
+    with pytest.raises(ContractBroken, match="export again"):
+        Controller.load(folder)
+
+
+@pytest.mark.parametrize("target", ["/dev/zero", "/etc", "nowhere"])
+def test_a_link_to_what_is_no_file_is_missing(exported: Path, tmp_path: Path, target: str) -> None:
+    folder = Path(shutil.copytree(exported, tmp_path / "folder"))
+    (folder / "policy.onnx").unlink()
+    (folder / "policy.onnx").symlink_to(target)
+    with pytest.raises(ContractBroken, match=r"policy\.onnx missing"):
+        read_contract(folder)
