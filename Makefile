@@ -1,12 +1,13 @@
 # make test   sets everything up, then lint, types and tests
 # make run    sets everything up, then the quickstart recipe
 # make measure   makes the tables of the README anew
+# make chaos   disturbs runs 200 times and counts what is lost (docs/reliability.md)
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup test lint types run measure image clean
+.PHONY: setup test lint types run measure chaos image clean
 
 setup: $(READY)
 
@@ -36,6 +37,9 @@ measure: run
 	$(BIN)/iowbc bench rg
 	$(BIN)/iowbc bench sim
 	$(BIN)/iowbc bench train
+
+chaos: setup
+	$(BIN)/python tests/chaos/chaos.py --events 200
 
 image:
 	docker build --tag iowbc .

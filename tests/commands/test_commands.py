@@ -246,7 +246,7 @@ def test_a_damaged_record_of_a_recipe_is_named_and_keeps_gc_from_removing(folder
 @pytest.mark.parametrize("stage", ["teacher", "rg-fit"])
 def test_a_damaged_policy_or_generator_is_not_played(folder: Path, command: Command, key: Key, stage: str) -> None:
     damaged = folder / "runs" / "store" / stage / key("second", stage)
-    (damaged / "result.json").write_text('{"seed": 8, "started_at": 0}')
+    (damaged / "result.json").write_text('{"seed": 8, "count": 3}')
     done = command("play", "second/teacher")
     assert done.returncode == 2
     assert f"{damaged.relative_to(folder)} is damaged: result.json differs from its digest" in done.stderr

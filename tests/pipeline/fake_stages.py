@@ -12,11 +12,15 @@ import time
 from collections.abc import Callable
 
 from iowbc.errors import Interrupted, StageFailed
-from iowbc.files import write_whole
+from iowbc.files import newest_checked, write_checked
 from iowbc.pipeline import stage as contract
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.tracking import tracker as tracking
 from iowbc.recipe.recipe import Recipe
+
+CHECKPOINT = "checkpoint.one"
+STARTED = "started_at.json"
+"""Record of how far the checkpoint was from which a stage went on."""
 
 
 def counting(name: str) -> Callable[[Job], None]:
@@ -24,14 +28,14 @@ def counting(name: str) -> Callable[[Job], None]:
 
     def run(job: Job) -> None:
         behaviour = json.loads(os.environ.get("FAKE_BEHAVIOUR", "{}")).get(name, {})
-        checkpoint = job.work / "checkpoint.json"
-        done = json.loads(checkpoint.read_text()) if checkpoint.exists() else 0
+        content, _ = newest_checked(job.work / CHECKPOINT, job.key)
+        done = json.loads(content) if content is not None else 0
         started_at = done
         steps = behaviour.get("steps", 3)
         while done < steps:
             time.sleep(behaviour.get("pause", 0.0))
             done += 1
-            write_whole(checkpoint, json.dumps(done))
+            write_checked(job.work / CHECKPOINT, job.key, json.dumps(done).encode(), keep_previous=True)
             job.report.metrics({"count": float(done), "half": done / 2}, done)
             job.report.progress(done, steps, f"at {done}")
             if job.interrupted():
@@ -44,7 +48,8 @@ def counting(name: str) -> Callable[[Job], None]:
             (job.out / folder).mkdir()
         (job.out / "tables" / "counts.md").write_text(f"| {name} |\n|---|\n| {done} |\n")
         (job.out / "figures" / "curve.png").write_bytes(b"not really a picture")
-        (job.out / "result.json").write_text(json.dumps({"seed": job.recipe.seed, "started_at": started_at}))
+        (job.out / "result.json").write_text(json.dumps({"seed": job.recipe.seed, "count": done}))
+        (job.out / STARTED).write_text(json.dumps(started_at))
         job.summarize({"count": float(done)})
 
     return run

@@ -5,6 +5,7 @@ import shlex
 import signal
 
 import pytest
+from fake_stages import STARTED
 from workplace import Workplace, until
 
 SLOW = {"teacher": {"steps": 40, "pause": 0.05}}
@@ -13,7 +14,7 @@ SLOW = {"teacher": {"steps": 40, "pause": 0.05}}
 def started_at(workplace: Workplace, stage: str) -> int:
     """How far the checkpoint was from which the finished stage went on."""
     (artifact,) = workplace.store.artifacts(stage)
-    return int(json.loads((artifact.folder / "result.json").read_text())["started_at"])
+    return int(json.loads((artifact.folder / STARTED).read_text()))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

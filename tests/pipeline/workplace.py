@@ -14,6 +14,7 @@ from typing import Any
 
 import fake_stages
 
+from iowbc.files import read_checked
 from iowbc.pipeline.console.display import StageView
 from iowbc.pipeline.planner import Options, Planner, Step
 from iowbc.pipeline.runner import Runner
@@ -108,7 +109,8 @@ class Workplace:
         for path in (self.folder / "runs" / "work").glob("*/progress.json"):
             record = read_json(path)
             if record and record["stage"] == stage:
-                return {"checkpoint": read_json(path.parent / "scratch" / "checkpoint.json") or 0, **record}
+                content = read_checked(path.parent / "scratch" / fake_stages.CHECKPOINT, record["key"])
+                return {"checkpoint": json.loads(content or b"0"), **record}
         return None
 
     def checkpoint(self, stage: str) -> int:
