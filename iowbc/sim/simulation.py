@@ -157,6 +157,14 @@ class Simulation:
         acting: NDArray[np.bool_] = np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
         return acting
 
+    @property
+    def foot_slide(self) -> Array:
+        """Speed at which loaded soles slide over the ground, left and right, (n, 2) [m/s]."""
+        speed = np.empty((self.n, 2))
+        for world in self.worlds:
+            speed[world.place] = world.foot_slide()
+        return speed
+
     def hold(self, fixed: Mapping[str, Array]) -> None:
         """Holds quantities at values (n,) from the next reset on; NaN draws. Keeps what is held and not named here."""
         unknown = [name for name in fixed if name not in self._draws.names]

@@ -254,6 +254,25 @@ class World:
         else:
             self._gather_object(state, layout.object, velocity)
 
+    def foot_slide(self) -> Array:
+        """Horizontal speed of the soles at their centres of pressure, (n, 2) [m/s]; zero in the air.
+
+        A foot that rolls over its edge does not slide: there its centre of pressure rests.
+        """
+        feet = self.layout.feet
+        wrench, spatial = self._external[:, feet], self._spatial_velocity[:, feet]
+        torque, force = wrench[..., :3], wrench[..., 3:]
+        loaded = force[..., 2] > self.physics.contact_force
+        weight = np.where(loaded, force[..., 2], 1.0)
+        down = -self._subtree_com[:, self.layout.base, 2:]
+        ahead = (down * force[..., 0] - torque[..., 1]) / weight
+        left = (down * force[..., 1] + torque[..., 0]) / weight
+        turning, velocity = spatial[..., :3], spatial[..., 3:]
+        along_x = velocity[..., 0] + turning[..., 1] * down - turning[..., 2] * left
+        along_y = velocity[..., 1] + turning[..., 2] * ahead - turning[..., 0] * down
+        speed: Array = np.hypot(along_x, along_y) * loaded
+        return speed
+
     def _robot_velocity(self) -> Array:
         """Velocity of the robot's centre of mass, (n, 3) [m/s]: momentum, in the first rows of M qvel, by mass."""
         momentum = self._inertia.take(self.layout.momentum, axis=1)

@@ -136,7 +136,7 @@ class Batch:
         )
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
         if self._schedule.repeats:
-            write_trial_signals(self.buffers, simulation.state)
+            write_trial_signals(self.buffers, simulation.state, simulation.foot_slide)
         memory.action[:] = action
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)

@@ -30,7 +30,14 @@ from iowbc.stages import evaluate
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 
-SOMETIMES = ("foot_slip_per_metre", "hand_weight_share", "partner_weight_share", "weight_in_hands", "object_jerk")
+SOMETIMES = (
+    "foot_slip_per_metre",
+    "foot_drift_per_metre",
+    "hand_weight_share",
+    "partner_weight_share",
+    "weight_in_hands",
+    "object_jerk",
+)
 """Figures that a trial without a walk, or without an object in the hands for a second, does not have."""
 QUESTION = {
     "name": "test",

@@ -12,24 +12,35 @@ from iowbc.evaluation.trials.load import load_metrics
 
 def test_only_loaded_feet_slip() -> None:
     signals = trace(100)
-    velocity, load = signals.foot_velocity.copy(), signals.foot_load.copy()
-    velocity[:50, 0] = 0.1  # left foot, loaded in the first half
-    velocity[:, 5] = 3.0  # upward speed of the right foot is no slip
+    slide, load = signals.foot_slide.copy(), signals.foot_load.copy()
+    slide[:50, 0] = 0.1  # left foot, loaded in the first half
     load[50:, 0] = 0.0
-    velocity[50:, 0] = 2.0
-    metrics = foot_metrics(replace(signals, foot_velocity=velocity, foot_load=load), 50.0, walked=2.0)
+    slide[50:, 0] = 2.0
+    metrics = foot_metrics(replace(signals, foot_slide=slide, foot_load=load), 50.0, walked=2.0)
     assert metrics["foot_slip"] == pytest.approx(0.1 * 50 * DT)
     assert metrics["foot_slip_per_metre"] == pytest.approx(0.05)
 
 
 def test_the_largest_slip_is_that_of_one_stance() -> None:
     signals = trace(90)
-    load, velocity = signals.foot_load.copy(), signals.foot_velocity.copy()
+    load, slide = signals.foot_load.copy(), signals.foot_slide.copy()
     load[30:60, 0] = 0.0
-    velocity[:30, 0], velocity[60:, 0] = 0.1, 0.3
-    metrics = foot_metrics(replace(signals, foot_velocity=velocity, foot_load=load), 50.0, walked=0.0)
+    slide[:30, 0], slide[60:, 0] = 0.1, 0.3
+    metrics = foot_metrics(replace(signals, foot_slide=slide, foot_load=load), 50.0, walked=0.0)
     assert metrics["foot_slip_peak"] == pytest.approx(0.3 * 30 * DT)
     assert np.isnan(metrics["foot_slip_per_metre"]), "nobody walked"
+
+
+def test_feet_that_tremble_do_not_drift_and_feet_that_creep_do() -> None:
+    signals = trace(100)
+    load, position = signals.foot_load.copy(), signals.foot_position.copy()
+    position[:, 0] = 0.004 * (-1.0) ** np.arange(100)  # the left foot trembles
+    position[:, 3] = np.linspace(0.0, 0.05, 100)  # the right one creeps, and is lifted and set down ahead meanwhile
+    load[40:50, 1] = 0.0
+    position[50:, 3] += 0.4
+    metrics = foot_metrics(replace(signals, foot_position=position, foot_load=load), 50.0, walked=2.0)
+    assert metrics["foot_drift"] == pytest.approx(0.05 * (39 + 49) / 99 + 0.008)
+    assert metrics["foot_drift_per_metre"] == pytest.approx(0.5 * metrics["foot_drift"])
 
 
 def test_swing_clearance_is_the_mean_of_the_highest_points_of_each_foot() -> None:

@@ -220,6 +220,38 @@ def test_forces_on_feet_and_hands_are_the_contact_forces(start, calm, hold_base)
     assert np.allclose(simulation.state.grip_force[0], hands, atol=2.0)
 
 
+@pytest.mark.parametrize(("push", "friction", "first", "last"), [(0.0, 1.0, 48, 58), (60.0, 0.2, 0, 12)])
+def test_feet_slide_as_their_loaded_points_do(start, calm, push, friction, first, last):
+    simulation = start(calm, ["free"], ground_friction=friction)
+    simulation.planned_push[:] = (push, 0.3 * push, 0.0)
+    slid = points = 0.0
+    run(simulation, first)
+    for _ in range(first, last):
+        simulation.step()
+        model, data = simulation.physics_model(0)
+        mujoco.mj_forward(model, data)
+        for foot, name in enumerate(("left_ankle_roll_link", "right_ankle_roll_link")):
+            moved, load = sliding_points(model, data, model.body(name).id)
+            if load > 50.0:
+                slid += simulation.foot_slide[0, foot]
+                points += np.hypot(*moved[:2]) / load
+    assert slid == pytest.approx(points, rel=0.1)
+    assert slid > 0.5
+
+
+def sliding_points(model, data, body):
+    """Sum over a body's contacts of normal force times velocity (3,), and of the force [N]."""
+    moved, load, force, jacobian = np.zeros(3), 0.0, np.zeros(6), np.zeros((3, model.nv))
+    for index in range(data.ncon):
+        contact = data.contact[index]
+        if body in model.geom_bodyid[contact.geom]:
+            mujoco.mj_contactForce(model, data, index, force)
+            mujoco.mj_jac(model, data, jacobian, None, contact.pos, body)
+            moved += force[0] * (jacobian @ data.qvel)
+            load += force[0]
+    return moved, load
+
+
 def test_reset_puts_the_soles_on_the_ground_and_the_object_between_the_hands(start, calm):
     simulation = start(calm, ["lift", "push"])
     assert np.allclose(simulation.state.foot_position[..., 2], 0.0, atol=1e-3)

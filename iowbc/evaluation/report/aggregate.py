@@ -27,6 +27,8 @@ COSTS = (
     "foot_slip",
     "foot_slip_peak",
     "foot_slip_per_metre",
+    "foot_drift",
+    "foot_drift_per_metre",
     "swing_clearance_left",
     "swing_clearance_right",
     "hand_weight_share",

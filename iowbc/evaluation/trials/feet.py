@@ -14,21 +14,26 @@ def foot_metrics(trace: Trace, load: float, walked: float) -> dict[str, float]:
 
     load: vertical force from which a foot counts as loaded [N]; walked: length of the base's path [m].
 
-    `foot_slip`: distance that sole centres slide while loaded, both feet [m]; rolling over an edge of the foot counts,
-    too. `foot_slip_peak`: the largest in one stance [m]. `foot_slip_per_metre`: a metre walked; NaN where hardly any
-    was. `swing_clearance_left`, `_right`: mean over the swings of the highest the sole came [m]; zero without a swing.
+    `foot_slip`: way that soles slide at their centres of pressure while loaded, back and forth, both feet [m]; rolling
+    over an edge of the foot is none. `foot_slip_peak`: the longest in one stance [m]. `foot_drift`: how far soles are
+    at the end of a stance from where it began, summed over the stances of both feet [m]. `_per_metre`: of either, a
+    metre walked; NaN where hardly any was. `swing_clearance_left`, `_right`: mean over the swings of the highest the
+    sole came [m]; zero without a swing.
     """
-    speed = np.linalg.norm(trace.foot_velocity.reshape(-1, 2, 3)[:, :, :2], axis=2)
     loaded = trace.foot_load >= load
-    slid = speed * loaded * trace.dt
-    total = float(slid.sum())
-    stances = [slid[run, foot].sum() for foot in range(2) for run in runs(loaded[:, foot])]
-    height = trace.foot_position.reshape(-1, 2, 3)[:, :, 2]
-    swings = [[height[run, foot].max() for run in runs(trace.foot_contact[:, foot] == 0)] for foot in range(2)]
+    slid = trace.foot_slide * loaded * trace.dt
+    position = trace.foot_position.reshape(-1, 2, 3)
+    stances = [(foot, stance) for foot in range(2) for stance in runs(loaded[:, foot])]
+    slips = [float(slid[stance, foot].sum()) for foot, stance in stances]
+    drifts = [position[stance.stop - 1, foot, :2] - position[stance.start, foot, :2] for foot, stance in stances]
+    slip, drift = sum(slips), float(sum(np.hypot(*moved) for moved in drifts))
+    swings = [[position[run, foot, 2].max() for run in runs(trace.foot_contact[:, foot] == 0)] for foot in range(2)]
     return {
-        "foot_slip": total,
-        "foot_slip_peak": float(max(stances, default=0.0)),
-        "foot_slip_per_metre": total / walked if walked >= SHORTEST_WALK else np.nan,
+        "foot_slip": slip,
+        "foot_slip_peak": max(slips, default=0.0),
+        "foot_slip_per_metre": slip / walked if walked >= SHORTEST_WALK else np.nan,
+        "foot_drift": drift,
+        "foot_drift_per_metre": drift / walked if walked >= SHORTEST_WALK else np.nan,
         "swings": float(sum(map(len, swings))),
         **{
             f"swing_clearance_{side}": float(np.mean(highest)) if highest else 0.0

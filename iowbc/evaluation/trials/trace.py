@@ -47,8 +47,8 @@ class Trace:
     """Shape (T, 3) [m]; zero without an object."""
     foot_position: Array
     """Sole centres, left then right, shape (T, 6) [m]."""
-    foot_velocity: Array
-    """Of the sole centres, shape (T, 6) [m/s]."""
+    foot_slide: Array
+    """Horizontal speed of the soles at their centres of pressure, shape (T, 2) [m/s]."""
     foot_load: Array
     """Vertical force of the ground on each foot, shape (T, 2) [N]."""
     foot_contact: Array

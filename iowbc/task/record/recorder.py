@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.arrays import Mask
+from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
 from iowbc.sim.state import SimulationState
 from iowbc.task.endings import Ending
@@ -54,14 +54,14 @@ def write_signals(
     buffers["signal/foot_contact"][:] = state.foot_contact
 
 
-def write_trial_signals(buffers: Buffers, state: SimulationState) -> None:
+def write_trial_signals(buffers: Buffers, state: SimulationState, foot_slide: Array) -> None:
     """The signals that only planned episodes have; see `iowbc.task.record.signals.TRIAL_SIGNALS`."""
     n = len(state.base_position)
     values = {
         "torso_position": state.base_position + TORSO_CENTRE * state.torso_rotation[:, :, 2],
         "object_position": state.object_position,
         "foot_position": state.foot_position.reshape(n, -1),
-        "foot_velocity": state.foot_velocity.reshape(n, -1),
+        "foot_slide": foot_slide,
         "foot_load": state.foot_force[:, :, 2],
         "link_object_force": state.link_object_force[:, None],
         "joint_torque": state.joint_torque,

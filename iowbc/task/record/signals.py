@@ -42,7 +42,7 @@ TRIAL_SIGNALS = {
     "torso_position": 3,
     "object_position": 3,
     "foot_position": 6,
-    "foot_velocity": 6,
+    "foot_slide": 2,
     "foot_load": 2,
     "link_object_force": 1,
 }
