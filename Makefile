@@ -2,12 +2,13 @@
 # make run    sets everything up, then the quickstart recipe
 # make measure   makes the tables of the README anew
 # make chaos   disturbs runs 200 times and counts what is lost (docs/reliability.md)
+# make leaks   watches memory and descriptors of a training for an hour
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup test lint types run measure chaos image clean
+.PHONY: setup test lint types run measure chaos leaks image clean
 
 setup: $(READY)
 
@@ -40,6 +41,9 @@ measure: run
 
 chaos: setup
 	$(BIN)/python tests/chaos/chaos.py --events 200
+
+leaks: setup
+	$(BIN)/python tests/chaos/leaks.py
 
 image:
 	docker build --tag iowbc .

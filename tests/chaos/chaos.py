@@ -123,6 +123,7 @@ class Chaos:
             family = psutil.Process(process.pid).children(recursive=True)
             hit = KINDS[kind](self, process)
             count.events += 1
+            print(f"{moment * self.seconds:.1f} s: {kind}", file=sys.stderr, flush=True)
             kept = self.whole()
             count.lost += sum(folder not in kept and folder != hit for folder in before)
         else:

@@ -8,10 +8,12 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
+from network_watch import watched
 
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.journal import Journal
@@ -35,7 +37,7 @@ def test_a_taken_port_is_refused_with_a_free_one(tmp_path: Path) -> None:
     assert done.stderr.startswith(f"port {port} is taken; try --port ")
 
 
-def recorded(runs: Runs) -> None:
+def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
     """A run with a file and a description, as MLflow has it."""
     (runs.root / "store" / "eval").mkdir(parents=True)
     (runs.root / "store" / "eval" / "table.md").write_text("a table")
@@ -46,12 +48,18 @@ def recorded(runs: Runs) -> None:
         journal.write("files", id="recipe", paths=["store/eval/table.md"])
         journal.write("end", id="recipe", status="FINISHED")
     words = [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root)]
-    assert subprocess.run(words, check=False, timeout=120).returncode == 0
+    assert subprocess.run(words, env=environment, check=False, timeout=120).returncode == 0
 
 
 @pytest.mark.slow
-def test_the_interface_of_a_moved_folder_answers_with_its_files_and_ends(tmp_path: Path) -> None:
-    recorded(Runs(tmp_path / "before"))
+def test_the_interface_of_a_moved_folder_answers_with_its_files_tells_nobody_and_ends(tmp_path: Path) -> None:
+    with watched(tmp_path / "watch") as watch:
+        answers_and_ends(tmp_path, watch.environment)
+        assert watch.contacts() == []
+
+
+def answers_and_ends(tmp_path: Path, environment: Mapping[str, str]) -> None:
+    recorded(Runs(tmp_path / "before"), environment)
     (tmp_path / "before").rename(tmp_path / "runs")
     port = free_port()
     address = f"http://127.0.0.1:{port}"
@@ -63,7 +71,8 @@ def test_the_interface_of_a_moved_folder_answers_with_its_files_and_ends(tmp_pat
         with urllib.request.urlopen(request, timeout=10) as answer:
             return json.load(answer)
 
-    with (tmp_path / "log.txt").open("w") as log, subprocess.Popen(words, stdout=log, stderr=log) as server:
+    log = (tmp_path / "log.txt").open("w")
+    with log, subprocess.Popen(words, env=environment, stdout=log, stderr=log) as server:
         limit = time.monotonic() + 90.0
         while True:
             try:

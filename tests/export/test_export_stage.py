@@ -2,10 +2,13 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from network_watch import watched
 from stage_jobs import make_job
 
 from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, Contract, read_contract, seal
@@ -135,6 +138,21 @@ def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
     assert 1 <= shown.frames <= 4
     assert film.stat().st_size > 500
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
+
+
+def test_playing_an_exported_folder_tells_nobody(done: Job, tmp_path: Path) -> None:
+    program = (
+        "from pathlib import Path; from iowbc.evaluation.play import exported_source, play;"
+        "from iowbc.evaluation.play_request import PlayRequest; from iowbc.recipe.evaluation.segment import Segment;"
+        "from iowbc.recipe.evaluation.video import Video;"
+        f"play(exported_source(Path({str(done.out)!r})), PlayRequest(sequence=(Segment(duration=0.1, ramp=0.0),),"
+        f"video=Path({str(tmp_path / 'out.mp4')!r}), video_settings=Video(width=96, height=64, fps=10)))"
+    )
+    with watched(tmp_path / "watch") as watch:
+        words = [sys.executable, "-c", program]
+        shown = subprocess.run(words, env=watch.environment, capture_output=True, text=True, check=False)
+        assert shown.returncode == 0, shown.stderr
+        assert watch.contacts() == []
 
 
 def test_a_damaged_recipe_of_an_export_is_named(done: Job, tmp_path: Path) -> None:
