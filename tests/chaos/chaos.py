@@ -128,10 +128,13 @@ class Chaos:
             count.lost += sum(folder not in kept and folder != hit for folder in before)
         else:
             self._ended(process.returncode, count)
-        count.tracebacks += self.said().count("Traceback (most recent call last)")
+        if "Traceback" in self.said():
+            count.tracebacks += 1
+            print(f"a traceback after '{kind}':\n{self.said()}", file=sys.stderr, flush=True)
         count.left += self._left(family)
         if self.start("status").wait() or "Traceback" in self.said():
             count.tracebacks += 1
+            print(f"status after '{kind}':\n{self.said()}", file=sys.stderr, flush=True)
 
     def _ended(self, code: int, count: Count) -> None:
         """A run came to its end before anything happened to it: compare what it made, and begin again."""
