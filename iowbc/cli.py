@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from iowbc.commands import completion
 from iowbc.commands.streams import let_go, outlasting_readers, prepare_streams
 from iowbc.commands.unforeseen import told
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Train, test and export a whole-body controller of a humanoid robot that carries and pushes heavy objects.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"max_content_width": 120},
@@ -32,17 +32,30 @@ app.add_typer(bench, name="bench")
 
 PIPE_WIDTH = 160
 """Characters in a line of a table where the output is not a terminal."""
-RecipeFile = Annotated[str, typer.Argument(help="Recipe, a YAML file or the name of one.", metavar="RECIPE")]
+RecipeFile = Annotated[
+    str,
+    typer.Argument(help="Recipe, a YAML file or the name of one.", metavar="RECIPE", autocompletion=completion.recipes),
+]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Change a value of the recipe; repeat for more.", metavar="A.B.C=VALUE"),
+    typer.Option(
+        "--set",
+        help="Change a value of the recipe; repeat for more.",
+        metavar="A.B.C=VALUE",
+        autocompletion=completion.paths,
+    ),
 ]
 RunsFolder = Annotated[
     Path | None,
     typer.Option("--runs", help="Folder of artifacts and tracking; IOWBC_RUNS, else ./runs.", envvar="IOWBC_RUNS"),
 ]
-Until = Annotated[str | None, typer.Option(help="Stop after this stage.", metavar="STAGE")]
-Force = Annotated[list[str] | None, typer.Option(help="Make this stage anew; repeat for more.", metavar="STAGE")]
+Until = Annotated[
+    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
+]
+Force = Annotated[
+    list[str] | None,
+    typer.Option(help="Make this stage anew; repeat for more.", metavar="STAGE", autocompletion=completion.stages),
+]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
 SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe, a YAML file; the defaults.", metavar="RECIPE")]
@@ -53,9 +66,36 @@ OnCodeChange = Annotated[
     Literal["report", "rerun"], typer.Option(help="What to do about a cached stage whose code has changed since.")
 ]
 
-Named = Annotated[
-    str, typer.Argument(help="Recipe (name or file), RECIPE/STAGE, or first characters of a key.", metavar="WHAT")
+RanRecipes = Annotated[
+    list[str],
+    typer.Argument(help="Recipes that have run.", metavar="RECIPE...", autocompletion=completion.ran),
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
+Named = Annotated[
+    str,
+    typer.Argument(
+        help="Recipe (name or file), RECIPE/STAGE, or first characters of a key.",
+        metavar="WHAT",
+        autocompletion=completion.artifacts,
+    ),
+]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"iowbc {version('iowbc')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """What comes before a command."""
 
 
 @app.command()
@@ -67,6 +107,10 @@ def run(
     workers: Workers = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
     on_code_change: OnCodeChange = "report",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print a plain line for every step of progress.")
+    ] = False,
     runs: RunsFolder = None,
 ) -> None:
     """Run a recipe: make every stage that is not cached, and resume what was interrupted."""
@@ -79,7 +123,9 @@ def run(
         print_plan(request, STAGES, _console())
     else:
         with outlasting_readers():
-            raise typer.Exit(run_recipe(request, STAGES, _console()))
+            raise typer.Exit(
+                run_recipe(request, STAGES, _console(), "quiet" if quiet else "verbose" if verbose else "usual")
+            )
 
 
 @app.command()
@@ -89,13 +135,14 @@ def plan(
     until: Until = None,
     force: Force = None,
     on_code_change: OnCodeChange = "report",
+    as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
     """Say for each stage whether it is cached or would run, why, and how long it takes."""
     from iowbc.commands.plan import plan as print_plan
     from iowbc.stages.registry import STAGES
 
-    print_plan(_request(recipe, overrides, until, force, None, on_code_change, runs), STAGES, _console())
+    print_plan(_request(recipe, overrides, until, force, None, on_code_change, runs), STAGES, _console(), as_json)
 
 
 @app.command()
@@ -135,57 +182,67 @@ def init(
 
 
 @app.command()
-def status(runs: RunsFolder = None) -> None:
+def status(as_json: AsJson = False, runs: RunsFolder = None) -> None:
     """Show what runs, what was left unfinished, and what each recipe has."""
     from iowbc.commands.status import print_status
 
-    print_status(_store(runs), _console())
+    print_status(_store(runs), _console(), as_json)
 
 
 @app.command("ls")
 def list_(
-    stage: Annotated[str | None, typer.Argument(help="Only artifacts of this stage.")] = None,
+    stage: Annotated[
+        str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
+    ] = None,
+    as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
     """List the stored artifacts."""
     from iowbc.commands.ls import list_artifacts
 
-    list_artifacts(_store(runs), _console(), stage)
+    list_artifacts(_store(runs), _console(), stage, as_json)
 
 
 @app.command()
-def show(what: Named, runs: RunsFolder = None) -> None:
+def show(what: Named, as_json: AsJson = False, runs: RunsFolder = None) -> None:
     """Show an artifact in detail, or the stages and metrics of a recipe."""
     from iowbc.commands.show import show as print_artifact
 
-    print_artifact(_store(runs), _console(), what)
+    print_artifact(_store(runs), _console(), what, as_json)
 
 
 @app.command()
-def diff(first: Named, second: Named, runs: RunsFolder = None) -> None:
+def diff(first: Named, second: Named, as_json: AsJson = False, runs: RunsFolder = None) -> None:
     """Show how two recipes or artifacts differ: recipe, keys, versions, code, metrics."""
     from iowbc.commands.diff import diff as print_differences
 
-    print_differences(_store(runs), _console(), first, second)
+    print_differences(_store(runs), _console(), first, second, as_json)
 
 
 @app.command()
 def compare(
-    recipes: Annotated[list[str], typer.Argument(help="Recipes that have run, two or more.", metavar="RECIPE...")],
+    recipes: Annotated[
+        list[str],
+        typer.Argument(help="Recipes that have run, two or more.", metavar="RECIPE...", autocompletion=completion.ran),
+    ],
     output: Annotated[Path | None, typer.Option(help="Folder to write to; runs/compare.")] = None,
     film: Annotated[bool, typer.Option("--film", help="Also film one trial with all of them side by side.")] = False,
+    as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
     """Write tables and figures over several runs."""
     from iowbc.commands.compare import compare as write_comparison
 
     store = _store(runs)
-    write_comparison(store, _console(), recipes, output or store.runs.root / "compare", film)
+    write_comparison(store, _console(), recipes, output or store.runs.root / "compare", film, as_json)
 
 
 @app.command()
 def report(
-    recipes: Annotated[list[str], typer.Argument(help="Recipes that have run, one or more.", metavar="RECIPE...")],
+    recipes: Annotated[
+        list[str],
+        typer.Argument(help="Recipes that have run, one or more.", metavar="RECIPE...", autocompletion=completion.ran),
+    ],
     output: Annotated[Path | None, typer.Option(help="HTML file to write; runs/report/RECIPE.html.")] = None,
     runs: RunsFolder = None,
 ) -> None:

@@ -4,10 +4,11 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from iowbc.commands.as_json import print_json
 from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.named import Named, named
 from iowbc.commands.play import input_of
@@ -29,7 +30,9 @@ CURVE_WIDTH = 40
 """Characters of a learning curve."""
 
 
-def compare(store: Store, console: Console, words: Sequence[str], output: Path, film: bool = False) -> None:
+def compare(
+    store: Store, console: Console, words: Sequence[str], output: Path, film: bool = False, as_json: bool = False
+) -> None:
     """Write `metrics.md`, and the report over all trials, under `output`; print the tables. Raises `UsageError`.
 
     film: also play one trial that all share again, and show the runs side by side.
@@ -47,6 +50,9 @@ def compare(store: Store, console: Console, words: Sequence[str], output: Path, 
             _film(store, tried, trials, output / "side_by_side.mp4")
     elif film:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
+    if as_json:
+        print_json(console, _data(found, output))
+        return
     for path in (output / "metrics.md", *sorted((output / "tables").glob("*.md"))):
         cells = read_table(path.read_text(encoding="utf-8"))
         console.print(drawn(cells, console.width) if cells.rows else "no metric differs")
@@ -68,6 +74,16 @@ def metrics_table(found: Sequence[Named]) -> str:
             cells = [row.cells[0], *(text for pair in zip(row.cells[1:], row.deltas, strict=True) for text in pair)]
             rows.append(f"| {row.stage} | {row.name} | " + " | ".join(cells) + " |")
     return "\n".join(rows) + "\n"
+
+
+def _data(found: Sequence[Named], output: Path) -> dict[str, Any]:
+    """The same for other programs: every metric of every run, and the files that were written."""
+    metrics = [
+        {"stage": stage, "run": run.word, **artifact.metrics}
+        for run in found
+        for stage, artifact in run.artifacts.items()
+    ]
+    return {"metrics": metrics, "files": [shown_path(path) for path in sorted(output.rglob("*.*"))]}
 
 
 def _groups(found: Sequence[Named]) -> "list[Group]":

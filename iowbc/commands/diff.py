@@ -6,6 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
+from iowbc.commands.as_json import print_json
 from iowbc.commands.named import Named, named
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.nested import MISSING, differences, nested
@@ -15,9 +16,12 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
 
 
-def diff(store: Store, console: Console, first: str, second: str) -> None:
+def diff(store: Store, console: Console, first: str, second: str, as_json: bool = False) -> None:
     """Print the differences. Each of the two is whatever `show` takes, or a recipe file that has not run."""
     a, b = _either(store, first), _either(store, second)
+    if as_json:
+        print_json(console, {"first": first, "second": second, "differences": difference_lines(a, b)})
+        return
     for line in difference_lines(a, b) or ["no difference"]:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
 

@@ -3,6 +3,7 @@
 from rich.console import Console
 from rich.text import Text
 
+from iowbc.commands.as_json import artifact_data, print_json
 from iowbc.commands.named import known_recipes
 from iowbc.commands.results import metrics_text
 from iowbc.commands.tables import NARROW, plain_table
@@ -13,7 +14,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.recipe import PIPELINE
 
 
-def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
+def list_artifacts(store: Store, console: Console, stage: str | None, as_json: bool = False) -> None:
     """A row for each artifact, oldest first. Raises `UsageError` for an unknown stage."""
     if stage is not None:
         require_known(stage, "stage", PIPELINE)
@@ -21,6 +22,10 @@ def list_artifacts(store: Store, console: Console, stage: str | None) -> None:
     for recipe in known_recipes(store):
         for key in ever_used(store.runs, recipe):
             users.setdefault(key, []).append(recipe)
+    if as_json:
+        found = [artifact_data(artifact) for artifact in store.artifacts(stage)]
+        print_json(console, [data | {"used_by": users.get(data["key"], [])} for data in found])
+        return
     wide = console.width >= NARROW
     table = plain_table("stage", "key", "used by", "made", "took", "size", *(["metrics"] if wide else []))
     artifacts = store.artifacts(stage)

@@ -1,11 +1,13 @@
 """`iowbc plan`: what would run, why, and how long that takes."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.commands.as_json import print_json
 from iowbc.commands.request import Request, prepared, recipes
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Step
@@ -15,10 +17,15 @@ REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
 
 
-def plan(request: Request, registry: Mapping[str, Stage], console: Console) -> None:
+def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a recipe of recipes for each of them."""
     loaded = recipes(request)
     planners = [prepared(one, request, registry)[0] for one in loaded]
+    if as_json:
+        names = [one.recipe.name for one in loaded]
+        planned = [[_data(step) for step in planner.plan()] for planner in planners]
+        print_json(console, [{"recipe": name, "stages": steps} for name, steps in zip(names, planned, strict=True)])
+        return
     for one, planner in zip(loaded, planners, strict=True):
         if len(loaded) > 1:
             console.print(f"{one.recipe.name}:", highlight=False)
@@ -55,3 +62,16 @@ def _row(step: Step) -> tuple[str | Text, ...]:
         return step.stage.name, Text("cached (published)" if published else "cached", style="cyan"), Text(why), ""
     why = "\n".join((short(step.reasons, REASONS_SHOWN), *step.notes))
     return step.stage.name, Text("run", style="bold yellow"), Text(why), duration(step.expected)
+
+
+def _data(step: Step) -> dict[str, Any]:
+    """The same for other programs."""
+    return {
+        "stage": step.stage.name,
+        "cached": step.cached,
+        "published": step.cached and step.artifact is not None and step.artifact.published,
+        "key": step.key,
+        "reasons": step.reasons,
+        "notes": step.notes,
+        "expected_seconds": None if step.cached else step.expected,
+    }

@@ -1,7 +1,8 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 from rich.console import Console
 
@@ -10,7 +11,7 @@ from iowbc.commands.request import Request, prepared, recipes
 from iowbc.commands.results import described, print_results
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, PipelineFailed
-from iowbc.pipeline.console.display import Display, PlainDisplay
+from iowbc.pipeline.console.display import Display, PlainDisplay, SilentDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner
@@ -21,11 +22,13 @@ from iowbc.pipeline.tracking.tracker import Tracker, backlog
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import LoadedRecipe
 
+Manner = Literal["usual", "quiet", "verbose"]
+"""How much a run prints."""
 DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
 
 
-def run(request: Request, registry: Mapping[str, Stage], console: Console) -> int:
+def run(request: Request, registry: Mapping[str, Stage], console: Console, manner: Manner = "usual") -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
 
     Of a recipe of recipes each is run, in order, up to the first that does not end; then they are compared.
@@ -35,28 +38,28 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console) -> in
     require_training("run")
     require_writable_runs(request.runs)
     for planner, robot in ready:
-        if len(ready) > 1:
+        if len(ready) > 1 and manner != "quiet":
             console.print(f"{planner.loaded.recipe.name}:", highlight=False)
-        code = _run(planner, robot, request, console)
+        code = _run(planner, robot, request, console, manner)
         if code != DONE:
             return code
-    if len(ready) > 1 and request.options.until is None:
+    if len(ready) > 1 and request.options.until is None and manner != "quiet":
         output = request.runs.root / "compare" / Path(request.word).stem
         compare(Store(request.runs), console, [one.recipe.name for one in loaded], output)
     return DONE
 
 
-def _run(planner: Planner, robot: Path, request: Request, console: Console) -> int:
+def _run(planner: Planner, robot: Path, request: Request, console: Console, manner: Manner) -> int:
     """Run one recipe; returns the exit code."""
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
     status, code, closing, delivered = "KILLED", INTERRUPTED, "", True
     try:
-        with StopRequest(shown=console.is_terminal) as stop:
+        with StopRequest(shown=console.is_terminal and manner == "usual") as stop:
             try:
                 tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
-                display = _display(loaded, console, stop)
+                display = _display(loaded, console, lambda: stop.text, manner)
                 runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
                 runner.run()
                 status, code = "FINISHED", DONE
@@ -73,7 +76,7 @@ def _run(planner: Planner, robot: Path, request: Request, console: Console) -> i
                     delivered = tracker.close(status, wait) or not wait
     except KeyboardInterrupt:
         code, closing = INTERRUPTED, _resumption(request, runner)
-    if code == DONE and runner is not None:
+    if code == DONE and runner is not None and manner != "quiet":
         print_results(request.runs, loaded.recipe.name, runner.artifacts, console, request.word)
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
@@ -95,7 +98,11 @@ def _rest(request: Request, made: Sequence[str]) -> str:
     return request.command([name for name in request.options.force if name not in made])
 
 
-def _display(loaded: LoadedRecipe, console: Console, stop: StopRequest) -> Display:
+def _display(loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], manner: Manner) -> Display:
+    if manner == "quiet":
+        return SilentDisplay()
+    if manner == "verbose":
+        return PlainDisplay(0.0, console.file)
     if console.is_terminal:
-        return LiveTable(console, lambda: stop.text)
+        return LiveTable(console, stopping)
     return PlainDisplay(loaded.recipe.execution.line_interval, console.file)

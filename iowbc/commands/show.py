@@ -8,6 +8,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.commands.as_json import artifact_data, print_json
 from iowbc.commands.named import named
 from iowbc.commands.results import shown_path
 from iowbc.commands.tables import metric_columns
@@ -20,9 +21,15 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.recipe import Recipe
 
 
-def show(store: Store, console: Console, word: str) -> None:
+def show(store: Store, console: Console, word: str, as_json: bool = False) -> None:
     """All of one artifact, or the stages and metrics of a recipe."""
     found = named(store, word)
+    if as_json:
+        artifacts = [
+            artifact_data(artifact) | {"ingredients": artifact.ingredients} for artifact in found.artifacts.values()
+        ]
+        print_json(console, artifacts if found.recipe is None else {"recipe": found.recipe, "stages": artifacts})
+        return
     if found.recipe is not None:
         for stage, artifact in found.artifacts.items():
             manifest = artifact.manifest

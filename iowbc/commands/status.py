@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
+from iowbc.commands.as_json import print_json
 from iowbc.commands.named import known_recipes, last_used
 from iowbc.commands.results import shown_path
 from iowbc.commands.tables import plain_table
@@ -21,10 +22,13 @@ from iowbc.pipeline.tracking.delivery import DAMAGED_LINE
 from iowbc.pipeline.tracking.tracker import backlog
 
 
-def print_status(store: Store, console: Console) -> None:
+def print_status(store: Store, console: Console, as_json: bool = False) -> None:
     """What runs, what was left unfinished, what the recipes have, and what MLflow lacks."""
     going_on = unfinished(store.runs)
     stopped: list[str] = []
+    if as_json:
+        print_json(console, _data(store))
+        return
     for folder, record in going_on:
         _print_work(store, console, folder, record)
         if not holder(store.runs, folder.name) and record.get("command"):
@@ -73,3 +77,19 @@ def _print_work(store: Store, console: Console, folder: Path, record: Mapping[st
     if values:
         text = f"{record.get('metric')} {sparkline(values)} {values[-1]:.4g}"
         console.print(Padding(Text(text), (0, 0, 0, 2)))
+
+
+def _data(store: Store) -> dict[str, Any]:
+    """The same for other programs."""
+    working = [
+        {
+            "stage": record.get("stage"),
+            "recipe": record.get("recipe"),
+            "key": folder.name,
+            "holder": holder(store.runs, folder.name),
+            **{name: record.get(name) for name in ("done", "total", "seconds", "attempts", "updated", "note")},
+        }
+        for folder, record in unfinished(store.runs)
+    ]
+    recipes = {name: recall(store.runs, name).get("stages", {}) for name in known_recipes(store)}
+    return {"unfinished": working, "recipes": recipes, "unsent": len(backlog(store.runs))}

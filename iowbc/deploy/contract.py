@@ -15,6 +15,7 @@ from iowbc.control.feasible_map import FEASIBLE
 from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.sensing import Sensing
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import DESCRIPTION
@@ -31,6 +32,12 @@ GENERATOR = "rg"
 LARGEST_CONTRACT = 1_000_000
 """Bytes of the largest contract that is read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
+
+
+TORQUE = (
+    "torque = clip(kp * (target - position) - kd * velocity, -effort, effort) for each joint [N·m], computed at "
+    "physics_frequency or faster; target holds between two steps of the graph"
+)
 
 
 class PortEntry(Section):
@@ -55,10 +62,21 @@ class PartEntry(Section):
     frame: str
 
 
+class Latency(Section):
+    """Ranges of delays that training drew [control periods]."""
+
+    action: tuple[float, float]
+    """From the graph's output to the motors."""
+    sensors: tuple[float, float]
+    """Of joints and inertial unit."""
+    object: tuple[float, float]
+    """Of the object's pose."""
+
+
 class Contract(Section):
     """What `contract.json` says."""
 
-    format: Literal[2] = 2
+    format: Literal[3] = 3
     """Raised when a reader of the old format would misread the new one."""
     recipe: str
     """Name of the recipe that was exported."""
@@ -108,6 +126,14 @@ class Contract(Section):
     """Ranges and rates of the command in training; outside of them the policy was never tried."""
     references: References
     """Base grasps, arm kinematics and gait clock."""
+    torque: str = TORQUE
+    """How a motor's torque follows from the targets."""
+    sensing: Sensing
+    """Noise of the sensors in training, standard deviations."""
+    latency: Latency
+    """Delays in training."""
+    sentences: dict[str, str] = Field(default_factory=dict)
+    """What each entry of this file means, by its dotted path."""
     versions: dict[str, str]
     """Of the packages that made the graph."""
     sources: dict[str, str]
@@ -128,6 +154,18 @@ class Contract(Section):
         if len(self.action_scale) != len(self.support):
             raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
         return self
+
+
+def sentences(section: type[Section], path: str = "") -> dict[str, str]:
+    """The sentence under each field of a section, and of the sections in it, by dotted path."""
+    found = {}
+    for name, about in section.model_fields.items():
+        place = f"{path}.{name}" if path else name
+        if about.description:
+            found[place] = about.description.replace("\n", " ")
+        if isinstance(about.annotation, type) and issubclass(about.annotation, Section):
+            found |= sentences(about.annotation, place)
+    return found
 
 
 def digest(path: Path) -> str:
@@ -173,7 +211,7 @@ def read_contract(folder: Path | str) -> Contract:
             raise ContractBroken(f"{folder / CONTRACT}: has {size:,} bytes, which no contract has; export again")
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
     except ValidationError as error:
-        raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 2: {error}; export again") from error
+        raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 3: {error}; export again") from error
     unsealed = [name for name in (GRAPH, f"{ROBOT}/{DESCRIPTION}") if name not in contract.files]
     if unsealed:
         raise ContractBroken(f"{folder / CONTRACT}: says nothing of {' and '.join(unsealed)}; export again")

@@ -77,13 +77,13 @@ def try_out(
 ) -> tuple[ExportedPolicy, list[Accepted]]:
     """Let the controller in the folder `exported` play the trials. Raises Interrupted when interrupted.
 
-    Returns the driver, which holds the golden vectors and the difference of targets, and how the trials went.
+    Returns the driver, which holds the difference of targets, and how the trials went.
     """
     episodes = acceptance_episodes(world.recipe)
     controller = Controller.load(exported, robots=len(episodes))
     environment = VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)
     try:
-        policy = ExportedPolicy(controller, environment, golden_steps=world.recipe.export.golden_steps)
+        policy = ExportedPolicy(controller, environment)
         outcomes = play_in(environment, policy, interrupted)
     finally:
         environment.close()

@@ -25,7 +25,7 @@ def write_folder(
 
     sources: artifact keys of what went into the graph, by stage.
     """
-    robot = graph.robot
+    robot, drawn = graph.robot, recipe.simulation.randomization
     write_onnx(graph, out / contract.GRAPH, recipe.export.opset, {"recipe": recipe.name, **sources})
     (out / contract.ROBOT).mkdir()
     for source in (robot.folder / DESCRIPTION, robot.mjcf):
@@ -60,6 +60,13 @@ def write_folder(
         command=COMMAND,
         commands=recipe.task.commands,
         references=recipe.task.references,
+        sensing=recipe.simulation.sensing,
+        latency=contract.Latency(
+            action=(drawn.action_latency.low, drawn.action_latency.high),
+            sensors=(drawn.sensor_latency.low, drawn.sensor_latency.high),
+            object=(drawn.object_latency.low, drawn.object_latency.high),
+        ),
+        sentences=contract.sentences(contract.Contract),
         versions={name: version(name) for name in PACKAGES},
         sources=dict(sources),
     )

@@ -27,6 +27,7 @@ def run(job: Job) -> None:
     from iowbc.deploy.session import open_session
     from iowbc.deploy.session import run as run_graph
     from iowbc.evaluation.acceptance import try_out
+    from iowbc.evaluation.golden_rollout import golden_inputs
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.export.graph import ControllerGraph
@@ -58,11 +59,13 @@ def run(job: Job) -> None:
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, recipe, rg, sources)
     try:
-        policy, played = try_out(Specification(recipe, job.robot, rg), job.out, job.interrupted)
+        world = Specification(recipe, job.robot, rg)
+        policy, played = try_out(world, job.out, job.interrupted)
+        steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
 
-    inputs = golden.stacked(policy.inputs)
+    inputs = golden.stacked(steps)
     expected = run_torch(graph, inputs)
     session = open_session(job.out / contract.GRAPH)
     differences = golden.largest_difference(expected, run_graph(session, inputs))
@@ -83,7 +86,7 @@ def run(job: Job) -> None:
     job.summarize(metrics, parity_by_output=differences, acceptance=[each.sentence for each in played])
     contract.seal(statement, job.out)
     job.report.say(
-        f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(policy.inputs)} steps; "
+        f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(steps)} steps; "
         f"an inference takes {metrics['inference_ms']:.3f} ms"
     )
     worst = max(differences, key=lambda name: differences[name])
@@ -110,7 +113,7 @@ def run(job: Job) -> None:
 
 STAGE = Stage(
     name="export",
-    version=1,
+    version=2,
     slice=("name", "seed", "rg.height", "simulation", "task", "export"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,

@@ -1,12 +1,14 @@
 """The stage `export` from a student on disk to the accepted controller, and its gates."""
 
 import json
+import runpy
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from network_watch import watched
 from stage_jobs import make_job
@@ -27,6 +29,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.stages import export
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 STAND = [{"duration": 0.3, "ramp": 0.0}]
 
 
@@ -49,7 +52,7 @@ def student(graph: ControllerGraph, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def job(folder: Path, robot: Robot, rg: Path, student: Path, *, stop: bool = False, **settings: Any) -> Job:
-    values = {"name": "test", "export": {"golden_steps": 10, "timing_steps": 20, **settings}}
+    values = {"name": "test", "export": {"golden_steps": 24, "timing_steps": 20, **settings}}
     inputs = {"rg-fit": rg, "distill": student}
     return make_job(folder, Recipe.model_validate(values), inputs=inputs, workers=2, interrupted=lambda: stop)
 
@@ -90,9 +93,39 @@ def test_parity_size_and_time_are_in_the_summary(done: Job) -> None:
 
 def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
     inputs, outputs = golden.read_golden(done.out / GOLDEN)
-    assert len(inputs["command"]) == 10
+    assert len(inputs["command"]) == 24
     found = run(open_session(done.out / GRAPH), inputs)
     assert max(golden.largest_difference(outputs, found).values()) < 1e-5
+
+
+def test_the_golden_rollout_walks_turns_and_changes_height_and_lean(done: Job) -> None:
+    inputs, _ = golden.read_golden(done.out / GOLDEN)
+    command = inputs["command"]
+    assert abs(command[:, :3]).max(axis=0).min() > 0.05
+    assert np.ptp(command[:, 3]) > 0.01
+    assert np.ptp(command[:, 4]) > 0.03
+    assert {0.0, 1.0} == set(inputs["gait"][:, 1].tolist())
+    assert len(set(inputs["gait"][:, 0].tolist())) > 3
+
+
+def test_the_contract_says_what_each_of_its_entries_means(done: Job) -> None:
+    said = json.loads((done.out / CONTRACT).read_text())
+    unsaid = {"inputs", "outputs", "sentences"}
+    assert {name for name in said if name not in said["sentences"]} <= unsaid
+    assert said["sentences"]["references.gait.frequency"]
+    assert "kp * (target - position) - kd * velocity" in said["torque"]
+    assert said["sensing"]["joint_position"] > 0.0
+    assert said["latency"]["object"] == [0.0, 2.0]
+
+
+def test_examples_run_an_export_without_iowbc(done: Job) -> None:
+    source = (EXAMPLES / "plain_mujoco.py").read_text() + (EXAMPLES / "onnx_only.py").read_text()
+    assert "import iowbc" not in source
+    assert "from iowbc" not in source
+    compare = runpy.run_path(str(EXAMPLES / "onnx_only.py"))["largest_difference"]
+    assert compare(done.out) < 1e-5
+    stand = runpy.run_path(str(EXAMPLES / "plain_mujoco.py"))["stand"]
+    assert stand(done.out, 0.2) > 0.6
 
 
 def test_too_few_survivors_fail_the_stage(robot: Robot, rg: Path, student: Path, tmp_path: Path) -> None:

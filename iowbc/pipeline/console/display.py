@@ -145,3 +145,22 @@ class PlainDisplay:
 
     def end(self) -> None:
         """Nothing more comes."""
+
+
+class SilentDisplay:
+    """Shows nothing."""
+
+    def begin(self, views: Sequence[StageView]) -> None:
+        """Start to show these stages."""
+
+    def changed(self, view: StageView) -> None:
+        """A stage changed its state."""
+
+    def moved(self, view: StageView) -> None:
+        """A stage made progress."""
+
+    def say(self, text: str) -> None:
+        """One line."""
+
+    def end(self) -> None:
+        """Nothing more comes."""

@@ -1,0 +1,65 @@
+"""What one expects of any command line: a version, completion, JSON for programs, silence when asked."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from iowbc.commands import completion
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def test_the_version_is_told(command: Command) -> None:
+    assert command("--version").stdout.startswith("iowbc 0.")
+
+
+@pytest.mark.parametrize(
+    ("words", "part", "expected"),
+    [
+        (["plan", "first.yaml", "--set", "seed=9"], lambda data: len(data[0]["stages"]), 6),
+        (["status"], lambda data: sorted(data["recipes"]), ["first", "second"]),
+        (["ls", "teacher"], lambda data: sorted(one["used_by"] for one in data), [["first"], ["second"]]),
+        (["show", "first/teacher"], lambda data: data[0]["metrics"], {"count": 3.0}),
+        (["show", "first"], lambda data: data["recipe"]["seed"], 3),
+        (["diff", "first", "second"], lambda data: data["differences"][1], "teacher.steps: 4096 -> 8192"),
+        (["compare", "first", "second"], lambda data: data["metrics"][0]["run"], "first"),
+    ],
+)
+def test_what_is_told_can_be_read_by_programs(
+    command: Command, words: list[str], part: Callable[[object], object], expected: object
+) -> None:
+    done = command(*words, "--json")
+    assert done.returncode == 0, done.stderr
+    assert part(json.loads(done.stdout)) == expected
+
+
+def test_a_quiet_run_prints_nothing_and_a_verbose_one_every_step(command: Command) -> None:
+    assert command("run", "first.yaml", "-q").stdout == ""
+    assert "eval: 33 %" in command("run", "first.yaml", "-v", "--set", "eval.trials=9").stdout
+    failed = command("run", "first.yaml", "-q", "--set", "seed=x")
+    assert failed.stderr
+    assert failed.stdout == ""
+
+
+def test_a_shell_completes_recipes_artifacts_stages_and_paths(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.delenv("IOWBC_RUNS", raising=False)
+    assert "quickstart" in completion.recipes("quick")
+    assert completion.ran("") == ["first", "second"]
+    assert completion.artifacts("first/t") == ["first/teacher"]
+    key = (folder / "runs" / "first" / "teacher").resolve().name
+    assert completion.artifacts(key[:12]) == [key]
+    assert completion.stages("t") == ["teacher"]
+    assert completion.paths("teacher.gam") == ["teacher.gamma="]
+
+
+def test_the_command_line_answers_a_shells_question(tmp_path: Path) -> None:
+    asked = {**os.environ, "_IOWBC_COMPLETE": "complete_bash", "COMP_WORDS": "iowbc run --until tea", "COMP_CWORD": "3"}
+    words = [sys.executable, "-m", "iowbc"]
+    done = subprocess.run(words, env=asked, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["teacher"]
