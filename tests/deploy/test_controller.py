@@ -165,7 +165,7 @@ def changed(exported: Path, place: Path, **entries: Any) -> Path:
 
 def test_a_contract_of_another_format_is_refused(exported: Path, tmp_path: Path) -> None:
     with pytest.raises(ContractBroken, match="not a contract of format 3"):
-        read_contract(changed(exported, tmp_path / "later", format=3))
+        read_contract(changed(exported, tmp_path / "later", format=4))
 
 
 @pytest.mark.parametrize(
