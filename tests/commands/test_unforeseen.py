@@ -126,3 +126,9 @@ def test_ingredients_of_other_types_are_damage(
         done = command(*words)
         assert done.returncode == 0, done.stderr
     assert "damaged: key.json has " in command("plan", "first.yaml").stdout.replace("\n", " ")
+
+
+def test_ctrl_c_while_the_program_is_still_being_read_ends_it_without_a_word(tmp_path: Path) -> None:
+    (tmp_path / "typer.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
+    done = iowbc(tmp_path, "ls", PYTHONPATH=os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
