@@ -33,9 +33,11 @@ def test_a_failed_stage_goes_on_from_its_checkpoint(workplace: Workplace) -> Non
 def test_the_end_of_a_run_shows_metrics_tables_and_files(workplace: Workplace) -> None:
     command = workplace.command("run", "small.yaml")
     assert command.code == 0
-    assert "eval: count 3" in command.output
-    assert "| eval |" in command.output
-    assert "figures/curve.png" in command.output
+    lines = [line.rstrip() for line in command.output.splitlines()]
+    assert "eval        count 3" in lines
+    assert "more tables  runs/small/eval/tables: counts.md" in lines
+    assert "figures  runs/small/eval/figures (1)" in lines
+    assert lines[lines.index("next:") + 1 :][0] == "  iowbc play small.yaml"
 
 
 def test_progress_is_told_in_plain_lines_where_there_is_no_terminal(workplace: Workplace) -> None:
