@@ -177,7 +177,8 @@ class Planner:
             old = artifact.ingredients
             changes = list(differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])))
             alike = all(old.get(name) == ingredients[name] for name in ("version", "inputs", "robot"))
-            if alike and artifact.whole and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
+            there = not set(stage.extends_from) & set(artifact.manifest.omitted)
+            if alike and there and [path for path, _, _ in changes] == [stage.extends] and changes[0][1] < aim:
                 ends[changes[0][1]] = artifact
         for end in sorted(ends, reverse=True):
             try:

@@ -80,5 +80,7 @@ class Stage:
     extends: str | None = None
     """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
     differs in nothing but a smaller one, as if it had never stopped."""
+    extends_from: tuple[str, ...] = ()
+    """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""

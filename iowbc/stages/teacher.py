@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
-from iowbc.stages.training import leave_extendable, train
+from iowbc.stages.training import CURVES, STATE, leave_extendable, train
 
 if TYPE_CHECKING:
     from iowbc.evaluation.trials.quick import QuickEvaluation
@@ -123,5 +123,6 @@ STAGE = Stage(
     results=("teacher.safetensors", "teacher.json"),
     packages=("stages.teacher", "stages.training", "learning", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",
+    extends_from=(STATE, CURVES),
     counts=("teacher.steps",),
 )

@@ -1,6 +1,7 @@
 """What was published with the repository is used like what was made here, and never changed."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
 from workplace import Workplace
@@ -44,7 +45,7 @@ def test_a_damaged_one_is_named_ignored_and_left_alone(cloned: Workplace) -> Non
     (folder / "result.json").write_text("{}")
     step = cloned.plan()["teacher"]
     assert not step.cached
-    assert step.notes == ("the published artifact is ignored, it is damaged: result.json has 2 bytes instead of 28",)
+    assert step.notes == ("the published artifact is ignored, it is damaged: result.json has 2 bytes instead of 23",)
     cloned.run()
     assert cloned.ran() == ["teacher"]
     assert (folder / "result.json").read_text() == "{}"
@@ -55,7 +56,7 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     workplace: Workplace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = workplace.run()
-    monkeypatch.setattr(publishing, "LARGEST_FILE", 27)
+    monkeypatch.setattr(publishing, "LARGEST_FILE", 22)
     copy = publishing.publish(workplace.store.runs, made["rg-fit"])
     assert "result.json" in copy.manifest.omitted
     monkeypatch.undo()
@@ -84,6 +85,20 @@ def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: 
     workplace.ran()
     workplace.run("eval.trials=9")
     assert workplace.ran() == ["eval"]
+
+
+def test_a_published_training_is_gone_on_from_unless_it_lacks_what_that_takes(
+    workplace: Workplace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(publishing, "KINDS", (".json",))
+    for artifact in workplace.run().values():
+        publishing.publish(workplace.store.runs, artifact)
+    shutil.rmtree(workplace.store.runs.store)
+    teacher = workplace.registry["teacher"]
+    for needed, found in (("result.json", True), ("figures/curve.png", False)):
+        workplace.registry["teacher"] = replace(teacher, extends="teacher.steps", extends_from=(needed,))
+        step = workplace.plan("teacher.steps=8192")["teacher"]
+        assert (step.predecessor is not None) == found
 
 
 def test_publishing_copies_verifies_and_refuses_what_has_not_run(workplace: Workplace) -> None:

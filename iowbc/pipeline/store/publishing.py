@@ -10,11 +10,11 @@ from iowbc.pipeline.store.artifact import BESIDE, MANIFEST, Artifact, read_artif
 from iowbc.pipeline.store.runs import Runs
 
 KINDS = frozenset(
-    [".safetensors", ".json", ".npz", ".parquet", ".onnx", ".csv", ".md", ".tex", ".png", ".xml", ".yaml"]
+    [".safetensors", ".json", ".jsonl", ".npz", ".parquet", ".onnx", ".csv", ".md", ".tex", ".png", ".xml", ".yaml"]
 )
 """Endings of files that are published: reading them executes no code."""
-LARGEST_FILE = 8_000_000
-"""A larger file is left out [bytes]: the stages behind it need its digest alone."""
+LARGEST_FILE = 12_000_000
+"""A larger file is left out [bytes]: the stages behind it need its digest alone. What a training goes on from fits."""
 LARGEST_REPOSITORY = 60_000_000
 """All that may be published [bytes]: a clone must stay quick."""
 
