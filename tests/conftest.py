@@ -1,5 +1,6 @@
-"""The robot that most tests are about, and a smaller one."""
+"""The robot that most tests are about, and a smaller one; and that what tests start hears its signals."""
 
+import signal
 import xml.etree.ElementTree as ElementTree
 
 import pytest
@@ -9,6 +10,14 @@ from iowbc.robot.description import DESCRIPTION, Robot, load_robot, robot_folder
 
 STIFF = ("waist_roll", "waist_pitch", "wrist_pitch", "wrist_yaw")
 """Joints that the robot of 29 joints has and the one of 23 has not."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def signals_are_heard() -> None:
+    """Where the tests run in a background job or under nohup, their processes would inherit that signals are ignored."""
+    for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, usual)
 
 
 @pytest.fixture(scope="session")

@@ -130,9 +130,5 @@ def test_ingredients_of_other_types_are_damage(
 
 def test_ctrl_c_while_the_program_is_still_being_read_ends_it_without_a_word(tmp_path: Path) -> None:
     (tmp_path / "typer.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
-    listening = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    program = listening + "runpy.run_module('iowbc', run_name='__main__')"  # a background job of a shell hears no SIGINT
-    paths = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
-    words = [sys.executable, "-c", program, "ls"]
-    done = subprocess.run(words, cwd=tmp_path, env=paths, capture_output=True, text=True, check=False, timeout=120)
+    done = iowbc(tmp_path, "ls", PYTHONPATH=os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

@@ -50,7 +50,7 @@ def counting(name: str) -> Callable[[Job], None]:
         (job.out / "figures" / "curve.png").write_bytes(b"not really a picture")
         (job.out / "result.json").write_text(json.dumps({"seed": job.recipe.seed, "count": done}))
         (job.out / STARTED).write_text(json.dumps(started_at))
-        job.summarize({"count": float(done)})
+        job.summarize({"count": float(done)}, note=behaviour.get("note", ""))
 
     return run
 

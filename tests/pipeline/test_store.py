@@ -59,7 +59,8 @@ def test_a_manifest_that_belongs_elsewhere_is_damage(workplace: Workplace) -> No
 
 def test_every_file_of_a_stage_is_in_the_manifest(workplace: Workplace) -> None:
     artifact = workplace.run()["teacher"]
-    assert set(artifact.manifest.files) == {"figures/curve.png", "result.json", "summary.json", "tables/counts.md"}
+    files = {"figures/curve.png", "result.json", "started_at.json", "summary.json", "tables/counts.md"}
+    assert set(artifact.manifest.files) == files
     assert artifact.metrics == {"count": 3.0}
     assert artifact.ingredients["recipe"]["teacher"]["steps"] == 4096
 
@@ -68,7 +69,7 @@ def test_records_decide_no_later_key(workplace: Workplace, monkeypatch: pytest.M
     """Curves, times and pictures of a repeated stage may differ: what reads its results stays."""
     before = workplace.run()["teacher"].manifest
     workplace.ran()
-    monkeypatch.setenv("FAKE_BEHAVIOUR", json.dumps({"teacher": {"steps": 5}}))
+    monkeypatch.setenv("FAKE_BEHAVIOUR", json.dumps({"teacher": {"note": "another day"}}))
     after = workplace.run(force=frozenset({"teacher"}))["teacher"].manifest
     assert workplace.ran() == ["teacher"]
     assert after.files["summary.json"] != before.files["summary.json"]
