@@ -14,7 +14,7 @@ STIFF = ("waist_roll", "waist_pitch", "wrist_pitch", "wrist_yaw")
 
 @pytest.fixture(scope="session", autouse=True)
 def signals_are_heard() -> None:
-    """Where the tests run in a background job or under nohup, their processes would inherit that signals are ignored."""
+    """In a background job or under nohup, what the tests start would inherit that signals are ignored."""
     for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, usual)

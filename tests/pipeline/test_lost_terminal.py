@@ -68,7 +68,7 @@ def test_nohup_protects_a_run(workplace: Workplace) -> None:
 
 
 def test_a_hangup_that_comes_twice_or_before_a_request_does_not_abort(workplace: Workplace) -> None:
-    command = workplace.start("run", "small.yaml", behaviour={"teacher": {"steps": 3, "pause": 1.0}})
+    command = workplace.start("run", "small.yaml", behaviour={"teacher": {"steps": 3, "pause": 2.5}})
     until(lambda: workplace.progress("teacher"))
     for number in (signal.SIGHUP, signal.SIGHUP, signal.SIGTERM, signal.SIGHUP):
         command.signal(number)
