@@ -28,8 +28,6 @@ class Accepted:
     """How the trials of one `export.acceptance` went."""
 
     asked: Acceptance
-    seconds: tuple[float, ...]
-    """How long each lasted [s]."""
     survived: int
     """Trials without a fall or a drop."""
     passed: int
@@ -108,7 +106,6 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
         passed += bool(outcome.survived and carried and transported)
     return Accepted(
         asked,
-        seconds=tuple(outcome.seconds for _, outcome in trials),
         survived=sum(outcome.survived for _, outcome in trials),
         passed=passed,
         weight_in_hands=float(np.mean(hands)),

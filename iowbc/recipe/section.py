@@ -45,5 +45,6 @@ def _deciding(value: Any, plain: Any) -> Any:
 
 def _left_out(field: FieldInfo, value: Any) -> bool:
     marks = field.json_schema_extra if isinstance(field.json_schema_extra, Mapping) else {}
-    usual: Any = field.get_default(call_default_factory=True)
-    return bool(marks.get("cosmetic")) or (bool(marks.get("later")) and bool(value == usual))
+    if marks.get("later"):
+        return bool(value == field.get_default(call_default_factory=True))
+    return bool(marks.get("cosmetic"))
