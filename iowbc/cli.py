@@ -49,6 +49,9 @@ RunsFolder = Annotated[
     Path | None,
     typer.Option("--runs", help="Folder of artifacts and tracking; IOWBC_RUNS, else ./runs.", envvar="IOWBC_RUNS"),
 ]
+SweepFile = Annotated[
+    Path | None, typer.Option("--from", help="File with a grid, draws or both: what a sweep varies.", metavar="YAML")
+]
 Until = Annotated[
     str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
 ]
@@ -129,20 +132,62 @@ def run(
 
 
 @app.command()
+def sweep(
+    recipe: RecipeFile,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="Vary a value (a,b or 0..4), or change it for all; repeat for a grid.",
+            metavar="A.B.C=VALUES",
+            autocompletion=completion.paths,
+        ),
+    ] = None,
+    file: SweepFile = None,
+    jobs: Annotated[int, typer.Option(help="Points that run at the same time; they share the cores.", min=1)] = 1,
+    until: Until = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes of each point.", min=1)] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
+    on_code_change: OnCodeChange = "report",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="With --dry-run: print JSON.")] = False,
+    runs: RunsFolder = None,
+) -> None:
+    """Run a recipe with every combination of some values; stages that points share are made once."""
+    from iowbc.commands.sweep import SweepRequest, plan_sweep
+    from iowbc.commands.sweep import sweep as run_sweep
+    from iowbc.stages.registry import STAGES
+
+    asked = SweepRequest(_request(recipe, overrides, until, None, workers, on_code_change, runs), file, jobs)
+    if dry_run:
+        plan_sweep(asked, STAGES, _console(), as_json)
+    else:
+        with outlasting_readers():
+            raise typer.Exit(run_sweep(asked, STAGES, _console(), quiet))
+
+
+@app.command()
 def plan(
     recipe: RecipeFile,
     overrides: Overrides = None,
     until: Until = None,
     force: Force = None,
     on_code_change: OnCodeChange = "report",
+    as_sweep: Annotated[bool, typer.Option("--sweep", help="Of a sweep, where --set may name several values.")] = False,
+    file: SweepFile = None,
     as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
     """Say for each stage whether it is cached or would run, why, and how long it takes."""
     from iowbc.commands.plan import plan as print_plan
+    from iowbc.commands.sweep import SweepRequest, plan_sweep
     from iowbc.stages.registry import STAGES
 
-    print_plan(_request(recipe, overrides, until, force, None, on_code_change, runs), STAGES, _console(), as_json)
+    request = _request(recipe, overrides, until, force, None, on_code_change, runs)
+    if as_sweep or file is not None:
+        plan_sweep(SweepRequest(request, file, 1), STAGES, _console(), as_json)
+    else:
+        print_plan(request, STAGES, _console(), as_json)
 
 
 @app.command()

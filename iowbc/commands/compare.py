@@ -13,6 +13,7 @@ from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.named import Named, named
 from iowbc.commands.play import input_of
 from iowbc.commands.results import shown_path
+from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
@@ -37,7 +38,7 @@ def compare(
 
     film: also play one trial that all share again, and show the runs side by side.
     """
-    found = [named(store, word) for word in words]
+    found = [named(store, word) for word in points_of(store, words)]
     if len(found) < 2:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
     require_training("compare")

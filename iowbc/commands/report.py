@@ -9,6 +9,7 @@ from iowbc.commands.compare import joined_tables
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
+from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
@@ -18,7 +19,7 @@ from iowbc.pipeline.writability import require_writable
 
 def report(store: Store, console: Console, words: Sequence[str], output: Path) -> None:
     """Write the page about what the words name, and say where it lies. Raises `UsageError`."""
-    found = [named(store, word) for word in words]
+    found = [named(store, word) for word in points_of(store, words)]
     single = [run.word for run in found if run.recipe is None]
     if single:
         raise UsageError(

@@ -24,10 +24,12 @@ class Request:
     overrides: Sequence[str]
     runs: Runs
     options: Options
+    further: Sequence[str] = ()
+    """Words of the command line that only `iowbc sweep` knows."""
 
     def command(self, forced: Sequence[str]) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
-        words = ["iowbc", "run", self.word]
+        words = ["iowbc", "sweep" if self.further else "run", self.word, *self.further]
         for override in self.overrides:
             words += ["--set", override]
         if self.options.until:

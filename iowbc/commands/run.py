@@ -37,43 +37,54 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
     ready = [prepared(one, request, registry) for one in loaded]
     require_training("run")
     require_writable_runs(request.runs)
-    for planner, robot in ready:
-        if len(ready) > 1 and manner != "quiet":
-            console.print(f"{planner.loaded.recipe.name}:", highlight=False)
-        code = _run(planner, robot, request, console, manner)
-        if code != DONE:
-            return code
+    try:
+        with StopRequest(shown=console.is_terminal and manner == "usual") as stop:
+            for planner, robot in ready:
+                if len(ready) > 1 and manner != "quiet":
+                    console.print(f"{planner.loaded.recipe.name}:", highlight=False)
+                code = run_recipe(planner, robot, request, console, stop, manner)
+                if code != DONE:
+                    return code
+    except KeyboardInterrupt:
+        return INTERRUPTED
     if len(ready) > 1 and request.options.until is None and manner != "quiet":
         output = request.runs.root / "compare" / Path(request.word).stem
         compare(Store(request.runs), console, [one.recipe.name for one in loaded], output)
     return DONE
 
 
-def _run(planner: Planner, robot: Path, request: Request, console: Console, manner: Manner) -> int:
-    """Run one recipe; returns the exit code."""
+def run_recipe(
+    planner: Planner,
+    robot: Path,
+    request: Request,
+    console: Console,
+    stop: StopRequest,
+    manner: Manner = "usual",
+    within: str | None = None,
+) -> int:
+    """Run one recipe; returns the exit code. `within`: the run of a sweep to which this one belongs in MLflow."""
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
     status, code, closing, delivered = "KILLED", INTERRUPTED, "", True
     try:
-        with StopRequest(shown=console.is_terminal and manner == "usual") as stop:
-            try:
-                tracker = Tracker(request.runs, loaded) if loaded.recipe.execution.track else None
-                display = _display(loaded, console, lambda: stop.text, manner)
-                runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
-                runner.run()
-                status, code = "FINISHED", DONE
-                if tracker is not None:
-                    tracker.describe(described(runner.artifacts))
-            except PipelineFailed as error:
-                status, code = "FAILED", STAGE_FAILED
-                closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"
-            except Interrupted as error:
-                closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
-            finally:
-                if tracker is not None:
-                    wait = bool(_made(runner)) and not stop()
-                    delivered = tracker.close(status, wait) or not wait
+        try:
+            tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
+            display = _display(loaded, console, lambda: stop.text, manner)
+            runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
+            runner.run()
+            status, code = "FINISHED", DONE
+            if tracker is not None:
+                tracker.describe(described(runner.artifacts))
+        except PipelineFailed as error:
+            status, code = "FAILED", STAGE_FAILED
+            closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"
+        except Interrupted as error:
+            closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
+        finally:
+            if tracker is not None:
+                wait = within is None and bool(_made(runner)) and not stop()
+                delivered = tracker.close(status, wait) or not wait
     except KeyboardInterrupt:
         code, closing = INTERRUPTED, _resumption(request, runner)
     if code == DONE and runner is not None and manner != "quiet":

@@ -111,6 +111,24 @@ def test_whichever_call_fails_mlflow_ends_up_with_the_same(
         assert server.runs == whole.runs, failing
 
 
+@pytest.mark.parametrize("parent_first", [False, True])
+def test_a_run_may_belong_to_one_of_another_journal_whichever_is_sent_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parent_first: bool
+) -> None:
+    runs, server = Runs(tmp_path), Server()
+    for stem, parent in (("above", None), ("below", "above/recipe")):
+        with Journal(runs.tracking / f"{stem}.jsonl") as journal:
+            assert journal.acquire()
+            journal.write("journal", uri="sqlite://", experiment="tried", recipe=stem, digest="")
+            journal.write("run", id="recipe", parent=parent, name=stem, tags={"told": stem}, params={"is": stem})
+    for stem in ("above", "below") if parent_first else ("below", "above"):
+        delivered(runs, runs.tracking / f"{stem}.jsonl", server, monkeypatch)
+    assert sorted(run["params"]["is"] for run in server.runs.values()) == ["above", "below"]
+    (above,) = [name for name, run in server.runs.items() if run["tags"]["told"] == "above"]
+    (below,) = [run for run in server.runs.values() if run["tags"]["told"] == "below"]
+    assert below["tags"]["mlflow.parentRunId"] == above
+
+
 def test_a_flipped_bit_costs_its_line_and_names_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -61,7 +61,13 @@ class Runs:
             self.tracked_files,
             self.root / "compare",
             self.reports,
+            self.sweeps,
         )
+
+    @property
+    def sweeps(self) -> Path:
+        """What each sweep consists of and came to, `<name>/`."""
+        return self.root / "sweeps"
 
     @property
     def reports(self) -> Path:

@@ -178,11 +178,24 @@ class Delivery:
         tags = {**event["tags"], ORIGIN_TAG: f"{self.path.stem}/{event['id']}"}
         if event["parent"] in self.ids:
             tags["mlflow.parentRunId"] = self.ids[event["parent"]]
-        condition = f"tags.`{ORIGIN_TAG}` = '{tags[ORIGIN_TAG]}'"
-        found = self.client.search_runs([self._experiment], condition, max_results=1)
-        made = found[0] if found else self._created(event, tags)
+        elif "/" in (event["parent"] or ""):
+            tags["mlflow.parentRunId"] = self._above(event)
+        found = self._of(tags[ORIGIN_TAG])
+        made = self._created(event, tags) if found is None else found
         self.ids[event["id"]] = made.info.run_id
-        self._batch(event["id"], params=event["params"])
+        self._batch(event["id"], tags=None if found is None else tags, params=event["params"])
+
+    def _of(self, origin: str) -> "Run | None":
+        """The run that MLflow has of a place in a journal."""
+        condition = f"tags.`{ORIGIN_TAG}` = '{origin}'"
+        return next(iter(self.client.search_runs([self._experiment], condition, max_results=1)), None)
+
+    def _above(self, event: Mapping[str, Any]) -> str:
+        """Identifier of the run of another journal that this one belongs to: made here where that was not sent yet."""
+        origin = event["parent"]
+        known = {"id": origin, "name": origin.partition("/")[0], "time": event["time"]}
+        above = self._of(origin) or self._created(known, {ORIGIN_TAG: origin})
+        return str(above.info.run_id)
 
     def _created(self, event: Mapping[str, Any], tags: Mapping[str, str]) -> "Run":
         from mlflow.exceptions import MlflowException

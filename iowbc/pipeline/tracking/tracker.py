@@ -38,10 +38,12 @@ DESCRIPTION = "mlflow.note.content"
 class Tracker:
     """Records one recipe run and its stages. A run of the same recipe that did not finish is continued."""
 
-    def __init__(self, runs: Runs, loaded: LoadedRecipe) -> None:
+    def __init__(self, runs: Runs, loaded: LoadedRecipe, within: str | None = None) -> None:
+        """within: the run of another journal above this one, which sees to the sender, too."""
         self.runs = runs
+        self.within = within
         self.patience = loaded.recipe.execution.tracking_patience
-        self._sender: subprocess.Popen[bytes] | None = None
+        self._sender = Sender(runs)
         self._loaded = loaded
         self._cached: list[tuple[str, Artifact]] = []
         """Cached stages of a run that has made nothing yet: it is recorded once it makes something."""
@@ -58,43 +60,20 @@ class Tracker:
 
     def _begun(self, loaded: LoadedRecipe) -> Journal:
         recipe = loaded.recipe
-        stamp = time.strftime("%Y%m%d-%H%M%S")
-        journal = Journal(self.runs.tracking / f"{stamp}-{recipe.name}-{os.getpid()}.jsonl")
-        journal.acquire(CHECKING_TIME)
         resolved = recipe.model_dump(mode="json")
+        journal = new_journal(self.runs, recipe.name, recipe.execution.experiment, data_digest(resolved))
         journal.write(
-            "journal",
-            uri=tracking_uri(),
-            experiment=recipe.execution.experiment,
-            recipe=recipe.name,
-            digest=data_digest(resolved),
-        )
-        journal.write(
-            "run", id=PARENT, parent=None, name=recipe.name, tags=_process_tags(), params=parameters(resolved)
+            "run", id=PARENT, parent=self.within, name=recipe.name, tags=process_tags(), params=parameters(resolved)
         )
         journal.write("text", id=PARENT, file=RECIPE, text=as_yaml(recipe))
         return journal
 
     def _continued(self, loaded: LoadedRecipe) -> Journal | None:
-        """The newest journal of the same resolved recipe whose run did not finish and whose process is gone."""
-        digest = data_digest(loaded.recipe.model_dump(mode="json"))
-        for path in sorted(self.runs.tracking.glob(f"*-{loaded.recipe.name}-*.jsonl"), reverse=True):
-            first = header(path)
-            if first.get("digest") != digest or first.get("uri") != tracking_uri():
-                continue
-            if statuses(path).get(PARENT) == "FINISHED":
-                return None
-            journal = Journal(path)
-            if journal.acquire(CHECKING_TIME):
-                journal.write("reopen", id=PARENT, tags=_process_tags())
-                return journal
-            journal.close()
-            return None
-        return None
+        return unfinished_journal(self.runs, loaded.recipe.name, data_digest(loaded.recipe.model_dump(mode="json")))
 
     def stage(self, name: str, key: str, slices: Mapping[str, Any], resumed: bool) -> None:
         """A stage begins to run, or goes on; `slices` is its part of the recipe."""
-        tags = {**_process_tags(), "iowbc.stage": name, "iowbc.key": key, "iowbc.cached": "false"}
+        tags = {**process_tags(), "iowbc.stage": name, "iowbc.key": key, "iowbc.cached": "false"}
         if resumed and name in statuses(self._journal.path):
             self._journal.write("reopen", id=name, tags={**tags, "iowbc.resumed": "true"})
         else:
@@ -148,28 +127,67 @@ class Tracker:
             self._journal.write("end", id=PARENT, status=status)
         self._journal.close()
         self.send()
-        limit = time.monotonic() + (self.patience if wait else 0.0)
-        while path.exists() and unsent(path):
-            if time.monotonic() > limit or (self._sender is not None and self._sender.poll() is not None):
-                return not (path.exists() and unsent(path))
+        return self._sender.took(path, self.patience if wait else 0.0)
+
+    def send(self) -> None:
+        """See to it that a sender is at work."""
+        if self.within is None:
+            self._sender.start()
+
+
+class Sender:
+    """The process that sends what the runs of a folder tell; it outlives this one."""
+
+    def __init__(self, runs: Runs) -> None:
+        self.runs = runs
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """See to it that one is at work."""
+        if self._process is None or self._process.poll() is not None:
+            with contextlib.suppress(OSError):  # without a sender the journal waits for that of the next run
+                self._process = start_sender(self.runs)
+
+    def took(self, journal: Path, patience: float) -> bool:
+        """Wait until MLflow has all of a journal, at most so long [s]; whether it has."""
+        limit = time.monotonic() + patience
+        while journal.exists() and unsent(journal):
+            if time.monotonic() > limit or (self._process is not None and self._process.poll() is not None):
+                return not (journal.exists() and unsent(journal))
             time.sleep(0.05)
         return True
 
-    def send(self) -> None:
-        """See to it that a sender is at work; it outlives this process."""
-        if self._sender is None or self._sender.poll() is not None:
-            with contextlib.suppress(OSError):  # without a sender the journal waits for that of the next run
-                self._sender = start_sender(self.runs)
+
+def new_journal(runs: Runs, name: str, experiment: str, digest: str) -> Journal:
+    """A journal that begins; `digest` is of what its run does."""
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    journal = Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl")
+    journal.acquire(CHECKING_TIME)
+    journal.write("journal", uri=tracking_uri(), experiment=experiment, recipe=name, digest=digest)
+    return journal
+
+
+def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
+    """The newest journal of the same run, where that did not finish and its process is gone; the run goes on."""
+    for path in sorted(runs.tracking.glob(f"*-{name}-*.jsonl"), reverse=True):
+        first = header(path)
+        if first.get("digest") != digest or first.get("uri") != tracking_uri():
+            continue
+        if statuses(path).get(PARENT) == "FINISHED":
+            return None
+        journal = Journal(path)
+        if journal.acquire(CHECKING_TIME):
+            journal.write("reopen", id=PARENT, tags=process_tags())
+            return journal
+        journal.close()
+        return None
+    return None
 
 
 def record_figures(runs: Runs, name: str, figures: Mapping[str, float]) -> None:
     """Record a run that has no stages, such as a benchmark: its figures by name."""
-    stamp = time.strftime("%Y%m%d-%H%M%S")
-    with Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl") as journal:
-        journal.acquire(CHECKING_TIME)
-        experiment = Execution.model_fields["experiment"].default
-        journal.write("journal", uri=tracking_uri(), experiment=experiment, recipe=name, digest="")
-        journal.write("run", id=PARENT, parent=None, name=name, tags=_process_tags(), params={})
+    with new_journal(runs, name, Execution.model_fields["experiment"].default, "") as journal:
+        journal.write("run", id=PARENT, parent=None, name=name, tags=process_tags(), params={})
         journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
         journal.write("end", id=PARENT, status="FINISHED")
     start_sender(runs)
@@ -212,5 +230,6 @@ def backlog(runs: Runs) -> list[Path]:
     return [path for path in sorted(runs.tracking.glob("*.jsonl")) if unsent(path)]
 
 
-def _process_tags() -> dict[str, str]:
+def process_tags() -> dict[str, str]:
+    """This process, by which a run tells whose it is."""
     return {"iowbc.pid": str(os.getpid()), "iowbc.host": host(), "iowbc.boot": boot()}

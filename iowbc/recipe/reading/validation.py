@@ -73,7 +73,7 @@ def _position(place: str) -> tuple[str, int, int]:
 
 def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
     """Place, `key 'x' = value`, and what is valid."""
-    path, found = _descend(tree, error["loc"])
+    path, found = descend(tree, error["loc"])
     if error["type"] == "missing":
         name = ".".join((*path, str(error["loc"][-1])))
         return found.place, f"key '{name}'", "is missing and has no default"
@@ -94,7 +94,7 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
     return found.place, head, text
 
 
-def _descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ...], Located]:
+def descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ...], Located]:
     """The deepest value of the file that an error's location leads to; names of union members are skipped."""
     path: list[str] = []
     for part in location:

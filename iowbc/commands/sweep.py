@@ -1,0 +1,186 @@
+"""`iowbc sweep`: a recipe with every combination of some values, several runs at a time, and what came of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+
+from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.commands.named import Named, named
+from iowbc.commands.points import DONE, INTERRUPTED, STAGE_FAILED, Task, failure, run_tasks
+from iowbc.commands.request import Request, prepared
+from iowbc.commands.results import shown_path
+from iowbc.commands.run import run_recipe
+from iowbc.commands.sweep_plan import Planned, in_all, planned, print_plan
+from iowbc.commands.swept import record
+from iowbc.commands.training import require_training
+from iowbc.errors import Problem, RecipeError
+from iowbc.pipeline.console.board import Board, RunView
+from iowbc.pipeline.planner import Planner
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.stop_request import StopRequest
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.tracking.family import Family
+from iowbc.pipeline.writability import require_writable_runs
+from iowbc.processes import available_cores
+from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
+
+LOGS = "logs"
+"""Folder of a sweep with what each point prints."""
+STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What `iowbc sweep` was asked for."""
+
+    recipe: Request
+    """Recipe and what holds for all points; `--set` of several values varies one."""
+    file: Path | None
+    """File that says what is varied besides."""
+    jobs: int
+    """Points that run at the same time."""
+
+    @property
+    def command(self) -> str:
+        """The command that goes on with this sweep."""
+        further = [*(["--from", str(self.file)] if self.file else []), "--jobs", str(self.jobs)]
+        return replace(self.recipe, further=further).command([])
+
+
+@dataclass(frozen=True)
+class ReadyPoint:
+    """A point that can run."""
+
+    point: Point
+    planner: Planner
+    robot: Path
+    request: Request
+
+
+def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, list[ReadyPoint]]:
+    """The points of a sweep. Raises `RecipeError` for all that is wrong before any runs."""
+    if asked.recipe.options.force:
+        text = "names a stage that points may share; force it in one of them with `iowbc run`"
+        raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
+    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file)
+    workers = asked.recipe.options.workers or max(1, available_cores() // asked.jobs)
+    points = []
+    for point in found.points:
+        options = replace(asked.recipe.options, workers=workers)
+        request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides, options=options)
+        points.append(ReadyPoint(point, *prepared(point.loaded, request, registry), request))
+    return found, points
+
+
+def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
+    """Print what a sweep would run. Raises `RecipeError`."""
+    found, points = ready(asked, registry)
+    print_plan(found, planned([one.planner for one in points]), console, as_json)
+
+
+def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, quiet: bool = False) -> int:
+    """Run all points; returns the exit code. Raises `RecipeError`.
+
+    A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
+    """
+    found, points = ready(asked, registry)
+    runs = asked.recipe.runs
+    require_training("sweep")
+    require_writable_runs(runs)
+    folder = runs.sweeps / found.name
+    record(found, folder)
+    before = planned([one.planner for one in points])
+    if not quiet:
+        console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
+    execution = found.points[0].loaded.recipe.execution
+    codes: Mapping[str, int | None] = {}
+    family: Family | None = None
+    status = "KILLED"
+    try:
+        with StopRequest(shown=console.is_terminal and not quiet) as stop:
+            if execution.track and not _all_cached(before):
+                settings = {point.name: point.settings for point in found.points}
+                family = Family(runs, found.name, execution.experiment, settings, execution.tracking_patience)
+                family.send()
+            origin = None if family is None else family.origin
+            tasks = [_task(one, stop, folder, origin) for one in points]
+            views = {task.name: RunView(task.name, task.log) for task in tasks}
+            with Board(console, execution.line_interval, quiet, lambda: stop.text, views) as board:
+                codes = run_tasks(tasks, asked.jobs, stop, board)
+    except KeyboardInterrupt:
+        codes = dict.fromkeys(before, INTERRUPTED)
+    code = _code(codes)
+    status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
+    try:
+        if code != INTERRUPTED:
+            _conclude(found, codes, runs, folder, console, family, quiet)
+    finally:
+        if family is not None:
+            family.close(status)
+    _tell_rest(asked, codes, folder, code)
+    return code
+
+
+def _task(one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None) -> Task:
+    run = partial(run_recipe, one.planner, one.robot, one.request, stop=stop, within=origin)
+    return Task(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
+
+
+def _all_cached(before: Planned) -> bool:
+    return all(stage.step.cached for own in before.values() for stage in own)
+
+
+def _code(codes: Mapping[str, int | None]) -> int:
+    if any(code in (INTERRUPTED, None) for code in codes.values()):
+        return INTERRUPTED
+    return DONE if all(code == DONE for code in codes.values()) else STAGE_FAILED
+
+
+def _conclude(
+    found: Sweep,
+    codes: Mapping[str, int | None],
+    runs: Runs,
+    folder: Path,
+    console: Console,
+    family: Family | None,
+    quiet: bool,
+) -> None:
+    """Write and print what the finished points came to."""
+    from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, write_results
+
+    store = Store(runs)
+    finished: dict[str, Named] = {name: named(store, name) for name, code in codes.items() if code == DONE}
+    if not finished:
+        return
+    states = {name: STATES.get(code, "failed") for name, code in codes.items()}
+    paths = write_results(found, finished, states, folder)
+    text = (folder / TABLE).read_text(encoding="utf-8")
+    if family is not None:
+        lines = outcomes(found, finished).lines
+        figures = {f"{line.label}/{name}": value for line in lines for name, value in line.means.items()}
+        family.describe(text, figures, [folder / FIGURE, folder / TABLE])
+    if quiet:
+        return
+    console.print(drawn(read_table(text), console.width))
+    for path in paths:
+        console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
+    if len(finished) > 1:
+        console.print(f"next:\n  iowbc compare {found.name}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _tell_rest(asked: SweepRequest, codes: Mapping[str, int | None], folder: Path, code: int) -> None:
+    """Say on standard error what failed, and how to go on."""
+    said = Console(stderr=True, soft_wrap=True)
+    failed = [name for name, own in codes.items() if own not in (DONE, INTERRUPTED, None)]
+    if failed:
+        said.print(f"{len(failed)} of {len(codes)} points failed:", highlight=False)
+    for name in failed:
+        log = folder / LOGS / f"{name}.log"
+        said.print(f"  {name}: {failure(log)} (log {shown_path(log)})", markup=False, highlight=False)
+    if code != DONE:
+        head = "interrupted; to go on:" if code == INTERRUPTED else "what is finished is kept; after a remedy:"
+        said.print(f"{head}\n{asked.command}", markup=False, highlight=False)

@@ -1,0 +1,112 @@
+"""What a sweep would run: each stage counted once, however many points share it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.commands.as_json import print_json
+from iowbc.pipeline.console.wording import duration
+from iowbc.pipeline.planner import Planner, Step, slice_value
+from iowbc.pipeline.store.digests import data_digest
+from iowbc.recipe.reading.sweep import Sweep
+
+
+@dataclass(frozen=True)
+class PlannedStage:
+    """A stage of a point."""
+
+    step: Step
+    shared_with: str
+    """The earlier point that makes it; empty where this one does, or where it is cached."""
+
+
+Planned = Mapping[str, Sequence[PlannedStage]]
+"""The stages of each point, by its name."""
+
+
+def planned(planners: Sequence[Planner]) -> Planned:
+    """The stages of each point, as things stand; nothing is changed."""
+    makers: dict[str, str] = {}
+    found: dict[str, list[PlannedStage]] = {}
+    for planner in planners:
+        name = planner.loaded.recipe.name
+        identities: dict[str, str] = {}
+        own = found.setdefault(name, [])
+        for step in planner.plan():
+            identity = identities[step.stage.name] = _identity(planner, step, identities)
+            maker = name if step.cached else makers.setdefault(identity, name)
+            own.append(PlannedStage(step, "" if maker == name else maker))
+    return found
+
+
+def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
+    """What stands for a stage's key while those of the stages that it reads are not known."""
+    if step.key is not None:
+        return step.key
+    ingredients = {
+        "stage": step.stage.name,
+        "recipe": {path: slice_value(planner.deciding, path, step.stage) for path in step.stage.slice},
+        "robot": planner.robot_digest,
+        "inputs": {name: before[name] for name in planner.reads(step.stage)},
+    }
+    return data_digest(ingredients)
+
+
+def in_all(found: Planned) -> str:
+    """How much there is to do, in a sentence."""
+    stages = [stage for own in found.values() for stage in own]
+    made = [stage.step for stage in stages if not stage.step.cached and not stage.shared_with]
+    shared = sum(bool(stage.shared_with) for stage in stages)
+    cached = sum(stage.step.cached for stage in stages)
+    head = f"{len(found)} points: {len(made)} stages would run, {shared} are shared, {cached} cached"
+    known = [step.expected for step in made if step.expected is not None]
+    rest = len(made) - len(known)
+    if not made:
+        return f"{len(found)} points: all stages are cached"
+    if not known:
+        return f"{head}; how long that takes is not known"
+    unknown = f", and {rest} of unknown length" if rest else ""
+    return f"{head}; about {duration(sum(known))} one after another{unknown}"
+
+
+def print_plan(sweep: Sweep, found: Planned, console: Console, as_json: bool = False) -> None:
+    """A row for each point, and all together."""
+    if as_json:
+        print_json(console, {"sweep": sweep.name, "points": [_data(sweep, name, own) for name, own in found.items()]})
+        return
+    names = list(dict.fromkeys(stage.step.stage.name for own in found.values() for stage in own))
+    table = Table(box=None, padding=(0, 1))
+    for head in ("point", *names):
+        table.add_column(head, no_wrap=True, overflow="ellipsis")
+    for point, own in found.items():
+        cells = {stage.step.stage.name: _cell(stage) for stage in own}
+        table.add_row(point, *(cells.get(name, "") for name in names))
+    console.print(table)
+    console.print(in_all(found), highlight=False)
+
+
+def _cell(stage: PlannedStage) -> Text | str:
+    if stage.step.cached:
+        return Text("cached", style="cyan")
+    if stage.shared_with:
+        return Text("shared", style="dim")
+    return Text(f"run {duration(stage.step.expected)}".strip(), style="bold yellow")
+
+
+def _data(sweep: Sweep, name: str, own: Sequence[PlannedStage]) -> dict[str, Any]:
+    settings = next(point.settings for point in sweep.points if point.name == name)
+    stages = [
+        {
+            "stage": stage.step.stage.name,
+            "cached": stage.step.cached,
+            "shared_with": stage.shared_with or None,
+            "key": stage.step.key,
+            "expected_seconds": None if stage.step.cached or stage.shared_with else stage.step.expected,
+        }
+        for stage in own
+    ]
+    return {"point": name, "settings": dict(settings), "stages": stages}

@@ -1,0 +1,143 @@
+"""What a sweep came to: a table and a figure over its settings, seeds together, and every point's metrics."""
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.commands.named import Named
+from iowbc.commands.results import headline
+from iowbc.evaluation.report.statistics import mean_half_width
+from iowbc.recipe.reading.sweep import Point, Sweep, written
+from iowbc.recipe.recipe import PIPELINE
+from iowbc.report.parallel import Line, parallel_coordinates, write_figure
+
+SEED = "seed"
+"""What is averaged over."""
+OUTCOMES_SHOWN = 6
+"""Metrics in the table and in the figure at most: those of the last stages."""
+TABLE, FIGURE, POINTS = "table.md", "parallel.png", "points.csv"
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """The points that have finished, those that differ in their seed alone in one line."""
+
+    settings: tuple[str, ...]
+    """Dotted paths that lines differ in."""
+    metrics: tuple[str, ...]
+    """`stage metric` of those that are shown."""
+    lines: tuple[Line, ...]
+
+
+def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
+    """What came out; `found`: the finished points by name."""
+    settings = tuple(path for path in sweep.axes if path != SEED)
+    points = [point for point in sweep.points if point.name in found]
+    metrics = _chosen([found[point.name] for point in points])
+    groups: dict[tuple[str, ...], list[Point]] = {}
+    for point in points:
+        groups.setdefault(tuple(written(point.settings[path]) for path in settings), []).append(point)
+    lines = []
+    for group in groups.values():
+        own = {path: group[0].settings[path] for path in settings}
+        runs = [_values(found[point.name], metrics) for point in group]
+        means, halves = {}, {}
+        for name in metrics:
+            values = np.array([run[name] for run in runs if math.isfinite(run.get(name, math.nan))], np.float64)
+            if len(values):
+                means[name], halves[name] = float(values.mean()), _half(values)
+        label = ", ".join(f"{path.rpartition('.')[2]} {written(value)}" for path, value in own.items()) or sweep.name
+        lines.append(Line(label, own, means, halves, runs))
+    return Outcomes(settings, metrics, tuple(lines))
+
+
+def _half(values: NDArray[np.float64]) -> float:
+    """Half the 95 % interval of a mean; NaN of one value, none of equal ones."""
+    return 0.0 if len(values) > 1 and not np.ptp(values) else mean_half_width(values)
+
+
+def _values(run: Named, metrics: Sequence[str]) -> dict[str, float]:
+    own = {
+        f"{stage} {name}": value
+        for stage, artifact in run.artifacts.items()
+        for name, value in artifact.metrics.items()
+    }
+    return {name: own[name] for name in metrics if name in own}
+
+
+def _chosen(runs: Sequence[Named]) -> tuple[str, ...]:
+    """The telling metrics in which points differ, of the last stages first; of one that is the same for all, those of
+    the last stage."""
+    by_stage = {
+        stage: list(
+            dict.fromkeys(
+                f"{stage} {name}"
+                for run in runs
+                if stage in run.artifacts
+                for name, _ in headline(stage, run.artifacts[stage].metrics)
+            )
+        )
+        for stage in reversed(PIPELINE)
+    }
+    known = [name for names in by_stage.values() for name in names]
+    differing = [name for name in known if len({_values(run, [name]).get(name) for run in runs}) > 1]
+    last = next((names for names in by_stage.values() if names), [])
+    chosen = (differing or last)[:OUTCOMES_SHOWN]
+    return tuple(sorted(chosen, key=known.index, reverse=True))
+
+
+def write_results(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], folder: Path) -> list[Path]:
+    """Write table, figure and points; returns their paths."""
+    made = outcomes(sweep, found)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / name for name in (TABLE, FIGURE, POINTS)]
+    paths[0].write_text(table(sweep, made), encoding="utf-8")
+    title = f"{sweep.name}: means over seeds (thick), 95 % intervals (bars), single runs (thin)"
+    write_figure(parallel_coordinates(made.settings, made.metrics, made.lines, title), paths[1])
+    _write_points(sweep, found, states, paths[2])
+    return paths
+
+
+def table(sweep: Sweep, made: Outcomes) -> str:
+    """A row for each setting in Markdown: means over seeds with half their 95 % interval."""
+    head = [*(path.rpartition(".")[2] for path in made.settings), "seeds", *made.metrics]
+    rows = [
+        f"*Sweep {sweep.name}: means over seeds with their 95 % interval.*",
+        "",
+        "| " + " | ".join(head) + " |",
+        "|" + "---|" * len(made.settings) + "---:|" * (1 + len(made.metrics)),
+    ]
+    for line in made.lines:
+        cells = [
+            *map(written, line.settings.values()),
+            str(len(line.runs)),
+            *(_cell(line, name) for name in made.metrics),
+        ]
+        rows.append("| " + " | ".join(cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _cell(line: Line, name: str) -> str:
+    if name not in line.means:
+        return ""
+    half = line.halves[name]
+    return f"{line.means[name]:.4g}" + (f" ± {half:.2g}" if math.isfinite(half) else "")
+
+
+def _write_points(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], path: Path) -> None:
+    """Every metric of every point, for other programs."""
+    rows = []
+    for point in sweep.points:
+        row: dict[str, object] = {"point": point.name, "state": states.get(point.name, "waits"), **point.settings}
+        for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
+            row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
+        rows.append(row)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
+        writer.writeheader()
+        writer.writerows(rows)

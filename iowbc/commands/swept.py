@@ -1,0 +1,32 @@
+"""What a sweep consists of, kept so that other commands know it by its name."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from iowbc.commands.named import known_recipes
+from iowbc.files import write_whole
+from iowbc.pipeline.store.runs import read_json
+from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.sweep import Sweep
+
+RECORD = "sweep.json"
+"""File of a sweep with its points."""
+
+
+def record(found: Sweep, folder: Path) -> None:
+    """Keep a sweep's points and their settings in its folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    points = {point.name: dict(point.settings) for point in found.points}
+    write_whole(folder / RECORD, json.dumps({"axes": found.axes, "points": points}, indent=1))
+
+
+def points_of(store: Store, words: Sequence[str]) -> list[str]:
+    """Names of recipes, with the finished points of a sweep in place of its name."""
+    recipes = known_recipes(store)
+    found: list[str] = []
+    for word in words:
+        record = read_json(store.runs.sweeps / word / RECORD) if word not in recipes else None
+        points = record.get("points", {}) if isinstance(record, dict) else {}
+        found += [name for name in points if name in recipes] or [word]
+    return found

@@ -1,0 +1,129 @@
+"""What the console shows of many runs at once: how each stands, and the last line that it has said."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.pipeline.console.live_table import STYLES
+from iowbc.pipeline.console.wording import duration
+
+TAIL = 4096
+"""Bytes of a log in which its last line is looked for."""
+REDRAW = 0.5
+"""Seconds between two drawings of the live table."""
+LAST_SHOWN = 5
+"""Runs that have ended and are still shown in the live table."""
+
+
+@dataclass
+class RunView:
+    """What is known of one of many runs."""
+
+    name: str
+    log: Path
+    """What it prints."""
+    state: str = "waits"
+    note: str = ""
+    began: float = 0.0
+    """On the monotonic clock [s]."""
+    ended: float = 0.0
+    """On the monotonic clock [s]."""
+
+    @property
+    def spent(self) -> float | None:
+        """Time since its beginning, or until its end [s]; None before it runs."""
+        return (self.ended or time.monotonic()) - self.began if self.began else None
+
+
+@dataclass
+class Board:
+    """Shows many runs: a table on a terminal, lines elsewhere."""
+
+    console: Console
+    interval: float
+    """Seconds between two lines of progress where the output is not a terminal."""
+    quiet: bool = False
+    stopping: Callable[[], str] = lambda: ""
+    """What to show once a stop was asked for; empty before."""
+    views: dict[str, RunView] = field(default_factory=dict)
+    _live: Live | None = None
+    _shown: float = field(default_factory=time.monotonic)
+
+    def __enter__(self) -> "Board":
+        if self.console.is_terminal and not self.quiet:
+            self._live = Live(console=self.console, get_renderable=self._drawn, auto_refresh=False)
+            self._live.start()
+        return self
+
+    def __exit__(self, *reason: object) -> None:
+        if self._live is not None:
+            self._live.refresh()
+            self._live.stop()
+
+    def began(self, name: str) -> None:
+        """A run begins."""
+        view = self.views[name]
+        view.state, view.began = "runs", time.monotonic()
+        self._say(f"{name}: runs, log {view.log}")
+
+    def ended(self, name: str, state: str, note: str) -> None:
+        """A run has ended: `done`, `failed` or `stopped`."""
+        view = self.views[name]
+        view.state, view.note = state, note
+        if view.began:
+            view.ended = time.monotonic()
+        took = f" in {duration(view.spent)}" if view.began else ""
+        self._say(f"{name}: {state}{took}{f' - {note}' if note else ''} ({self._counts()})", lost=state == "failed")
+
+    def refresh(self) -> None:
+        """Show how far the runs are, once in a while."""
+        now = time.monotonic()
+        if self._live is not None and now - self._shown > REDRAW:
+            self._shown = now
+            self._live.refresh()
+        elif self._live is None and now - self._shown > self.interval:
+            self._shown = now
+            for view in self.views.values():
+                if view.state == "runs":
+                    self._say(f"{view.name}: {last_line(view.log)}")
+
+    def _say(self, text: str, *, lost: bool = False) -> None:
+        if self._live is None and (lost or not self.quiet):
+            self.console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def _counts(self) -> str:
+        """`3 of 10 done, 1 failed`."""
+        states = [view.state for view in self.views.values()]
+        parts = [f"{states.count(state)} {state}" for state in ("failed", "stopped") if state in states]
+        return ", ".join([f"{states.count('done')} of {len(states)} done", *parts])
+
+    def _drawn(self) -> Group:
+        table = Table(box=None, padding=(0, 1, 0, 0))
+        for name in ("run", "state", "spent", "says"):
+            table.add_column(name, no_wrap=True, overflow="ellipsis")
+        over = [view for view in self.views.values() if view.state not in ("waits", "runs")]
+        over.sort(key=lambda view: view.ended)
+        running = [view for view in self.views.values() if view.state == "runs"]
+        for view in (*over[-LAST_SHOWN:], *running):
+            text = view.note or (last_line(view.log) if view.state == "runs" else "")
+            state = Text(view.state, style=STYLES.get(view.state, ""))
+            table.add_row(Text(view.name), state, duration(view.spent), Text(text, style="dim"))
+        stopping = self.stopping()
+        return Group(table, Text(self._counts()), *([Text(stopping, style="magenta")] if stopping else []))
+
+
+def last_line(log: Path) -> str:
+    """The last line of a log that says anything; empty where there is none."""
+    try:
+        with log.open("rb") as file:
+            file.seek(max(0, log.stat().st_size - TAIL))
+            lines = file.read().decode(errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line.strip() for line in reversed(lines) if line.strip()), "")

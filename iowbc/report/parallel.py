@@ -1,0 +1,154 @@
+"""Parallel coordinates: what a sweep varied and what came out, an upright axis each, and a line for every setting."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+from pydantic import JsonValue
+
+from iowbc.recipe.reading.sweep import written
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+"""Okabe and Ito's palette: told apart with any colour vision. More lines than this are coloured by the last axis."""
+ORDERS = 30.0
+"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
+VALUES_NAMED = 8
+"""Different values of a setting up to which each is named beside its axis."""
+AXIS_WIDTH = 1.9
+"""Distance of two axes [inch]."""
+DPI = 150
+
+
+@dataclass(frozen=True)
+class Line:
+    """One setting: what was varied, and what came out of each of its runs."""
+
+    label: str
+    settings: Mapping[str, JsonValue]
+    means: Mapping[str, float]
+    halves: Mapping[str, float]
+    """Half the interval of each mean; NaN where there is none."""
+    runs: Sequence[Mapping[str, float]]
+    """The same of each run alone."""
+
+
+def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines: Sequence[Line], title: str) -> Figure:
+    """Axes for the settings, then for the outcomes: means thick with their intervals as bars, single runs thin."""
+    scales = [_setting(name, lines) for name in settings] + [_outcome(name, lines) for name in outcomes]
+    figure = Figure(figsize=(max(6.0, AXIS_WIDTH * len(scales) + 1.0), 4.6), layout="constrained")
+    axes = figure.subplots()
+    colours = _colours(figure, axes, lines, outcomes)
+    for line, colour in zip(lines, colours, strict=True):
+        fixed = [line.settings.get(name) for name in settings]
+        for run in line.runs if len(line.runs) > 1 else ():
+            _draw(axes, scales, [*fixed, *(run.get(name) for name in outcomes)], color=colour, lw=0.7, alpha=0.5)
+        means = [line.means.get(name) for name in outcomes]
+        _draw(axes, scales, [*fixed, *means], color=colour, lw=2.2, marker="o", ms=4, label=line.label)
+        for place, name in enumerate(outcomes, len(settings)):
+            mean, half = line.means.get(name), line.halves.get(name, math.nan)
+            if mean is not None and math.isfinite(half):
+                ends = [scales[place].height(mean - half), scales[place].height(mean + half)]
+                axes.plot([place, place], ends, color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
+    for place, scale in enumerate(scales):
+        axes.axvline(place, color="0.3", lw=0.8, zorder=0)
+        for height, text in scale.marks:
+            label = axes.annotate(text, (place, height), (-5, 0), textcoords="offset points", ha="right", va="center")
+            label.set(size=7, zorder=5, path_effects=[withStroke(linewidth=3, foreground="white")])
+    axes.set_xticks(range(len(scales)), [scale.name for scale in scales], fontsize=8)
+    axes.set_yticks([])
+    axes.set_xlim(-0.6, len(scales) - 0.7)
+    axes.set_ylim(-0.06, 1.06)
+    for side in ("top", "left", "right", "bottom"):
+        axes.spines[side].set_visible(False)
+    axes.tick_params(length=0)
+    if len(lines) <= len(COLOURS):
+        figure.legend(loc="outside lower center", ncols=min(3, len(lines)), fontsize=7, frameon=False)
+    figure.suptitle(title, fontsize=9)
+    return figure
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG."""
+    figure.savefig(path, dpi=DPI)
+
+
+@dataclass(frozen=True)
+class _Scale:
+    name: str
+    low: float
+    high: float
+    logarithmic: bool
+    places: Mapping[str, float]
+    """Height of each value, for values that are no numbers."""
+    marks: Sequence[tuple[float, str]]
+    """Heights that are named, and how."""
+
+    def height(self, value: JsonValue) -> float:
+        """Where a value stands, 0 to 1; NaN for none."""
+        if self.places:
+            return self.places.get(written(value), math.nan)
+        return _height(value, self.low, self.high, self.logarithmic)
+
+
+def _height(value: JsonValue, low: float, high: float, logarithmic: bool) -> float:
+    if not isinstance(value, (int, float)) or not math.isfinite(value):
+        return math.nan
+    if high <= low:
+        return 0.5
+    if logarithmic:
+        return math.log(max(float(value), low) / low) / math.log(high / low)
+    return (float(value) - low) / (high - low)
+
+
+def _setting(name: str, lines: Sequence[Line]) -> _Scale:
+    values = list(dict.fromkeys(written(line.settings.get(name)) for line in lines))
+    numbers = [line.settings.get(name) for line in lines]
+    if not all(isinstance(number, (int, float)) and not isinstance(number, bool) for number in numbers):
+        last = max(1, len(values) - 1)
+        places = {value: place / last if len(values) > 1 else 0.5 for place, value in enumerate(values)}
+        return _Scale(name.rpartition(".")[2], 0.0, 1.0, False, places, [(places[value], value) for value in values])
+    return _numbers(name.rpartition(".")[2], [float(number) for number in numbers], named=True)  # type: ignore[arg-type]
+
+
+def _outcome(name: str, lines: Sequence[Line]) -> _Scale:
+    found = [run[name] for line in lines for run in line.runs if math.isfinite(run.get(name, math.nan))]
+    for line in lines:
+        mean, half = line.means.get(name, math.nan), line.halves.get(name, math.nan)
+        found += [value for value in (mean - half, mean + half) if math.isfinite(value)]
+    return _numbers(name.replace(" ", "\n", 1), found or [0.0], named=False)
+
+
+def _numbers(name: str, values: Sequence[float], *, named: bool) -> _Scale:
+    low, high = min(values), max(values)
+    logarithmic = named and low > 0 and high / low > ORDERS
+    own = sorted(set(values))
+    if not (named and len(own) <= VALUES_NAMED):
+        own = [float(tick) for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high] or own
+        own = sorted({low, high}) if logarithmic else own
+    marks = [(_height(value, low, high, logarithmic), f"{value:.4g}") for value in own]
+    return _Scale(name, low, high, logarithmic, {}, marks)
+
+
+def _draw(axes: Axes, scales: Sequence[_Scale], values: Sequence[JsonValue], **style: Any) -> None:
+    axes.plot(range(len(scales)), [scale.height(value) for scale, value in zip(scales, values, strict=True)], **style)
+
+
+def _colours(figure: Figure, axes: Axes, lines: Sequence[Line], outcomes: Sequence[str]) -> Sequence[object]:
+    """A colour a line: its own, or, of many, by the last outcome."""
+    if len(lines) <= len(COLOURS) or not outcomes:
+        return [COLOURS[place % len(COLOURS)] for place in range(len(lines))]
+    last = [line.means.get(outcomes[-1], math.nan) for line in lines]
+    finite = [value for value in last if math.isfinite(value)] or [0.0]
+    shade = ScalarMappable(Normalize(min(finite), max(finite)), matplotlib.colormaps["viridis"])
+    figure.colorbar(shade, ax=axes, label=outcomes[-1], pad=0.01)
+    return list(shade.to_rgba(np.array(last)))
