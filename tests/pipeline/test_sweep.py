@@ -8,6 +8,7 @@ import signal
 from fake_stages import STARTED
 from workplace import Workplace, until
 
+from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.tracking.journal import events
 
 GRID = ("--set", "seed=0,1", "--set", "teacher.steps=4096,8192")
@@ -19,10 +20,9 @@ def counts(workplace: Workplace) -> dict[str, int]:
 
 
 def test_points_share_stages_and_are_summed_up(workplace: Workplace) -> None:
-    planned = workplace.command("sweep", "small.yaml", *GRID, "--dry-run")
-    assert "4 points: 20 stages would run, 4 are shared, 0 cached" in planned.output
     done = workplace.command("sweep", "small.yaml", *GRID, "--jobs", "2")
     assert done.code == 0, done.errors
+    assert "4 points: 20 stages would run, 4 are shared, 0 cached" in done.output
     assert counts(workplace) == {"rg-dataset": 2, "teacher": 4, "export": 4}
     folder = workplace.folder / "runs" / "sweeps" / "small-seed-steps"
     table = (folder / "table.md").read_text().splitlines()
@@ -49,37 +49,35 @@ def test_a_point_that_fails_does_not_stop_the_others(workplace: Workplace) -> No
     assert "1 of 3 points failed:\n  small-seed-1: teacher failed: it got lost" in done.errors
     assert done.errors.strip().splitlines()[-1] == "iowbc sweep small.yaml --jobs 1 --set seed=0..2"
     assert counts(workplace)["export"] == 2
-    assert workplace.command("sweep", "small.yaml", "--set", "seed=0..2", "-q").code == 0
-    assert counts(workplace)["export"] == 3
 
 
-def test_ctrl_c_stops_all_points_at_a_checkpoint_and_the_last_line_goes_on(workplace: Workplace) -> None:
-    command = workplace.start("sweep", "small.yaml", "--set", "seed=0..2", "--jobs", "2", behaviour=SLOW)
-    work = workplace.folder / "runs" / "work"
-    until(lambda: len(list(work.glob("*/scratch/checkpoint.one"))) == 2 and workplace.checkpoint("teacher") > 0)
-    command.signal(signal.SIGINT)
-    assert command.finish() == 130
-    assert "(0 of 3 done, 2 stopped)" in command.output
-    last = shlex.split(command.errors.strip().splitlines()[-1])
-    assert last == ["iowbc", "sweep", "small.yaml", "--jobs", "2", "--set", "seed=0..2"]
+def test_a_kill_and_ctrl_c_lose_nothing_and_the_last_line_goes_on(workplace: Workplace) -> None:
+    words = ("sweep", "small.yaml", "--jobs", "2", "--set", "seed=0..1", "--until", "teacher")
+    killed = workplace.start(*words, behaviour=SLOW)
+    checkpoints = workplace.folder / "runs" / "work"
+    until(lambda: len(list(checkpoints.glob("*/scratch/checkpoint.one"))) == 2 and workplace.checkpoint("teacher") > 0)
+    killed.signal(signal.SIGKILL)
+    killed.finish()
+    until(lambda: not any(holder(workplace.store.runs, path.name) for path in checkpoints.iterdir()))
+
+    asked = workplace.start(*words, behaviour=SLOW)
+    until(lambda: "goes on from attempt 1" in asked.output + logs(workplace))
+    asked.signal(signal.SIGINT)
+    assert asked.finish() == 130
+    assert "(0 of 2 done, 2 stopped)" in asked.output
+    last = shlex.split(asked.errors.strip().splitlines()[-1])
+    assert last == ["iowbc", *words]
 
     again = workplace.command(*last[1:])
     assert again.code == 0, again.errors
     teachers = workplace.store.artifacts("teacher")
-    assert sorted(artifact.manifest.attempts for artifact in teachers) == [1, 2, 2]
-    assert sum(json.loads((artifact.folder / STARTED).read_text()) > 0 for artifact in teachers) == 2
+    assert [artifact.manifest.attempts for artifact in teachers] == [3, 3]
+    assert all(json.loads((artifact.folder / STARTED).read_text()) > 0 for artifact in teachers)
+    assert counts(workplace) == {"rg-dataset": 2, "teacher": 2, "export": 0}
 
 
-def test_a_killed_sweep_takes_its_points_along_and_goes_on(workplace: Workplace) -> None:
-    command = workplace.start("sweep", "small.yaml", "--set", "seed=0,1", behaviour=SLOW)
-    until(lambda: workplace.checkpoint("teacher") > 0)
-    command.signal(signal.SIGKILL)
-    command.finish()
-    reached = workplace.checkpoint("teacher")
-    again = workplace.command("sweep", "small.yaml", "--set", "seed=0,1")
-    assert again.code == 0, again.errors
-    assert counts(workplace) == {"rg-dataset": 2, "teacher": 2, "export": 2}
-    assert reached <= max(json.loads((a.folder / STARTED).read_text()) for a in workplace.store.artifacts("teacher"))
+def logs(workplace: Workplace) -> str:
+    return "".join(path.read_text() for path in workplace.folder.glob("runs/sweeps/*/logs/*.log"))
 
 
 def test_mlflow_is_told_of_a_run_above_those_of_the_points(workplace: Workplace) -> None:
