@@ -300,6 +300,25 @@ def report(
 
 
 @app.command()
+def export(
+    what: Annotated[
+        str,
+        typer.Argument(
+            help="Recipe, RECIPE/export, key, or the folder of an export.",
+            metavar="WHAT",
+            autocompletion=completion.artifacts,
+        ),
+    ],
+    web: Annotated[Path, typer.Option("--web", help="Folder of the web page to write.", metavar="DIR")],
+    runs: RunsFolder = None,
+) -> None:
+    """Write an exported controller as a web page, in which the robot moves on the visitor's machine (needs npm)."""
+    from iowbc.commands.export import export_page
+
+    export_page(_store(runs), _console(), what, web)
+
+
+@app.command()
 def gc(
     unused: Annotated[bool, typer.Option("--unused", help="Artifacts that no recipe ever used.")] = False,
     recipe: Annotated[

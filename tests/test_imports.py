@@ -34,9 +34,10 @@ MAY_IMPORT = {
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
     "report": {"pipeline", "recipe", "errors"},
+    "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD
-    | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"},
+    | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report", "web"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""

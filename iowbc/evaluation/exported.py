@@ -1,11 +1,34 @@
 """The exported controller as the driver of simulated episodes: it reads the simulated sensors, not the observation."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from iowbc.control.sensors import Measured
+from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
+from iowbc.errors import ContractBroken
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
+
+
+def exported_world(folder: Path) -> Specification:
+    """The world in which the controller of an exported folder was accepted; it needs nothing but the folder.
+
+    Raises ContractBroken where the folder is not what its contract says.
+    """
+    Controller.load(folder)
+    path = folder / contract.RECIPE
+    try:
+        recipe = Recipe.model_validate_json(path.read_bytes())
+    except (FileNotFoundError, ValidationError) as error:
+        raise ContractBroken(f"{path}: missing or not a recipe of this version: {error}; export again") from error
+    generator = folder / contract.GENERATOR
+    with contract.readable(folder):
+        return Specification(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None)
 
 
 class ExportedPolicy:

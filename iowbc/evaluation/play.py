@@ -5,13 +5,10 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from iowbc.control.action import action_mirror
 from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
-from iowbc.errors import ContractBroken
-from iowbc.evaluation.exported import ExportedPolicy
+from iowbc.evaluation.exported import ExportedPolicy, exported_world
 from iowbc.evaluation.films import EpisodeFilm, Film
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.outcome import Outcome
@@ -46,16 +43,7 @@ class Source:
 
 def exported_source(folder: Path) -> Source:
     """The source in an exported folder, which holds all it needs. Raises ContractBroken."""
-    Controller.load(folder)
-    path = folder / contract.RECIPE
-    try:
-        recipe = Recipe.model_validate_json(path.read_bytes())
-    except (FileNotFoundError, ValidationError) as error:
-        raise ContractBroken(f"{path}: missing or not a recipe of this version: {error}; export again") from error
-    generator = folder / contract.GENERATOR
-    with contract.readable(folder):
-        world = Specification(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None)
-    return Source(world, folder)
+    return Source(exported_world(folder), folder)
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,7 @@ class Runs:
             self.root / "compare",
             self.reports,
             self.sweeps,
+            self.npm,
         )
 
     @property
@@ -73,6 +74,11 @@ class Runs:
     def reports(self) -> Path:
         """HTML pages about runs."""
         return self.root / "report"
+
+    @property
+    def npm(self) -> Path:
+        """What npm fetched for web pages, a folder for each set of versions."""
+        return self.root / "npm"
 
     @property
     def database(self) -> Path:

@@ -1,0 +1,50 @@
+"""`iowbc export WHAT --web DIR`: an exported controller as a static web page."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from iowbc.commands.named import named
+from iowbc.commands.results import shown_path
+from iowbc.commands.training import require_training
+from iowbc.errors import UsageError
+from iowbc.pipeline.console.wording import size
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.writability import require_writable
+
+CONTRACT = "contract.json"
+"""Every exported folder has one."""
+
+
+def export_page(store: Store, console: Console, word: str, folder: Path) -> None:
+    """Write the page of what a word names into a folder, and say how to look at it. Raises `UsageError`."""
+
+    def say(text: str) -> None:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    require_training("export")
+    exported = exported_folder(store, word)
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():
+        raise UsageError(f"--web {folder}: holds other files; give an empty folder, or one that this command has made")
+    require_writable(folder, "--web")
+    require_writable(store.runs.npm, "--runs")
+
+    from iowbc.web.page import write_page
+
+    write_page(exported, folder, store.runs.npm, say)
+    whole = sum(path.stat().st_size for path in folder.iterdir())
+    say(f"{shown_path(folder)} ({size(whole)}): copy it to any web server; to look at it here:")
+    say(f"python3 -m http.server --bind 127.0.0.1 --directory {shown_path(folder)} 8000")
+
+
+def exported_folder(store: Store, word: str) -> Path:
+    """The exported folder that a word names: a folder, a recipe, `RECIPE/export` or a key. Raises `UsageError`."""
+    if (Path(word) / CONTRACT).is_file():
+        return Path(word)
+    found = named(store, word).artifacts
+    if "export" not in found:
+        raise UsageError(
+            f"{word}: no exported controller; finished: {', '.join(found) or 'none'}; "
+            "run a recipe that ends with `export`, or give the folder that it made"
+        )
+    return found["export"].folder

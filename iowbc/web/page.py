@@ -1,0 +1,40 @@
+"""Writes the folder of a web page from an exported folder."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from iowbc.control.feasible_map import FEASIBLE
+from iowbc.deploy import contract
+from iowbc.evaluation.exported import exported_world
+from iowbc.robot.description import load_robot
+from iowbc.web.bundling import bundle, npm_parts
+from iowbc.web.kinematics import kinematics
+from iowbc.web.scenes import web_scenes
+
+SCENES = "scenes.json"
+"""What the page adds to the exported files: scenes, kinematics, and which of the files it has."""
+
+
+def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:
+    """Write a page with the controller of an exported folder into `out`, which holds all that it needs.
+
+    `cache`: where npm's packages are kept. Raises ContractBroken for a damaged export, UsageError without npm.
+    """
+    parts = npm_parts(cache, say)
+    world = exported_world(exported)
+    out.mkdir(parents=True, exist_ok=True)
+    feasible = f"{contract.GENERATOR}/{FEASIBLE}"
+    taken = [name for name in (contract.GOLDEN, feasible) if (exported / name).is_file()]
+    for name in (contract.GRAPH, contract.CONTRACT, *taken):
+        shutil.copyfile(exported / name, out / Path(name).name)
+    robot = load_robot(world.robot)
+    about = {
+        "scenes": web_scenes(world, robot),
+        "kinematics": kinematics(robot),
+        "feasible": FEASIBLE if feasible in taken else None,
+        "golden": contract.GOLDEN if contract.GOLDEN in taken else None,
+    }
+    (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")
+    bundle(parts, out)

@@ -1,0 +1,159 @@
+"""The simulation of a scene for the browser: its MJCF, the numbers that MJCF rounds, and how it begins."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.robot.description import Robot
+from iowbc.sim.model import scene_spec
+from iowbc.sim.objects import HANDS, TORSION, inertia_per_mass
+from iowbc.sim.simulation import Simulation
+from iowbc.sim.timing import Timing
+from iowbc.sim.world import World
+from iowbc.task.specification import Specification
+from iowbc.web.looks import looks
+
+KINDS = ("free", "lift")
+"""Scenes that the page simulates; the wheels of a crate, whose friction follows their direction, it does not."""
+FIELDS = (
+    *("qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis"),
+    *("jnt_range", "jnt_actfrcrange", "dof_armature", "dof_damping", "dof_frictionloss", "geom_pos", "geom_quat"),
+    *("geom_size", "geom_friction", "geom_rbound", "geom_aabb", "site_pos", "site_quat"),
+    *("actuator_gainprm", "actuator_biasprm"),
+)
+"""What of the model is written in full precision."""
+STILL = ("partner_share", "impulse_scale", "push_scale", "noise_scale")
+"""Quantities of an episode that are zero on the page: nobody helps or pushes, and sensors tell the truth."""
+HEAVIEST = 1.5
+"""Mass to which the page's slider goes, as a part of the object's nominal one (Table I: to 150 %)."""
+
+
+def web_scenes(world: Specification, robot: Robot) -> dict[str, Any]:
+    """Every scene that a page can show, by name, at the nominal values of all that training draws."""
+    scenes = world.recipe.simulation.scenes
+    return {name: _web_scene(world, robot, name) for name, scene in scenes if scene.kind in KINDS}
+
+
+def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
+    recipe: Recipe = world.recipe
+    scene: Scene = getattr(recipe.simulation.scenes, name)
+    simulation = begun(world, robot, name)
+    started, drawn = simulation.worlds[0], simulation.drawn
+    layout, physics = started.layout, recipe.simulation.physics
+    timing = Timing(simulation.period, physics.timestep, 0)
+    described = {
+        "kind": scene.kind,
+        "xml": _plain(scene_spec(robot, physics, scene, timing, dressed=False)),
+        "fields": _fields(started),
+        "start": started.qpos[0].tolist(),
+        "period": simulation.period,
+        "substeps": timing.substeps,
+        "base": layout.base,
+        "torso": layout.torso,
+        "joints": {
+            "position": [layout.joints.start, layout.joints.stop],
+            "velocity": [layout.joint_speeds.start, layout.joint_speeds.stop],
+        },
+        "drives": {
+            "effort": simulation.motor_effort[0].tolist(),
+            "speed": robot.velocity_limit.tolist(),
+            "corner": physics.torque_corner,
+            "kp": robot.kp.tolist(),
+            "kd": robot.kd.tolist(),
+            "linkages": robot.linkages.tolist(),
+        },
+        "looks": looks(scene_spec(robot, physics, scene, timing, dressed=True).compile(), started.model),
+    }
+    if scene.object is None or layout.object is None:
+        return described | {"object": None, "hold": None}
+    count = started.model.nbody
+    hands, wrists = (np.arange(count)[places].tolist() for places in (layout.hands, layout.wrists))
+    inertia = inertia_per_mass(scene.object)
+    thing = {
+        "body": layout.object,
+        "shape": scene.object.shape,
+        "mass": scene.object.mass,
+        "least": scene.object.smallest_mass,
+        "most": HEAVIEST * scene.object.mass,
+        "inertia_per_mass": inertia.tolist(),
+    }
+    hold = _hold(
+        started, robot, scene, inertia, {key: float(drawn[key][0]) for key in ("slip_force", "surface_friction")}
+    )
+    return described | {"object": thing, "hold": hold, "hands": hands, "wrists": wrists}
+
+
+def begun(world: Specification, robot: Robot, name: str) -> Simulation:
+    """One simulation of a scene at the start of an episode, undisturbed and with nothing drawn."""
+    recipe = world.recipe
+    quiet = recipe.simulation.randomization.model_copy(update={"enabled": False})
+    alone = recipe.simulation.partner.model_copy(update={"enabled": False})
+    simulation = Simulation(
+        robot,
+        recipe.simulation.model_copy(update={"randomization": quiet, "partner": alone}),
+        envs=np.zeros(1),
+        seed=0,
+        scenes=[name],
+        fixed={name: np.zeros(1) for name in STILL},
+        control_frequency=recipe.task.control_frequency,
+    )
+    references = ReferenceLayer(robot, recipe.task.references, world.rg)
+    command = references.clamp(references.startable(nominal_command(recipe)[None]))
+    arms, posture = references.start(command, both_wrists(getattr(recipe.task.references.grasps, name))[None])
+    joints = np.empty((1, len(robot.joints)))
+    joints[:, robot.support], joints[:, robot.interaction] = posture, arms
+    simulation.reset(np.zeros(1, np.int64), joints, references.start_pitch(posture, command), np.zeros(1))
+    return simulation
+
+
+def nominal_command(recipe: Recipe) -> Array:
+    """Standing still in the nominal posture, (11,)."""
+    commands = recipe.task.commands
+    return np.array([0.0, 0.0, 0.0, commands.nominal_height, commands.nominal_pitch, *[0.0] * 6])
+
+
+def _plain(spec: Any) -> str:
+    """The MJCF, without the memory of motors and sensors, which the page has no delays for."""
+    for part in (*spec.actuators, *spec.sensors):
+        part.nsample = 0
+    text: str = spec.to_xml()
+    return text
+
+
+def _fields(world: World) -> dict[str, list[float]]:
+    """The model's numbers as the simulation has them after its start, those that differ between simulations too."""
+    own: Mapping[str, Array] = world.fields.of(0)
+    return {name: np.ravel(own[name] if name in own else getattr(world.model, name)).tolist() for name in FIELDS}
+
+
+def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
+    """What the hands do beside their connection to the object, or the contact with it."""
+    grasp, layout, model = scene.grasp, world.layout, world.model
+    compliant = grasp.kind == "compliant"
+    places = np.arange(model.nsite)[layout.grips] if layout.palms is None else layout.palms
+    sides = np.split(robot.interaction, 2)
+    return {
+        "compliant": compliant,
+        "points": places.tolist(),
+        "arms": [
+            [{"joint": int(joint), "hinge": int(joint) + 1, "kp": float(robot.kp[joint])} for joint in side]
+            for side in sides
+        ],
+        "sensors": [int(model.sensor(name).adr[0]) for name in HANDS],
+        "handover": grasp.handover / world.timing.period,
+        "squeeze": 0.0 if compliant else grasp.squeeze,
+        "by_friction": grasp.by_friction if compliant else 0.0,
+        "strength": grasp.strength,
+        "friction": drawn["surface_friction"],
+        "slip_force": drawn["slip_force"],
+        "torsion": TORSION,
+        "about": float(inertia[1] + grasp.height**2),
+        "stability": grasp.stability,
+        "stiffness": grasp.stiffness,
+        "swing_damping": grasp.swing_damping,
+    }

@@ -1,0 +1,116 @@
+/** The page's panel: sliders, buttons and what is told beside them. */
+
+import * as command from "./command.js";
+
+const find = (selector) => document.querySelector(selector);
+
+export class Panel {
+  /** `contract` gives the ranges of the command; `on`: what happens when scene, mass or a button is changed. */
+  constructor(contract, scenes, on) {
+    this.command = [0, 0, 0, contract.commands.nominal_height, contract.commands.nominal_pitch, 0, 0, 0, 0, 0, 0];
+    this.first = [...this.command];
+    const { velocity_x, velocity_y, yaw_rate, height, pitch } = contract.commands;
+    this.sliders = [
+      this.#slider(command.VELOCITY_X, "forward", "m/s", velocity_x),
+      this.#slider(command.VELOCITY_Y, "left", "m/s", velocity_y),
+      this.#slider(command.YAW_RATE, "turn", "rad/s", yaw_rate),
+      this.#slider(command.HEIGHT, "height", "m", height),
+      this.#slider(command.PITCH, "lean", "rad", pitch),
+    ];
+    this.massSlider = slider("mass", "mass", "kg", 0, 1, 0, (mass) => on.mass(mass));
+    find("#sliders").append(...this.sliders.map((each) => each.row), this.massSlider.row);
+    const choice = find("#scene");
+    choice.append(...Object.entries(scenes).map(([name, { object }]) => new Option(titled(name, object), name)));
+    choice.value = Object.keys(scenes).find((name) => scenes[name].object) ?? choice.options[0].value;
+    choice.addEventListener("change", () => on.scene(choice.value));
+    find("#again").addEventListener("click", () => {
+      this.#put(this.first);
+      on.again();
+    });
+    find("#stand").addEventListener("click", () => this.#put(this.first));
+    find("#pause").addEventListener("click", () => (on.pause(), find("#pause").classList.toggle("pressed")));
+    find("#check").addEventListener("click", () => on.check());
+    find("#title").textContent = `${contract.recipe} on ${contract.robot}`;
+    document.title = find("#title").textContent;
+    find("#message").textContent = "";
+    find("main").hidden = false;
+  }
+
+  get scene() {
+    return find("#scene").value;
+  }
+
+  get mass() {
+    return this.massSlider.value;
+  }
+
+  #slider(place, name, unit, [low, high]) {
+    return slider(name, name, unit, low, high, this.command[place], (value) => (this.command[place] = value));
+  }
+
+  #put(values) {
+    this.sliders.forEach((each, place) => each.put(values[place]));
+  }
+
+  /** The range of the mass; none without an object. */
+  massOf(object) {
+    this.massSlider.row.hidden = object === null;
+    if (object) this.massSlider.range(object.least, object.most, object.mass);
+  }
+
+  checkable(possible) {
+    find("#check").hidden = !possible;
+  }
+
+  /** What is measured, once a second. */
+  tell({ factor, world, running }) {
+    const { linear } = world.velocity(world.scene.base), rotation = world.rotation(world.scene.base);
+    const forward = rotation[0] * linear[0] + rotation[3] * linear[1];
+    const height = world.position(world.scene.base)[2];
+    find("#told").textContent = running
+      ? `${world.time.toFixed(0)} s, ${factor.toFixed(2)} × real time; forward ${forward.toFixed(2)} m/s, height ${height.toFixed(2)} m`
+      : "paused";
+    document.documentElement.dataset.factor = factor.toFixed(3);
+  }
+
+  /** The check's figure. */
+  agreement(largest, steps) {
+    find("#agreement").textContent =
+      `Over the ${steps} steps of the export's golden rollout this browser differs by ${largest.toExponential(1)} at most.`;
+  }
+}
+
+function titled(name, object) {
+  return object ? `${name} (${object.shape}, ${object.mass} kg)` : `${name} (nothing in the hands)`;
+}
+
+function slider(id, name, unit, low, high, value, onInput) {
+  const row = document.createElement("label");
+  const [title, input, shown] = ["span", "input", "output"].map((tag) => document.createElement(tag));
+  title.textContent = name;
+  Object.assign(input, { type: "range", id, step: "any" });
+  row.append(title, input, shown);
+  const tell = () => (shown.textContent = `${Number(input.value).toFixed(2)} ${unit}`);
+  const put = (wanted) => {
+    input.value = wanted;
+    tell();
+    onInput(Number(input.value));
+  };
+  const bounds = (least, most) => Object.assign(input, { min: least, max: most });
+  input.addEventListener("input", () => put(input.value));
+  bounds(low, high);
+  input.value = value;
+  tell();
+  return {
+    row,
+    put,
+    get value() {
+      return Number(input.value);
+    },
+    range(least, most, first) {
+      bounds(least, most);
+      input.value = first;
+      tell();
+    },
+  };
+}
