@@ -11,7 +11,7 @@ from iowbc.evaluation.exported import exported_world
 from iowbc.robot.description import load_robot
 from iowbc.web.bundling import bundle, npm_parts
 from iowbc.web.kinematics import kinematics
-from iowbc.web.scenes import web_scenes
+from iowbc.web.scenes import first_scene, web_scenes
 
 SCENES = "scenes.json"
 """What the page adds to the exported files: scenes, kinematics, and which of the files it has."""
@@ -32,6 +32,7 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     robot = load_robot(world.robot)
     about = {
         "scenes": web_scenes(world, robot),
+        "first": first_scene(world.recipe),
         "kinematics": kinematics(robot),
         "feasible": FEASIBLE if feasible in taken else None,
         "golden": contract.GOLDEN if contract.GOLDEN in taken else None,

@@ -8,6 +8,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
@@ -37,6 +38,18 @@ def web_scenes(world: Specification, robot: Robot) -> dict[str, Any]:
     """Every scene that a page can show, by name, at the nominal values of all that training draws."""
     scenes = world.recipe.simulation.scenes
     return {name: _web_scene(world, robot, name) for name, scene in scenes if scene.kind in KINDS}
+
+
+def first_scene(recipe: Recipe) -> str:
+    """Name of the scene that a page begins in: one in which the controller was accepted, or none with an object."""
+    return next((name for name, _ in accepted(recipe)), FREE)
+
+
+def accepted(recipe: Recipe) -> list[tuple[str, float]]:
+    """Scenes and masses [kg] of objects in the hands with which the exported controller was tried."""
+    scenes = recipe.simulation.scenes
+    trials = [(trial.scene, trial.mass) for trial in recipe.export.acceptance if trial.mass > 0.0]
+    return [(name, mass) for name, mass in trials if getattr(scenes, name).kind in KINDS]
 
 
 def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
@@ -78,6 +91,7 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
         "body": layout.object,
         "shape": scene.object.shape,
         "mass": scene.object.mass,
+        "first": next((mass for place, mass in accepted(recipe) if place == name), scene.object.mass),
         "least": scene.object.smallest_mass,
         "most": HEAVIEST * scene.object.mass,
         "inertia_per_mass": inertia.tolist(),

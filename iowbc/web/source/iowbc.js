@@ -17,7 +17,7 @@ async function fetched(url) {
   return answer;
 }
 
-/** Everything in a page's folder: {contract, scenes, mujoco, controller, golden}; `golden` is null where there is none. */
+/** Everything in a page's folder: by name; `golden` is null where there is none. */
 export async function load(folder = new URL("./", import.meta.url)) {
   const at = (name) => new URL(name, folder);
   const json = async (name) => (await fetched(at(name))).json();
@@ -34,5 +34,5 @@ export async function load(folder = new URL("./", import.meta.url)) {
   const bounds = feasible && { pitch: feasible.pitch.data, low: feasible.low.data, high: feasible.high.data };
   const golden = about.golden && (await readNpz(await binary(about.golden)));
   const controller = new Controller(contract, session, about.kinematics, bounds);
-  return { contract, scenes: about.scenes, mujoco, controller, golden };
+  return { contract, scenes: about.scenes, first: about.first, mujoco, controller, golden };
 }

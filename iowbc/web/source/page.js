@@ -13,14 +13,14 @@ const LOWEST = 0.5, STEEPEST = 0.5, LYING = 2.0;
  * this; time until it is put up again [s]. */
 
 class Page {
-  constructor({ contract, scenes, mujoco, controller, golden }) {
+  constructor({ contract, scenes, first, mujoco, controller, golden }) {
     Object.assign(this, { scenes, mujoco, controller, golden, fallen: 0, running: true });
     this.asked = [];
     const between = (act) => (value) => this.asked.push(() => act(value));
-    this.panel = new Panel(contract, scenes, {
+    this.panel = new Panel(contract, scenes, first, {
       scene: between((name) => this.begin(name)),
       mass: between((mass) => (this.world.mass = mass)),
-      again: between(() => this.begin(this.name)),
+      restart: between(() => this.begin(this.name)),
       pause: between(() => (this.running = !this.running)),
       check: between(() => this.check()),
     });

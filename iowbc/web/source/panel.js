@@ -5,10 +5,13 @@ import * as command from "./command.js";
 const find = (selector) => document.querySelector(selector);
 
 export class Panel {
-  /** `contract` gives the ranges of the command; `on`: what happens when scene, mass or a button is changed. */
-  constructor(contract, scenes, on) {
+  /**
+   * `contract` gives the ranges of the command; `first`: the scene to begin in; `on`: what happens when scene, mass or a
+   * button is changed.
+   */
+  constructor(contract, scenes, first, on) {
     this.command = [0, 0, 0, contract.commands.nominal_height, contract.commands.nominal_pitch, 0, 0, 0, 0, 0, 0];
-    this.first = [...this.command];
+    const nominal = [...this.command];
     const { velocity_x, velocity_y, yaw_rate, height, pitch } = contract.commands;
     this.sliders = [
       this.#slider(command.VELOCITY_X, "forward", "m/s", velocity_x),
@@ -21,14 +24,14 @@ export class Panel {
     find("#sliders").append(...this.sliders.map((each) => each.row), this.massSlider.row);
     const choice = find("#scene");
     choice.append(...Object.entries(scenes).map(([name, { object }]) => new Option(titled(name, object), name)));
-    choice.value = Object.keys(scenes).find((name) => scenes[name].object) ?? choice.options[0].value;
+    choice.value = first;
     choice.addEventListener("change", () => on.scene(choice.value));
-    find("#again").addEventListener("click", () => {
-      this.#put(this.first);
-      on.again();
+    find("#stand").addEventListener("click", () => this.#put(nominal));
+    find("#restart").addEventListener("click", () => on.restart());
+    find("#pause").addEventListener("click", () => {
+      find("#pause").classList.toggle("pressed");
+      on.pause();
     });
-    find("#stand").addEventListener("click", () => this.#put(this.first));
-    find("#pause").addEventListener("click", () => (on.pause(), find("#pause").classList.toggle("pressed")));
     find("#check").addEventListener("click", () => on.check());
     find("#title").textContent = `${contract.recipe} on ${contract.robot}`;
     document.title = find("#title").textContent;
@@ -55,7 +58,7 @@ export class Panel {
   /** The range of the mass; none without an object. */
   massOf(object) {
     this.massSlider.row.hidden = object === null;
-    if (object) this.massSlider.range(object.least, object.most, object.mass);
+    if (object) this.massSlider.range(object.least, object.most, object.first);
   }
 
   checkable(possible) {

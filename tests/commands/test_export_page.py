@@ -1,0 +1,68 @@
+"""`iowbc export WHAT --web DIR` says what is missing before it begins."""
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from iowbc.commands.export import export_page, exported_folder
+from iowbc.errors import UsageError
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.web.bundling import SOURCE, npm_parts, parts_folder
+
+
+@pytest.fixture
+def store(folder: Path) -> Store:
+    return Store(Runs(folder / "runs"))
+
+
+def test_a_page_is_of_an_exported_controller(store: Store) -> None:
+    with pytest.raises(UsageError, match=r"first/teacher: no exported controller; finished: teacher; run a recipe"):
+        exported_folder(store, "first/teacher")
+
+
+def test_a_folder_with_other_files_is_left_alone(store: Store, tmp_path: Path) -> None:
+    (tmp_path / "contract.json").write_text("{}")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("")
+    with pytest.raises(UsageError, match="holds other files"):
+        export_page(store, Console(), str(tmp_path), tmp_path / "mine")
+
+
+def test_without_node_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UsageError, match=r"needs node and npm .*install Node\.js 18 or newer"):
+        npm_parts(tmp_path / "cache", print)
+
+
+def test_without_a_network_it_says_so_and_leaves_nothing_half_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, text in (("node", "echo v20.1.0"), ("npm", "mkdir node_modules; echo ENOTFOUND >&2; exit 1")):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    with pytest.raises(UsageError, match=r"is there a network.*\nENOTFOUND"):
+        npm_parts(tmp_path / "cache", print)
+    assert not parts_folder(tmp_path / "cache").exists()
+
+
+def test_the_command_line_asks_for_the_folder(
+    command: Callable[..., "subprocess.CompletedProcess[str]"],
+) -> None:
+    done = command("export", "first")
+    assert done.returncode == 2
+    assert "--web" in done.stderr
+
+
+def test_packages_are_pinned_by_version_and_digest_and_come_from_whatever_registry_is_set() -> None:
+    packages = json.loads((SOURCE / "package-lock.json").read_text())["packages"]
+    pinned = {name: about for name, about in packages.items() if name}
+    assert all("integrity" in about and "resolved" not in about for about in pinned.values())
+    wanted = json.loads((SOURCE / "package.json").read_text())
+    for name, number in (wanted["dependencies"] | wanted["devDependencies"]).items():
+        assert pinned[f"node_modules/{name}"]["version"] == number
