@@ -7,7 +7,7 @@ const UP = new three.Vector3(0, 0, 1);
 const TILE = 0.5, GROUND = 40, SEGMENTS = 24;
 const THEMES = {
   light: { background: 0xeef1f4, ground: ["#e3e7eb", "#d6dbe0"], sky: 0xffffff, below: 0xb8bec6 },
-  dark: { background: 0x14181d, ground: ["#20262d", "#1a1f25"], sky: 0xaab8c8, below: 0x20242a },
+  dark: { background: 0x14181d, ground: ["#2b333c", "#232a32"], sky: 0xdde6f0, below: 0x4a525c },
 };
 
 function geometry({ shape, size }) {
@@ -65,6 +65,7 @@ export class Drawing {
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(1024, 1024);
     this.sun.shadow.radius = 4;
+    this.sun.shadow.normalBias = 0.02;
     Object.assign(this.sun.shadow.camera, { left: -1.5, right: 1.5, top: 1.8, bottom: -1.2, near: 1, far: 8 });
     this.scene.add(this.ground, this.sun, this.sun.target, new three.HemisphereLight(colours.sky, colours.below, 1.6));
     this.bodies = new Map();

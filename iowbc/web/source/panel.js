@@ -84,7 +84,7 @@ export class Panel {
 }
 
 function titled(name, object) {
-  return object ? `${name} (${object.shape}, ${object.mass} kg)` : `${name} (nothing in the hands)`;
+  return object ? `${name}: a ${object.shape}` : `${name}: nothing`;
 }
 
 function slider(id, name, unit, low, high, value, onInput) {
