@@ -90,6 +90,8 @@ class Simulation:
         self.feed = np.zeros((n, partner.FEED))
         self.planned_push = np.zeros((n, 3))
         """Force on the base in the period to come beside the drawn pushes, world frame, (n, 3) [N]."""
+        self.planned_impulse = np.zeros((n, 3))
+        """The same on the object's centre of mass, beside the drawn impulses, (n, 3) [N]."""
         self._partner = partner.Partner(recipe.partner, models, self.period)
         self._sensing = Sensing(
             recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency, self.period
@@ -227,6 +229,8 @@ class Simulation:
         wrench, diverged = state.external_force, state.diverged
         self._partner.wrench(self.feed, self._noise[:, self._sensing.noise_width :], state, wrench)
         wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
+        if self.planned_impulse.any():
+            wrench[:, :3] += self.planned_impulse
         self._hand_over(wrench)
         push = self._pushes.advance(self.clock, self._episode_key, drawn["push_scale"])
         np.multiply(push, self._robot_mass[:, None], out=state.push_force)
@@ -361,7 +365,7 @@ class Simulation:
 
     def impulse_force(self, env: int) -> Array:
         """The impulse that acts on the object in this control period, world frame, (3,) [N]."""
-        force: Array = self._impulses.force[env].copy()
+        force: Array = self._impulses.force[env] + self.planned_impulse[env]
         return force
 
     def hand_position(self, env: int) -> Array:

@@ -239,6 +239,17 @@ def test_feet_slide_as_their_loaded_points_do(start, calm, push, friction, first
     assert slid > 0.5
 
 
+def test_a_planned_impulse_acts_on_the_object_in_full(start, calm):
+    blow, apart = (20.0, -10.0, 0.0), []
+    for force in ((0.0, 0.0, 0.0), blow):
+        simulation = start(calm, ["push"], object_mass=40.0)
+        simulation.planned_impulse[0] = force
+        simulation.step()
+        assert np.allclose(simulation.impulse_force(0), force)
+        apart.append(simulation.state.external_force[0, :3].copy())
+    assert np.allclose(apart[1] - apart[0], blow)
+
+
 def sliding_points(model, data, body):
     """Sum over a body's contacts of normal force times velocity (3,), and of the force [N]."""
     moved, load, force, jacobian = np.zeros(3), 0.0, np.zeros(6), np.zeros((3, model.nv))

@@ -7,7 +7,8 @@ from stepping import run
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.sim.rendering import appearance as look
 from iowbc.sim.rendering import backend as headless
-from iowbc.sim.rendering.renderer import GRIP, PUSH, SMALLEST_FORCE, SceneRenderer
+from iowbc.sim.rendering.forces import COLOURS, SMALLEST_FORCE
+from iowbc.sim.rendering.renderer import SceneRenderer
 
 
 @pytest.mark.parametrize("scene", ["free", "lift", "tyre", "push"])
@@ -41,7 +42,7 @@ def test_forces_are_drawn_as_arrows(start, monkeypatch):
     run(simulation, 30)
     with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
         renderer.frame()
-        assert _arrows(renderer, GRIP) == 2
+        assert _arrows(renderer, "grip") == 2
 
 
 def test_the_object_is_handed_over_without_an_arrow_of_a_disturbance(start, calm, monkeypatch):
@@ -51,17 +52,17 @@ def test_the_object_is_handed_over_without_an_arrow_of_a_disturbance(start, calm
     assert simulation.state.external_force[0, 2] > 10 * SMALLEST_FORCE
     with SceneRenderer(simulation, 0, width=64, height=48) as renderer:
         renderer.frame()
-        assert _arrows(renderer, PUSH) == 0
+        assert _arrows(renderer, "push") == 0
         simulation._impulses.force[0] = (40.0, 0.0, 0.0)
         renderer.frame()
-        assert _arrows(renderer, PUSH) == 1
+        assert _arrows(renderer, "push") == 1
 
 
-def _arrows(renderer, colour):
+def _arrows(renderer, kind):
     colours = np.array(
         [renderer._offscreen.scene.geoms[index].rgba for index in range(renderer._offscreen.scene.ngeom)]
     )
-    return int(np.sum(np.all(np.isclose(colours, colour), axis=1)))
+    return int(np.sum(np.all(np.isclose(colours, COLOURS[kind]), axis=1)))
 
 
 def test_meshes_sit_on_the_links_of_the_robot_where_they_are_installed(robot):

@@ -8,17 +8,9 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.sim.rendering.appearance import Appearance
+from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS, Force, forces
 from iowbc.sim.rendering.offscreen import Image, Offscreen
 from iowbc.sim.simulation import Simulation
-
-METRES_PER_NEWTON = 0.004
-ARROW_RADIUS = 0.016
-SMALLEST_FORCE = 5.0
-"""Weaker forces are not drawn [N]."""
-PARTNER, PUSH, GRIP, GROUND = (0.1, 0.6, 0.25, 1), (0.85, 0.1, 0.1, 1), (0.95, 0.55, 0.1, 1), (0.2, 0.4, 0.85, 1)
-"""Colours of forces: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet."""
-BESIDE = 0.09
-"""Forces on hands and feet are drawn this far outside of them, where the limbs do not hide them [m]."""
 
 
 class SceneRenderer:
@@ -66,26 +58,18 @@ class SceneRenderer:
         return aim
 
     def _draw_forces(self) -> None:
-        state, env = self._simulation.state, self._env
-        outward = BESIDE * state.base_rotation[env, :, 1] * np.array([[1.0], [-1.0]])
-        if state.has_object[env]:
-            self._arrow(self._simulation.partner_handle(env), state.partner_force[env], PARTNER)
-            self._arrow(state.object_position[env], self._simulation.impulse_force(env), PUSH)
-            hands = self._simulation.hand_position(env)
-            for hand in range(2):
-                self._arrow(hands[hand] + outward[hand], state.grip_force[env, hand], GRIP)
-        self._arrow(state.base_position[env], state.push_force[env], PUSH)
-        for foot in range(2):
-            self._arrow(state.foot_position[env, foot] + outward[foot], state.foot_force[env, foot], GROUND)
+        for force in forces(self._simulation, self._env):
+            self._arrow(force)
 
-    def _arrow(self, start: Array, force: Array, colour: tuple[float, ...]) -> None:
+    def _arrow(self, force: Force) -> None:
         scene = self._offscreen.scene
-        if np.linalg.norm(force) < SMALLEST_FORCE or scene.ngeom >= scene.maxgeom:
+        if scene.ngeom >= scene.maxgeom:
             return
         geom = scene.geoms[scene.ngeom]
         arrow = mujoco.mjtGeom.mjGEOM_ARROW.value
-        mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32))
-        mujoco.mjv_connector(geom, arrow, ARROW_RADIUS, start, start + METRES_PER_NEWTON * force)
+        colour = np.array(COLOURS[force.kind], np.float32)
+        mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), colour)
+        mujoco.mjv_connector(geom, arrow, ARROW_RADIUS, force.start, force.end)
         scene.ngeom += 1
 
     def close(self) -> None:

@@ -1,0 +1,62 @@
+"""The forces on an environment's robot and object, as arrows to draw."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.sim.simulation import Simulation
+
+METRES_PER_NEWTON = 0.004
+ARROW_RADIUS = 0.016
+SMALLEST_FORCE = 5.0
+"""Weaker forces are not drawn [N]."""
+COLOURS = {
+    "partner": (0.1, 0.6, 0.25, 1.0),
+    "push": (0.85, 0.1, 0.1, 1.0),
+    "grip": (0.95, 0.55, 0.1, 1.0),
+    "ground": (0.2, 0.4, 0.85, 1.0),
+}
+"""By kind: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet."""
+BESIDE = 0.09
+"""Forces on hands and feet are drawn this far outside of them, where the limbs do not hide them [m]."""
+
+
+@dataclass(frozen=True)
+class Force:
+    """An arrow, world frame."""
+
+    kind: str
+    """One of `COLOURS`."""
+    start: Array
+    """(3,) [m]."""
+    force: Array
+    """(3,) [N]."""
+
+    @property
+    def end(self) -> Array:
+        """Where the arrow points, (3,) [m]."""
+        end: Array = self.start + METRES_PER_NEWTON * self.force
+        return end
+
+
+def forces(simulation: Simulation, env: int) -> Iterator[Force]:
+    """The forces that are worth an arrow in the last control period."""
+    for force in _all(simulation, env):
+        if np.linalg.norm(force.force) >= SMALLEST_FORCE:
+            yield force
+
+
+def _all(simulation: Simulation, env: int) -> Iterator[Force]:
+    state = simulation.state
+    outward = BESIDE * state.base_rotation[env, :, 1] * np.array([[1.0], [-1.0]])
+    if state.has_object[env]:
+        yield Force("partner", simulation.partner_handle(env), state.partner_force[env].copy())
+        yield Force("push", state.object_position[env].copy(), simulation.impulse_force(env))
+        hands = simulation.hand_position(env)
+        for hand in range(2):
+            yield Force("grip", hands[hand] + outward[hand], state.grip_force[env, hand].copy())
+    yield Force("push", state.base_position[env].copy(), state.push_force[env].copy())
+    for foot in range(2):
+        yield Force("ground", state.foot_position[env, foot] + outward[foot], state.foot_force[env, foot].copy())
