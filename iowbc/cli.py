@@ -349,15 +349,24 @@ def play(
     seed: Annotated[int, typer.Option(min=0)] = 0,
     disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses and pushes.")] = False,
     video: Annotated[Path | None, typer.Option(help="Make a film instead of opening a window.", metavar="MP4")] = None,
+    web: Annotated[bool, typer.Option("--web", help="Drive it in the browser; needs no display.")] = False,
+    port: Annotated[int | None, typer.Option(help="Port of --web; 8080.", min=1, max=65535)] = None,
     runs: RunsFolder = None,
 ) -> None:
-    """Watch a trained policy in the viewer, or make a film of it."""
+    """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
     from iowbc.commands.play import PlayRequest, play_word
+    from iowbc.commands.play_web import PORT, play_on_web
+    from iowbc.errors import UsageError
 
     request = PlayRequest(
         scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
     )
-    raise typer.Exit(play_word(_store(runs), _console(), what, stage, request))
+    if web:
+        play_on_web(_store(runs), _console(), what, stage, request, port or PORT)
+    elif port is not None:
+        raise UsageError("--port is that of the page that --web serves; give both")
+    else:
+        raise typer.Exit(play_word(_store(runs), _console(), what, stage, request))
 
 
 @bench.command("sim")

@@ -31,13 +31,15 @@ MAY_IMPORT = {
     "learning": SHARED,
     "task": WORLD,
     "evaluation": WORLD | {"task", "reference", "learning", "deploy"},
+    "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
     "report": {"pipeline", "recipe", "errors"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD
-    | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report", "web"},
+    | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
+    | {"live", "web"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
@@ -90,6 +92,18 @@ def test_what_runs_on_the_robot_never_names_what_only_training_needs(name: str) 
         if module.split(".")[0] in ROBOT_FREE
     ]
     assert heavy == []
+
+
+def test_the_viewer_in_the_browser_is_loaded_only_when_asked_for() -> None:
+    named = {room(source) for source in SOURCES if any(module.startswith("viser") for module in imported(source))}
+    assert named == {"live"}
+    always = [
+        str(source.relative_to(PACKAGE.parent))
+        for source in SOURCES
+        for node in ast.parse(source.read_text(encoding="utf-8")).body
+        if room(source) != "live" and isinstance(node, ast.ImportFrom) and str(node.module).startswith("iowbc.live")
+    ]
+    assert always == []
 
 
 def test_no_two_rooms_import_each_other() -> None:

@@ -10,14 +10,13 @@ from rich.console import Console
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.commands.evaluated import TRIALS, evaluated_actor
 from iowbc.commands.named import Named, named
-from iowbc.commands.play import input_of
 from iowbc.commands.results import shown_path
 from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
-from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 
     from iowbc.report.runs import Group
 
-TRIALS = "trials.parquet"
 CURVE_WIDTH = 40
 """Characters of a learning curve."""
 
@@ -148,30 +146,11 @@ def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
     return trials
 
 
-def _evaluated(store: Store, artifact: Artifact) -> Artifact:
-    """The policy that an evaluation played. Raises `UsageError`."""
-    found = [policy for stage in ("distill", "teacher") if (policy := input_of(store, artifact, stage)) is not None]
-    if not found:
-        raise UsageError(f"{artifact.folder}: this evaluation read no policy; run its recipe again")
-    return found[0]
-
-
 def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]", path: Path) -> None:
     """Play one trial that all runs share again, with the policies that were evaluated, and film it."""
-    from iowbc.evaluation.side_by_side import Actor, common_trial, film_side_by_side
-    from iowbc.evaluation.trials.protocol import evaluated_world
-    from iowbc.learning.acting import load_policy
-    from iowbc.recipe.recipe import Recipe
-    from iowbc.robot.description import robot_folder
-    from iowbc.task.specification import Specification
+    from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
 
-    actors = []
-    for run, table in zip(runs, trials, strict=True):
-        artifact = run.artifacts["eval"]
-        recipe = Recipe.model_validate(artifact.recipe)
-        policy, generator = _evaluated(store, artifact), input_of(store, artifact, "rg-fit")
-        world = Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)
-        actors.append(Actor(evaluated_world(world), load_policy(policy.folder), table))
+    actors = [evaluated_actor(store, run.artifacts["eval"], table) for run, table in zip(runs, trials, strict=True)]
     rows = common_trial(actors)
     if not rows:
         raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")

@@ -9,6 +9,7 @@ from rich.console import Console
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
 from iowbc.commands.named import named
+from iowbc.commands.origins import generator_of, made_from, world_of
 from iowbc.commands.training import require_training
 from iowbc.errors import Damaged, Interrupted, UsageError
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
@@ -18,7 +19,6 @@ from iowbc.pipeline.store.store import Store
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
-    from iowbc.task.specification import Specification
 
 POLICIES = ("export", "distill", "teacher")
 """Stages that leave a policy, the one to prefer first."""
@@ -29,7 +29,7 @@ CONTRACT = "contract.json"
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
-    source = _named_source(store, console, word, stage)
+    source = named_source(store, console, word, stage)
 
     from iowbc.evaluation.play import play
 
@@ -45,8 +45,8 @@ def play_word(store: Store, console: Console, word: str, stage: str | None, requ
     return 0
 
 
-def _named_source(store: Store, console: Console, word: str, stage: str | None) -> "Source":
-    """What a word and `--stage` name. Raises `UsageError`."""
+def named_source(store: Store, console: Console, word: str, stage: str | None) -> "Source":
+    """What a word and `--stage` name, told on the console while it is trained. Raises `UsageError`."""
     from iowbc.evaluation.play import exported_source
 
     if (Path(word) / CONTRACT).is_file():
@@ -56,7 +56,13 @@ def _named_source(store: Store, console: Console, word: str, stage: str | None) 
         console.print(training.text, markup=False, highlight=False, soft_wrap=True)
         if training.recipe is not None:
             return _training_source(store, training, training.recipe)
-    artifact = playable(store, word, stage)
+    return artifact_source(store, playable(store, word, stage))
+
+
+def artifact_source(store: Store, artifact: Artifact) -> "Source":
+    """A stored policy with its world. Raises `UsageError` where its files are damaged."""
+    from iowbc.evaluation.play import exported_source
+
     generator = generator_of(store, artifact)
     for read in filter(None, (artifact, generator)):
         _check_whole(store, read)
@@ -85,50 +91,16 @@ def _check_whole(store: Store, artifact: Artifact) -> None:
         ) from None
 
 
-def generator_of(store: Store, artifact: Artifact) -> Artifact | None:
-    """The reference generator that a policy was trained on; None for an export, which holds its own, or without one."""
-    return None if artifact.manifest.stage == "export" else input_of(store, artifact, "rg-fit")
-
-
-def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
-    """What an artifact was made from; None where it read nothing of that stage. Raises `UsageError` if it is gone."""
-    manifest = artifact.manifest
-    return _made_from(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
-
-
-def _made_from(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
-    """The artifact of a stage among the ingredients of a key."""
-    digest = ingredients.get("inputs", {}).get(stage)
-    if digest is None:
-        return None
-    found = next((one for one in store.artifacts(stage) if one.manifest.digest == digest), None)
-    if found is None:
-        raise UsageError(
-            f"the {stage} (content {digest[:12]}) that {what} was made from is no longer stored; run its recipe again"
-        )
-    return found
-
-
 def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
     from iowbc.evaluation.play import Source
 
-    return Source(_world(artifact.recipe, generator), artifact.folder)
+    return Source(world_of(artifact.recipe, generator), artifact.folder)
 
 
 def _training_source(store: Store, training: InTraining, recipe: Mapping[str, Any]) -> "Source":
     """The newest checkpoint of a training, with the world of its recipe."""
     from iowbc.evaluation.play import Source
 
-    generator = _made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
-    return Source(_world(recipe, generator), training.checkpoint, training.key)
-
-
-def _world(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specification":
-    """The world that a resolved recipe describes."""
-    from iowbc.recipe.recipe import Recipe
-    from iowbc.robot.description import robot_folder
-    from iowbc.task.specification import Specification
-
-    recipe = Recipe.model_validate(resolved)
-    return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)
+    generator = made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
+    return Source(world_of(recipe, generator), training.checkpoint, training.key)

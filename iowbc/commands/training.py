@@ -26,3 +26,12 @@ def require_training(command: str) -> None:
             f"`iowbc {command}` needs {', '.join(missing)}, which this installation leaves out: "
             "`pip install 'iowbc[train]'` brings what simulates and trains"
         )
+
+
+def require_viewer() -> None:
+    """Raises `UsageError` with the command that installs what the viewer in the browser needs."""
+    if find_spec("viser") is None:
+        raise UsageError(
+            "`--web` needs viser, which this installation leaves out: `pip install 'iowbc[web]'` brings it; "
+            "--video out.mp4 makes a film without it"
+        )

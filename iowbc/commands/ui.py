@@ -3,22 +3,19 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 
 from rich.console import Console
 
+from iowbc.commands.ports import HOST, require_free
 from iowbc.commands.training import require_training
-from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, let_files_move, set_up
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
 
-HOST = "127.0.0.1"
-LAST_PORT = 65_535
 VIEW = "iowbc"
 """Name under which MLflow keeps how the runs are shown."""
 COLUMNS = {
@@ -35,9 +32,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     """Serve until interrupted; returns the server's exit code. Raises `UsageError` where it cannot begin."""
     require_training("ui")
     require_writable_runs(runs)
-    if not _free(port):
-        other = next((other for other in range(port + 1, LAST_PORT + 1) if _free(other)), None)
-        raise UsageError(f"port {port} is taken; try --port {other or 'with another number'}")
+    require_free(port)
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     uri = embedded_uri(runs)
     with set_up(runs):
@@ -74,14 +69,3 @@ def view() -> dict[str, object]:
         "runsExpanded": {},
         "viewMaximized": True,
     }
-
-
-def _free(port: int) -> bool:
-    """Whether a server may listen on a port of this machine."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except OSError:
-            return False
-    return True

@@ -81,6 +81,7 @@ def test_closed_output_breaks_nothing(tmp_path: Path) -> None:
     [
         (["schema", "--output", "nowhere/x.json"], "--output nowhere/x.json: cannot be written"),
         (["play", "first", "--mass", "inf"], "--mass inf: should be 0 to 1000 kg"),
+        (["play", "first", "--port", "8081"], "--port is that of the page that --web serves"),
         (["gc", "--unused", "--older-than", "nan"], "greater than or equal to 0"),
         (["plan", "first.yaml", "--set", ".".join(["a"] * 3000) + "=1"], "names 3000 levels"),
         (["plan", "first.yaml", "--set", "__class__.__init__=1"], "'__class__'"),

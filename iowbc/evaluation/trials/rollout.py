@@ -95,7 +95,7 @@ def play_in(
     recorded = {name: np.stack([frame[name].reshape(count, -1) for frame in frames]) for name in RECORDED}
     return [
         Outcome(
-            trace=_trace(recorded, index, int(length[index]), dt),
+            trace=trace_of(recorded, index, int(length[index]), dt),
             seconds=float(length[index] * dt),
             fallen=bool(endings["fallen"][index]),
             dropped=bool(endings["dropped"][index]),
@@ -106,6 +106,7 @@ def play_in(
     ]
 
 
-def _trace(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
+def trace_of(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -> Trace:
+    """The first `steps` of one environment as a trace, from signals of shape (T, n, k) by name."""
     rows = {name: values[:steps, index] for name, values in recorded.items()}
     return Trace(dt=dt, **{name: row if row.shape[1] > 1 else row[:, 0] for name, row in rows.items()})

@@ -1,0 +1,27 @@
+"""What an evaluation played: its world, its policy, its trials, to be played again."""
+
+from typing import TYPE_CHECKING
+
+from iowbc.commands.origins import input_of, policy_of, world_of
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.store import Store
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from iowbc.evaluation.side_by_side import Actor
+
+TRIALS = "trials.parquet"
+
+
+def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":
+    """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
+    import pandas as pd
+
+    from iowbc.evaluation.side_by_side import Actor
+    from iowbc.evaluation.trials.protocol import evaluated_world
+    from iowbc.learning.acting import load_policy
+
+    table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
+    world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
+    return Actor(world, load_policy(policy_of(store, artifact).folder), table)

@@ -1,0 +1,112 @@
+"""What an environment looks like at one time: everything that is shown of it, and nothing that simulates."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from iowbc.arrays import Array
+from iowbc.control.command import COMMAND
+from iowbc.evaluation.trials.rollout import RECORDED
+from iowbc.robot import rotations
+from iowbc.robot.description import GRAVITY
+from iowbc.sim.rendering.appearance import Appearance
+from iowbc.sim.rendering.forces import Force, forces
+from iowbc.task.vector.vector_env import VectorEnv
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One control step, world frame."""
+
+    seconds: float
+    """Since the episode began [s]."""
+    bodies: Array
+    """Position and quaternion (wxyz) of every body of the model, (bodies, 7)."""
+    reference: Array
+    """The same for the robot in its reference posture, the base where it is, (bodies, 7)."""
+    forces: tuple[Force, ...]
+    balance: Array
+    """The point of the ground beneath the centre of mass of robot and held object, (3,) [m]."""
+    support: Array
+    """Corners of the convex hull of the soles that touch the ground, in order, (k, 3) [m]; k is 0 in the air."""
+    command: Array
+    """In force in the step to come, (11,)."""
+    signals: Mapping[str, Array]
+    """Those that a trial records, of the step just made, each (k,)."""
+
+
+class Witness:
+    """Takes down the moments of the first environment of an in-process vector environment, in its present episode."""
+
+    def __init__(self, environment: VectorEnv) -> None:
+        self.environment = environment
+        self._simulation = simulation = environment.batch.simulation
+        self._appearance = Appearance(simulation, 0)
+        self.model = self._appearance.model
+        """As it is drawn: with looks, and the object in the size of the present episode."""
+        self._reference = mujoco.MjData(self.model)
+        self._world = simulation.world_of(0)[0]
+        robot = simulation.robot
+        soles = [self.model.body(name).id for name in robot.sole_bodies]
+        self._corners = [
+            np.flatnonzero((self.model.geom_bodyid == sole) & (self.model.geom_conaffinity != 0)) for sole in soles
+        ]
+        self._held = self._world.scene.kind == "lift"
+
+    @property
+    def held_weight(self) -> float:
+        """Weight of the object in the hands [N]; 0 without one."""
+        return GRAVITY * self._held_mass
+
+    @property
+    def _held_mass(self) -> float:
+        return float(self._simulation.drawn["object_mass"][0]) if self._held else 0.0
+
+    def look(self, seconds: float) -> Moment:
+        """The environment as it is now."""
+        data, batch = self._appearance.update(), self.environment.batch
+        return Moment(
+            seconds=seconds,
+            bodies=_poses(data),
+            reference=self._posture(data),
+            forces=tuple(forces(self._simulation, 0)),
+            balance=self._balance(),
+            support=self._support(data),
+            command=np.array(batch.command[0]).reshape(len(COMMAND)),
+            signals={name: self.environment.signals[name][0].copy() for name in RECORDED},
+        )
+
+    def _posture(self, data: Any) -> Array:
+        robot, memory, reference = self._simulation.robot, self.environment.batch.memory, self._reference
+        reference.qpos[:] = data.qpos
+        joints = reference.qpos[self._world.layout.joints]
+        joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
+        mujoco.mj_kinematics(self.model, reference)
+        return _poses(reference)
+
+    def _balance(self) -> Array:
+        simulation, state = self._simulation, self._simulation.state
+        centre: Array = state.com_position[0].copy()
+        if self._held:
+            offset = rotations.rotate(state.object_quaternion[:1], simulation.drawn["object_com_offset"][:1])[0]
+            part = self._held_mass / (self._held_mass + float(self._world.robot_mass[0]))
+            centre += part * (state.object_position[0] + offset - centre)
+        centre[2] = 0.0
+        return centre
+
+    def _support(self, data: Any) -> Array:
+        touching = self._simulation.state.foot_contact[0]
+        corners = [data.geom_xpos[points, :2] for points, down in zip(self._corners, touching, strict=True) if down]
+        if not corners:
+            return np.zeros((0, 3))
+        points = np.concatenate(corners)
+        hull = points[ConvexHull(points).vertices]
+        return np.column_stack([hull, np.zeros(len(hull))])
+
+
+def _poses(data: Any) -> Array:
+    return np.concatenate([data.xpos, data.xquat], axis=1)

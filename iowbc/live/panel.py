@@ -1,0 +1,156 @@
+"""The controls beside the scene. What they say is read, turn by turn, by who runs the simulation."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from queue import SimpleQueue
+from typing import Literal
+
+import numpy as np
+import viser
+
+from iowbc.arrays import Array
+from iowbc.control.command import COMMAND, VELOCITY
+from iowbc.evaluation.play_request import PlayRequest
+from iowbc.evaluation.trials.plan import DIRECTIONS
+from iowbc.live.stage import Shown
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.simulation.holding import SCENES
+from iowbc.recipe.task.commands import Commands
+from iowbc.task.commands.drawing import nominal_command
+
+Button = Literal["pause", "reset", "push robot", "push object"]
+
+LIVE = "live"
+PAST = 60.0
+"""How far back a live episode can be looked at [s]."""
+HEAVIEST = 2.0
+"""Largest mass on the slider, in nominal masses of the scene's object."""
+LIGHTEST = 1.0
+"""The same in the scene without an object, where it says nothing [kg]."""
+STRONGEST_PUSH = 60.0
+"""Largest push on the slider [N·s]: what speeds a robot of 35 kg up by 1.7 m/s."""
+LABELS = {
+    "v_x": "forward [m/s]",
+    "v_y": "left [m/s]",
+    "yaw_rate": "turn left [rad/s]",
+    "height": "height [m]",
+    "pitch": "lean [rad]",
+}
+
+
+class Panel:
+    """Controls of the page; all tabs of the browser share them."""
+
+    def __init__(self, gui: viser.GuiApi, recipe: Recipe, request: PlayRequest, trials: Sequence[str]) -> None:
+        """`trials`: titles of recorded trials to choose from; none are offered where there are none."""
+        self._gui, self._recipe, self._request = gui, recipe, request
+        self._pressed: SimpleQueue[Button] = SimpleQueue()
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
+        self.status = gui.add_markdown("")
+        self.showing = gui.add_dropdown("Show", (LIVE, *trials), initial_value=LIVE, visible=bool(trials))
+        self._pause = self._button(gui.add_button("Pause"), "pause")
+        self._button(gui.add_button("Reset", hint="Begin the episode, or the trial, from its start"), "reset")
+        self.time = gui.add_slider("Time [s]", -PAST, 0.0, 0.02, 0.0, hint="Drag to look at what has been")
+        self.speed = gui.add_slider("Speed", 0.1, 1.0, 0.1, 1.0, hint="1 is real time")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Command"):
+            self._command = self._commands(recipe.task.commands)
+            gui.add_button("Stand still").on_click(lambda _: self._stand())
+        with tabs.add_tab("Push"):
+            gui.add_markdown("Drag the robot or the object with the mouse, or:")
+            self.impulse = gui.add_slider("Size [N·s]", 1.0, STRONGEST_PUSH, 1.0, 15.0)
+            self.direction = gui.add_dropdown("Direction", tuple(DIRECTIONS), initial_value="forward")
+            self._button(gui.add_button("Push the robot"), "push robot")
+            self._button(gui.add_button("Push the object"), "push object")
+        with tabs.add_tab("Episode"):
+            gui.add_markdown("Every change begins a new episode.")
+            self._conditions()
+        with tabs.add_tab("View"):
+            usual = Shown()
+            self._shown = {
+                "forces": gui.add_checkbox("Forces", usual.forces),
+                "support": gui.add_checkbox("Support polygon, centre of mass", usual.support),
+                "reference": gui.add_checkbox("Reference posture", usual.reference),
+                "collision": gui.add_checkbox("Shapes that touch", usual.collision),
+                "follow": gui.add_checkbox("Follow the robot", usual.follow),
+            }
+        self.figures = gui.add_html("")
+
+    def _button(self, handle: viser.GuiButtonHandle, name: Button) -> viser.GuiButtonHandle:
+        handle.on_click(lambda _: self._pressed.put(name))
+        return handle
+
+    def _commands(self, commands: Commands) -> list[viser.GuiSliderHandle]:
+        """A slider for each entry of the command, over what training commands."""
+        wrist = np.add(commands.common_offset, commands.single_offset)
+        pitch = min(commands.pitch[0], commands.deep_pitch[0]), max(commands.pitch[1], commands.deep_pitch[1])
+        ranges = [commands.velocity_x, commands.velocity_y, commands.yaw_rate, commands.height, pitch]
+        start = nominal_command(commands)
+        rows: list[viser.GuiSliderHandle] = []
+        for name, (low, high) in zip(COMMAND[:5], ranges, strict=True):
+            value = float(np.clip(start[len(rows)], low, high))
+            rows.append(self._gui.add_slider(LABELS[name], low, high, 0.01, value))
+        with self._gui.add_folder("Wrists", expand_by_default=False):
+            for name, reach in zip(COMMAND[5:], np.tile(wrist, 2).tolist(), strict=True):
+                rows.append(self._gui.add_slider(f"{name.replace('_', ' ')} [m]", -reach, reach, 0.005, 0.0))
+        return rows
+
+    def _conditions(self) -> None:
+        request, gui = self._request, self._gui
+        self.scene = gui.add_dropdown("Scene", SCENES, initial_value=request.scene)
+        most = max(request.mass, self._heaviest(request.scene))
+        self.mass = gui.add_slider("Mass [kg]", 0.0, most, 0.5, request.mass, hint="0 is without an object")
+        share = request.partner_share or 0.0
+        self.partner_share = gui.add_slider("Partner's share", 0.0, 1.0, 0.05, share, hint="Of the weight")
+        self.seed = gui.add_number("Seed", request.seed, min=0, step=1)
+        self.disturbances = gui.add_checkbox("Impulses, pushes", request.disturbances, hint="At random times")
+        self.scene.on_update(lambda _: self._suit_mass())
+
+    def _suit_mass(self) -> None:
+        """Lets the mass range over what suits the scene's object."""
+        most = self._heaviest(self.scene.value)
+        self.mass.value = min(self.mass.value, most)
+        self.mass.max = most
+
+    def _heaviest(self, scene: str) -> float:
+        thing = getattr(self._recipe.simulation.scenes, scene).object
+        return HEAVIEST * thing.mass if thing else LIGHTEST
+
+    def _stand(self) -> None:
+        for slider in self._command[VELOCITY]:
+            slider.value = 0.0
+
+    @property
+    def command(self) -> Array:
+        """What the sliders ask for, (11,)."""
+        return np.array([slider.value for slider in self._command])
+
+    def set_command(self, name: str, value: float) -> None:
+        """Moves the slider of an entry of the command, one of `COMMAND`."""
+        self._command[COMMAND.index(name)].value = value
+
+    @property
+    def conditions(self) -> PlayRequest:
+        """The episode that is asked for."""
+        return replace(
+            self._request,
+            scene=self.scene.value,
+            mass=self.mass.value,
+            partner_share=self.partner_share.value,
+            seed=int(self.seed.value),
+            disturbances=self.disturbances.value,
+        )
+
+    @property
+    def shown(self) -> Shown:
+        """What is to be drawn."""
+        return Shown(**{name: box.value for name, box in self._shown.items()})
+
+    def pressed(self) -> list[Button]:
+        """The buttons that were pressed since this was asked last."""
+        return [self._pressed.get() for _ in range(self._pressed.qsize())]
+
+    def label_pause(self, paused: bool) -> None:
+        """Says what the button would do."""
+        self._pause.label = "Go on" if paused else "Pause"

@@ -1,0 +1,136 @@
+"""A policy that is driven by hand: one environment, commands, pushes, and what happened in the last minute."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.evaluation.play import Source, open_policy, requested_episode
+from iowbc.evaluation.play_request import PlayRequest
+from iowbc.evaluation.trials.plan import DIRECTIONS
+from iowbc.live.helm import Helm
+from iowbc.live.moment import Witness
+from iowbc.live.track import Track
+from iowbc.recipe.evaluation.segment import Segment
+
+Pushed = Literal["robot", "object"]
+
+AN_HOUR = (Segment(duration=600.0),) * 6
+"""The longest that an episode lasts."""
+REMEMBERED = 60.0
+"""How much of the past is kept [s]."""
+BLOW = 0.1
+"""How long a push lasts [s]; as long as those of `eval.robustness.pushes`."""
+
+
+class Session:
+    """One episode after another in the world of a source. Close it, or use it as a context manager."""
+
+    def __init__(self, source: Source, request: PlayRequest) -> None:
+        """Begins an episode. Raises ContractBroken for a damaged export, Damaged for a damaged checkpoint."""
+        self.source = source
+        self._pull = {"robot": np.zeros(3), "object": np.zeros(3)}
+        self._blow = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
+        self._open(request)
+
+    def _open(self, request: PlayRequest) -> None:
+        self.request = replace(request, sequence=AN_HOUR)
+        self.environment = self.source.environment(requested_episode(self.source.world.recipe, self.request))
+        self.helm = Helm(self.source.world, self.environment)
+        self._load()
+        self._witness: Witness | None = None
+        self.reset()
+
+    def _load(self) -> None:
+        self.written = self.source.policy.stat().st_mtime
+        """When the policy was written, as a time stamp; a checkpoint is written again and again."""
+        self._policy = open_policy(self.source, self.environment)
+
+    def begin(self, request: PlayRequest) -> None:
+        """A new episode under other conditions; the command stays."""
+        wanted = self.helm.wanted
+        self.environment.close()
+        self._open(request)
+        self.helm.wanted[:] = wanted
+
+    def reset(self) -> None:
+        """The episode from its start."""
+        environment, recipe = self.environment, self.source.world.recipe
+        self._observation = environment.reset()
+        self._policy.reset(np.ones(1, np.bool_))
+        self._steps = 0
+        self._witness = witness = self._witness or Witness(environment)
+        self.track = Track(
+            title=f"{self.request.scene}, {self.request.object_mass:g} kg",
+            model=witness.model,
+            period=environment.period,
+            gait_period=1.0 / recipe.task.references.gait.frequency,
+            held_weight=witness.held_weight,
+            joints=environment.batch.robot.joints,
+            kept=round(REMEMBERED / environment.period),
+        )
+        self._look = witness.look
+        self.track.moments.append(self._look(0.0))
+
+    def refresh(self) -> bool:
+        """Takes the newest checkpoint, if the policy is one and was written again; whether it was."""
+        try:
+            newer = self.source.policy.is_file() and self.source.policy.stat().st_mtime > self.written
+        except FileNotFoundError:  # between two looks, the training ended
+            newer = False
+        if newer:
+            self._load()
+        return newer
+
+    def step(self) -> None:
+        """One control period. After an episode's end, told in `track.ending`, nothing moves until a reset."""
+        if self.track.ending:
+            return
+        self._apply()
+        environment, layout = self.environment, self.environment.layout
+        seen = self._observation
+        action = self._policy.act(seen[:, layout.observation], seen[:, layout.privileged])
+        self._observation, _, done, infos = environment.step(action)
+        self._steps += 1
+        if done[0]:
+            self.track.ending = str(infos[0]["end"])
+            self._policy.reset(done)
+        else:
+            self.track.moments.append(self._look(self._steps * environment.period))
+
+    def push(self, what: Pushed, direction: str, impulse: float) -> None:
+        """A blow over `BLOW`, `direction` one of `DIRECTIONS` from the commanded heading, `impulse` [N·s]."""
+        forward, left = DIRECTIONS[direction]
+        heading = float(self.environment.batch.memory.heading_reference[0])
+        cosine, sine = np.cos(heading), np.sin(heading)
+        steps = max(1, round(BLOW / self.environment.period))
+        force = impulse / (steps * self.environment.period)
+        along = np.array([cosine * forward - sine * left, sine * forward + cosine * left, 0.0])
+        self._blow[what] = (force * along, steps)
+
+    def pull(self, what: Pushed, force: Array) -> None:
+        """A steady force, world frame, (3,) [N], until another is told."""
+        self._pull[what] = np.asarray(force, np.float64)
+
+    def _apply(self) -> None:
+        simulation = self.environment.batch.simulation
+        carried = simulation.state.has_object[0]
+        simulation.planned_push[0] = self._force("robot")
+        simulation.planned_impulse[0] = self._force("object") if carried else 0.0
+
+    def _force(self, what: Pushed) -> Array:
+        force, left = self._blow[what]
+        self._blow[what] = (force, max(0, left - 1))
+        total: Array = self._pull[what] + (force if left else 0.0)
+        return total
+
+    def close(self) -> None:
+        """Ends the simulation."""
+        self.environment.close()
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self.close()

@@ -1,0 +1,95 @@
+"""The geoms of a model as triangles, a mesh for each body and colour."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+
+from iowbc.arrays import Array
+
+GEOM = mujoco.mjtGeom
+HIDDEN_GROUP = 3
+"""From this group on, geoms are not for the eye, as in MuJoCo's own viewer."""
+ROUND = 24
+"""Segments of a circle."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Triangles of one colour on a body."""
+
+    body: str
+    vertices: Array
+    """Body frame, (v, 3) [m]."""
+    faces: Array
+    """(f, 3)."""
+    colour: tuple[float, float, float, float]
+    """Red, green, blue, opacity, 0 to 1."""
+
+
+def looks(model: Any) -> Iterator[Shape]:
+    """What MuJoCo's viewer shows, without the ground."""
+    return _merged(model, lambda geom: model.geom_group[geom] < HIDDEN_GROUP)
+
+
+def collision_shapes(model: Any, bodies: set[str]) -> Iterator[Shape]:
+    """The primitive shapes of some bodies, by which they touch, whether or not they are for the eye."""
+    mesh = GEOM.mjGEOM_MESH.value
+    return _merged(
+        model, lambda geom: model.geom_type[geom] != mesh and model.body(model.geom_bodyid[geom]).name in bodies
+    )
+
+
+def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[Shape]:
+    chosen: dict[tuple[int, tuple[float, ...]], list[tuple[Array, Array]]] = {}
+    for geom in range(model.ngeom):
+        if model.geom_type[geom] != GEOM.mjGEOM_PLANE.value and wanted(geom):
+            key = int(model.geom_bodyid[geom]), tuple(_colour(model, geom))
+            chosen.setdefault(key, []).append(_triangles(model, geom))
+    for (body, colour), parts in chosen.items():
+        starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+        vertices = np.concatenate([vertices for vertices, _ in parts])
+        faces = np.concatenate([start + faces for start, (_, faces) in zip(starts, parts, strict=True)])
+        yield Shape(model.body(body).name, vertices, faces, colour)  # type: ignore[arg-type]
+
+
+def _colour(model: Any, geom: int) -> list[float]:
+    material = model.geom_matid[geom]
+    return [round(float(part), 4) for part in (model.geom_rgba[geom] if material < 0 else model.mat_rgba[material])]
+
+
+def _triangles(model: Any, geom: int) -> tuple[Array, Array]:
+    """Vertices in the body's frame, and faces."""
+    kind, size = GEOM(model.geom_type[geom]), model.geom_size[geom]
+    if kind == GEOM.mjGEOM_MESH:
+        vertices, faces = _mesh(model, int(model.geom_dataid[geom]))
+    else:
+        made = _primitive(kind, size)
+        vertices, faces = np.asarray(made.vertices), np.asarray(made.faces)
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    return vertices @ turn.reshape(3, 3).T + model.geom_pos[geom], faces
+
+
+def _mesh(model: Any, mesh: int) -> tuple[Array, Array]:
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    start, number = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    return model.mesh_vert[first : first + count], model.mesh_face[start : start + number]
+
+
+def _primitive(kind: Any, size: Array) -> Any:
+    """A shape about the origin; the axis of a capsule or cylinder is z, as in MuJoCo."""
+    if kind == GEOM.mjGEOM_BOX:
+        return trimesh.creation.box(2.0 * size)
+    if kind == GEOM.mjGEOM_CAPSULE:
+        return trimesh.creation.capsule(height=2.0 * size[1], radius=size[0], count=[ROUND, ROUND])
+    if kind == GEOM.mjGEOM_CYLINDER:
+        return trimesh.creation.cylinder(radius=size[0], height=2.0 * size[1], sections=ROUND)
+    if kind in (GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_ELLIPSOID):
+        ball = trimesh.creation.icosphere(subdivisions=2)
+        ball.apply_scale(size if kind == GEOM.mjGEOM_ELLIPSOID else size[0])
+        return ball
+    raise ValueError(f"the viewer in the browser draws no geoms of type {kind.name}")

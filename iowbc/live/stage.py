@@ -1,0 +1,164 @@
+"""What is to be seen in the browser: the bodies of a model, forces, the support polygon, the reference posture."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import viser
+
+from iowbc.arrays import Array
+from iowbc.live.moment import Moment
+from iowbc.live.session import Pushed
+from iowbc.live.shapes import Shape, collision_shapes, looks
+from iowbc.robot.description import Robot
+from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
+
+GHOST = (0.15, 0.45, 0.95)
+GHOST_OPACITY = 0.35
+SUPPORT, BALANCE = (60, 170, 90), (210, 40, 40)
+ABOVE_GROUND = 0.003
+"""What is drawn on the ground lies so far above it [m]."""
+DOT = 0.025
+"""Radius of the mark under the centre of mass [m]."""
+FOLLOWING = 0.1
+"""Part of the way to the robot that the view follows with each picture."""
+LEFT_BEHIND = 1.0
+"""Farther away than this, it jumps there [m]."""
+STIFFNESS = 150.0
+"""Of the spring between what is dragged and the mouse [N/m]."""
+STRONGEST = 300.0
+"""Force of that spring at most [N]."""
+
+Pull = Callable[[Pushed, Array], None]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is drawn beside the robot and its object."""
+
+    forces: bool = True
+    support: bool = True
+    reference: bool = False
+    collision: bool = False
+    follow: bool = True
+
+
+class Stage:
+    """The scene of a server. `build` it for a model, then `show` its moments."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, pull: Pull) -> None:
+        """`pull` is told what is dragged and with what force, world frame, (3,) [N]; at last with zero."""
+        self._scene, self._robot, self._pull = scene, robot, pull
+        self._model: Any = None
+        self._at = np.zeros(2)
+        self._bodies: dict[int, viser.FrameHandle] = {}
+        self._ghosts: dict[int, viser.FrameHandle] = {}
+        self._root = scene.add_frame("/world", show_axes=False)
+        scene.set_up_direction("+z")
+        scene.configure_default_lights(cast_shadow=True)
+        scene.add_grid("/world/ground", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=25.0)
+        self._forces = scene.add_arrows(
+            "/world/forces",
+            np.zeros((1, 2, 3)),
+            np.zeros((1, 3), np.uint8),
+            shaft_radius=ARROW_RADIUS,
+            head_radius=2.0 * ARROW_RADIUS,
+            head_length=4.0 * ARROW_RADIUS,
+        )
+        flat = np.zeros((3, 3)), np.array([[0, 1, 2]])
+        self._support = scene.add_mesh_simple(
+            "/world/support", *flat, color=SUPPORT, opacity=0.5, side="double", cast_shadow=False
+        )
+        self._balance = scene.add_cylinder("/world/balance", radius=DOT, height=ABOVE_GROUND, color=BALANCE)
+
+    def build(self, model: Any) -> None:
+        """Puts the bodies of a model in place of those before."""
+        for handle in [*self._bodies.values(), *self._ghosts.values()]:
+            handle.remove()
+        self._model = model
+        links = set(self._robot.tree.bodies)
+        everything = {model.body(index).name for index in range(model.nbody)}
+        with_looks, primitive = list(looks(model)), list(collision_shapes(model, everything))
+        self._bodies = {
+            model.body(name).id: self._scene.add_frame(f"/world/bodies/{name}", show_axes=False)
+            for name in dict.fromkeys(shape.body for shape in [*with_looks, *primitive])
+        }
+        self._ghosts = {
+            model.body(name).id: self._scene.add_frame(f"/world/reference/{name}", show_axes=False, visible=False)
+            for name in dict.fromkeys(shape.body for shape in primitive if shape.body in links)
+        }
+        self._looks = [self._mesh(f"bodies/{shape.body}/looks{n}", shape) for n, shape in enumerate(with_looks)]
+        self._shapes = [self._mesh(f"bodies/{shape.body}/shape{n}", shape) for n, shape in enumerate(primitive)]
+        for n, shape in enumerate(primitive):
+            if shape.body in links:
+                self._mesh(f"reference/{shape.body}/shape{n}", shape, ghost=True)
+
+    def _mesh(self, name: str, shape: Shape, ghost: bool = False) -> viser.MeshHandle:
+        handle = self._scene.add_mesh_simple(
+            f"/world/{name}",
+            shape.vertices,
+            shape.faces,
+            color=GHOST if ghost else shape.colour[:3],
+            opacity=GHOST_OPACITY if ghost else None,
+            flat_shading=True,
+            cast_shadow=not ghost,
+            receive_shadow=not ghost,
+        )
+        if not ghost:
+            handle.on_drag("left")(self._dragged(shape.body))
+        return handle
+
+    def _dragged(self, body: str) -> Any:
+        what: Pushed = "object" if body == "object" else "robot"
+
+        async def pull(event: viser.SceneNodeDragEvent[viser.MeshHandle]) -> None:
+            """In order, as only asynchronous callbacks are."""
+            force = STIFFNESS * (np.array(event.end_position) - np.array(event.start_position))
+            force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), STRONGEST))
+            self._pull(what, np.zeros(3) if event.phase == "end" else force)
+
+        return pull
+
+    def show(self, model: Any, moment: Moment, shown: Shown) -> None:
+        """Everything as it is at a moment of a model, which is built if it is another one than before."""
+        if model is not self._model:
+            self.build(model)
+        for body, frame in self._bodies.items():
+            frame.position, frame.wxyz = moment.bodies[body, :3], moment.bodies[body, 3:]
+        for body, frame in self._ghosts.items():
+            frame.visible = shown.reference
+            if shown.reference:
+                frame.position, frame.wxyz = moment.reference[body, :3], moment.reference[body, 3:]
+        for handles, visible in ((self._looks, not shown.collision), (self._shapes, shown.collision)):
+            for handle in handles:
+                handle.visible = visible
+        self._show_forces(moment, shown.forces)
+        self._show_support(moment, shown.support)
+        self._follow(moment.bodies[model.body(self._robot.base).id, :2], shown.follow)
+
+    def _show_forces(self, moment: Moment, wanted: bool) -> None:
+        self._forces.visible = wanted and bool(moment.forces)
+        if self._forces.visible:
+            self._forces.points = np.array([[force.start, force.end] for force in moment.forces], np.float32)
+            colours = np.array([COLOURS[force.kind][:3] for force in moment.forces])
+            self._forces.colors = (255 * colours).astype(np.uint8)
+
+    def _show_support(self, moment: Moment, wanted: bool) -> None:
+        corners = len(moment.support)
+        self._support.visible = wanted and corners > 2
+        self._balance.visible = wanted
+        lifted = np.array([0.0, 0.0, ABOVE_GROUND])
+        self._balance.position = moment.balance + 2.0 * lifted
+        if self._support.visible:
+            fan = np.arange(1, corners - 1)
+            self._support.faces = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1).astype(np.uint32)
+            self._support.vertices = (moment.support + lifted).astype(np.float32)
+
+    def _follow(self, base: Array, wanted: bool) -> None:
+        """Moves the world under the cameras, so that each may be turned freely; `base` (2,) [m]."""
+        target = base if wanted else np.zeros(2)
+        away = target - self._at
+        far = np.linalg.norm(away) > LEFT_BEHIND
+        self._at += away if far else FOLLOWING * away
+        self._root.position = np.array([-self._at[0], -self._at[1], 0.0])

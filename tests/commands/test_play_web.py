@@ -1,0 +1,39 @@
+"""What is said where the viewer in the browser cannot begin."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from iowbc.commands import training
+from iowbc.commands.play_web import play_on_web
+from iowbc.errors import UsageError
+from iowbc.evaluation.play_request import PlayRequest
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+
+
+def play(folder: Path, port: int, **asked: Path) -> None:
+    play_on_web(Store(Runs(folder)), Console(), "first", None, PlayRequest(video=asked.get("video")), port)
+
+
+def test_a_taken_port_is_told_before_anything_is_loaded_with_one_that_is_free(tmp_path: Path) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(UsageError, match=rf"port {port} is taken; try --port \d+"):
+            play(tmp_path, port)
+
+
+def test_a_page_is_no_film(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--web and --video exclude each other"):
+        play(tmp_path, 8080, video=tmp_path / "box.mp4")
+
+
+def test_without_viser_the_command_that_installs_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = training.find_spec
+    monkeypatch.setattr(training, "find_spec", lambda name: None if name == "viser" else found(name))
+    with pytest.raises(UsageError, match=r"pip install 'iowbc\[web\]'"):
+        play(tmp_path, 8080)
