@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,16 +68,15 @@ def require_node() -> None:
 def bundle(parts: Path, out: Path) -> None:
     """Write scripts, WebAssembly, HTML, style and licenses into a folder. Raises `UsageError`."""
     parts = parts.resolve()
-    build = parts.parent / "source"
-    shutil.rmtree(build, ignore_errors=True)
-    shutil.copytree(SOURCE, build)
-    for name, others in ((LIBRARY, ()), (PAGE, (f"--external:./{LIBRARY}",))):
-        words = ["node", str(parts / "esbuild/bin/esbuild"), str(build / name), *BUNDLING, *others]
-        _run([*words, f"--outfile={out.resolve() / name}"], build, "esbuild could not bundle the page")
+    with tempfile.TemporaryDirectory(dir=parts.parent) as build:  # imports are looked for beside and above the source
+        shutil.copytree(SOURCE, build, dirs_exist_ok=True)
+        for name, others in ((LIBRARY, ()), (PAGE, (f"--external:./{LIBRARY}",))):
+            words = ["node", str(parts / "esbuild/bin/esbuild"), name, *BUNDLING, *others]
+            _run([*words, f"--outfile={out.resolve() / name}"], Path(build), "esbuild could not bundle the page")
     for name, place in WASM.items():
         shutil.copyfile(parts / place, out / name)
     for name in ("index.html", "style.css"):
-        shutil.copyfile(build / name, out / name)
+        shutil.copyfile(SOURCE / name, out / name)
     (out / "licenses.txt").write_text(licenses(parts), encoding="utf-8")
 
 

@@ -26,15 +26,17 @@ from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
 from iowbc.web.bundling import parts_folder
 
+DRAWING = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""Words with which the browser draws in three dimensions without a GPU."""
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 CACHE = Path(os.environ.get("IOWBC_RUNS") or Path(__file__).parents[2] / "runs") / "npm"
-LONGEST = 120.0
-"""Time within which the browser answers [s]."""
+LONGEST = 300.0
+"""Time within which the browser answers, on a machine with other work, too [s]."""
 
 
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
-    return Recipe.model_validate({"name": "test", "export": {"acceptance": [], "golden_steps": 20}})
+    return Recipe.model_validate({"name": "test", "export": {"acceptance": [{"mass": 4.0}], "golden_steps": 20}})
 
 
 @pytest.fixture(scope="session")
@@ -93,19 +95,20 @@ def served(folder: Path) -> Iterator[tuple[str, "Queue[Any]"]]:
 def browser_words(profile: Path, *more: str) -> list[str]:
     """The browser's command line; nothing but this machine is reached."""
     assert BROWSER is not None
-    words = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"]
+    words = ["--headless", "--no-sandbox", "--disable-quic", "--no-first-run"]
     words += ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
     words += ["--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", f"--user-data-dir={profile}"]
     return [BROWSER, *words, *more]
 
 
 @pytest.fixture
-def answer_of(tmp_path: Path) -> Callable[[Path, str], Any]:
-    """Opens a page of a folder in the browser and returns what it posts."""
+def answer_of(tmp_path: Path) -> Callable[..., Any]:
+    """Opens a page of a folder in the browser, that may have to draw, and returns what it posts."""
 
-    def ask(folder: Path, page: str) -> Any:
+    def ask(folder: Path, page: str, *, drawing: bool = False) -> Any:
         with served(folder) as (address, told):
-            words = browser_words(tmp_path / "profile", "--remote-debugging-port=0", f"{address}/{page}")
+            words = browser_words(tmp_path / "profile", *(DRAWING if drawing else ("--disable-gpu",)))
+            words += ["--remote-debugging-port=0", f"{address}/{page}"]
             browser = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             try:
                 return told.get(timeout=LONGEST)

@@ -1,6 +1,7 @@
 """The page's controller and simulation in a browser, beside those of Python."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +21,14 @@ from iowbc.robot.description import Robot
 from iowbc.web.page import write_page
 from iowbc.web.scenes import begun, nominal_command
 
+pytestmark = pytest.mark.timeout(900)
+
 PERIODS = 50
+ASKED = (
+    *("style.css", "page.js", "iowbc.js", "contract.json", "scenes.json", "policy.onnx", "feasible.npz", "golden.npz"),
+    *("mujoco.wasm", "onnxruntime.wasm"),
+)
+"""Everything that a page loads."""
 SCENES = ("free", "lift", "squeeze")
 TOLERANCE = 1e-4
 """Of the controller, for which the graph computes in float32."""
@@ -67,14 +75,14 @@ def golden_targets(exported: Path) -> NDArray[np.float64]:
 
 
 def test_a_browser_computes_and_simulates_what_python_does(
-    page: Path, exported: Path, robot: Robot, command: NDArray[np.float64], answer_of: Callable[[Path, str], Any]
+    page: Path, exported: Path, robot: Robot, command: NDArray[np.float64], answer_of: Callable[..., Any]
 ) -> None:
     shutil.copy(Path(__file__).with_name("check.html"), page)
     asked = [{"scene": scene, "command": command.tolist()} for scene in SCENES]
     (page / "asked.json").write_text(json.dumps({"played": asked}))
     told = answer_of(page, "check.html")
     assert "error" not in told, told["error"]
-    print({name: f"{value:.1e}" for name, value in told["largest"].items()})
+    print(f"loaded in {told['loaded']:.0f} ms; largest difference {max(told['largest'].values()):.1e}")
     assert max(told["largest"].values()) < TOLERANCE
     assert {name.partition("/")[2] for name in told["largest"]} >= {
         "action",
@@ -86,6 +94,21 @@ def test_a_browser_computes_and_simulates_what_python_does(
     for scene, rollout in zip(SCENES, told["rollouts"], strict=True):
         expected = played(exported, robot, scene, command)
         away = np.abs(np.array(rollout["positions"]) - expected)
-        print(scene, [f"{away[k].max():.1e}" for k in (0, 4, 9, 24, 49)], f"{rollout['factor']:.2f} x real time")
+        print(f"{scene}: differs by {away.max():.1e} over a second, {rollout['factor']:.2f} x real time")
         assert np.abs(expected[-1] - expected[0]).max() > 0.05
         assert away.max() < PHYSICS
+
+
+def test_a_visitor_moves_the_sliders_and_no_other_place_is_asked(page: Path, answer_of: Callable[..., Any]) -> None:
+    shutil.copy(Path(__file__).with_name("driven.html"), page)
+    told = answer_of(page, "driven.html", drawing=True)
+    assert "error" not in told, told["error"]
+    assert told["title"] == "test on g1"
+    assert "real time" in told["ran"]
+    assert told["shown"] == ["0.00 m/s", "0.00 m/s", "0.00 rad/s", "0.72 m", "0.00 rad", "4.00 kg"]
+    assert told["lowered"] == "0.60 m"
+    assert told["agreement"].startswith("Over the 20 steps")
+    assert told["wide"]
+    assert {re.sub(r":\d+/", "/", address) for address in told["addresses"]} == {
+        f"http://127.0.0.1/{name}" for name in ASKED
+    }

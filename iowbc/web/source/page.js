@@ -64,7 +64,8 @@ class Page {
       if (!this.running) behind = 0;
       this.drawing.draw(this.world);
       if (now - since >= 1000 * MEASURED) {
-        this.panel.tell({ factor: simulated / ((now - since) / 1000), world: this.world, running: this.running });
+        const factor = simulated / ((now - since) / 1000);
+        this.panel.tell({ factor, world: this.world, running: this.running, fallen: this.fallen > 0 });
         [since, simulated] = [now, 0];
       }
     }

@@ -66,14 +66,13 @@ export class Panel {
   }
 
   /** What is measured, once a second. */
-  tell({ factor, world, running }) {
+  tell({ factor, world, running, fallen }) {
     const { linear } = world.velocity(world.scene.base), rotation = world.rotation(world.scene.base);
     const forward = rotation[0] * linear[0] + rotation[3] * linear[1];
     const height = world.position(world.scene.base)[2];
-    find("#told").textContent = running
-      ? `${world.time.toFixed(0)} s, ${factor.toFixed(2)} × real time; forward ${forward.toFixed(2)} m/s, height ${height.toFixed(2)} m`
-      : "paused";
-    document.documentElement.dataset.factor = factor.toFixed(3);
+    const clock = `${world.time.toFixed(0)} s, ${factor.toFixed(2)} × real time`;
+    const moved = fallen ? "fell, and is put up again" : `forward ${forward.toFixed(2)} m/s, height ${height.toFixed(2)} m`;
+    find("#told").textContent = running ? `${clock}; ${moved}` : "paused";
   }
 
   /** The check's figure. */
