@@ -28,9 +28,9 @@ CHECKPOINTS = 2.0
 """Time between two looks for a newer checkpoint [s]."""
 BEHIND = 0.2
 """A simulation that is further behind its pace lets the time go [s]."""
-VIEW = (2.2, -1.8, 1.4)
+VIEW = (1.7, -1.4, 1.2)
 """Where a camera begins [m]."""
-AIM = (0.1, 0.0, 0.65)
+AIM = (0.1, 0.0, 0.6)
 """At what it looks [m]."""
 
 

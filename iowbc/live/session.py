@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.errors import Damaged
 from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
@@ -31,7 +32,6 @@ class Session:
         """Begins an episode. Raises ContractBroken for a damaged export, Damaged for a damaged checkpoint."""
         self.source = source
         self._pull = {"robot": np.zeros(3), "object": np.zeros(3)}
-        self._blow = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
         self._open(request)
 
     def _open(self, request: PlayRequest) -> None:
@@ -60,6 +60,7 @@ class Session:
         self._observation = environment.reset()
         self._policy.reset(np.ones(1, np.bool_))
         self._steps = 0
+        self._blow = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
         self._witness = witness = self._witness or Witness(environment)
         self.track = Track(
             title=f"{self.request.scene}, {self.request.object_mass:g} kg",
@@ -75,13 +76,14 @@ class Session:
 
     def refresh(self) -> bool:
         """Takes the newest checkpoint, if the policy is one and was written again; whether it was."""
+        policy = self.source.policy
         try:
-            newer = self.source.policy.is_file() and self.source.policy.stat().st_mtime > self.written
-        except FileNotFoundError:  # between two looks, the training ended
-            newer = False
-        if newer:
+            if not policy.is_file() or policy.stat().st_mtime <= self.written:
+                return False
             self._load()
-        return newer
+        except (FileNotFoundError, Damaged):  # the training has ended meanwhile
+            return False
+        return True
 
     def step(self) -> None:
         """One control period. After an episode's end, told in `track.ending`, nothing moves until a reset."""
