@@ -102,8 +102,11 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
     return described | {"object": thing, "hold": hold, "hands": hands, "wrists": wrists}
 
 
-def begun(world: Specification, robot: Robot, name: str) -> Simulation:
-    """One simulation of a scene at the start of an episode, undisturbed and with nothing drawn."""
+def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -> Simulation:
+    """One simulation of a scene at the start of an episode, undisturbed and with nothing drawn.
+
+    `mass` of the object [kg]; NaN for its nominal one.
+    """
     recipe = world.recipe
     quiet = recipe.simulation.randomization.model_copy(update={"enabled": False})
     alone = recipe.simulation.partner.model_copy(update={"enabled": False})
@@ -113,7 +116,7 @@ def begun(world: Specification, robot: Robot, name: str) -> Simulation:
         envs=np.zeros(1),
         seed=0,
         scenes=[name],
-        fixed={name: np.zeros(1) for name in STILL},
+        fixed={**{each: np.zeros(1) for each in STILL}, "object_mass": np.array([mass])},
         control_frequency=recipe.task.control_frequency,
     )
     references = ReferenceLayer(robot, recipe.task.references, world.rg)

@@ -29,7 +29,8 @@ ASKED = (
     *("mujoco.wasm", "onnxruntime.wasm"),
 )
 """Everything that a page loads."""
-SCENES = ("free", "lift", "squeeze")
+PLAYED = (("free", None), ("lift", None), ("lift", 60.0), ("squeeze", None))
+"""Scenes, and the object's mass [kg] where it is not the nominal one; 60 kg slip out of the hands."""
 TOLERANCE = 1e-4
 """Of the controller, for which the graph computes in float32."""
 PHYSICS = 1e-6
@@ -49,16 +50,19 @@ def command(recipe: Recipe) -> NDArray[np.float64]:
     return nominal_command(recipe) + np.array([0.2, 0.05, 0.1, *[0.0] * 8])
 
 
-def played(exported: Path, robot: Robot, scene: str, command: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Positions over a second of Python's own closed loop, (periods, nq)."""
-    simulation, controller = begun(exported_world(exported), robot, scene), Controller.load(exported)
+def played(
+    exported: Path, robot: Robot, scene: str, mass: float | None, command: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], bool]:
+    """Positions over a second of Python's own closed loop, (periods, nq), and whether the hands held on."""
+    world, controller = exported_world(exported), Controller.load(exported)
+    simulation = begun(world, robot, scene, np.nan if mass is None else mass)
     controller.reset(scene=scene)
     positions = []
     for _ in range(PERIODS):
         simulation.target[:] = controller.step(Measured.of(simulation.measured), command, limit_rates=False).position
         simulation.step()
         positions.append(simulation.worlds[0].qpos[0].copy())
-    return np.array(positions)
+    return np.array(positions), bool(simulation.state.grasped.all())
 
 
 def golden_targets(exported: Path) -> NDArray[np.float64]:
@@ -78,7 +82,7 @@ def test_a_browser_computes_and_simulates_what_python_does(
     page: Path, exported: Path, robot: Robot, command: NDArray[np.float64], answer_of: Callable[..., Any]
 ) -> None:
     shutil.copy(Path(__file__).with_name("check.html"), page)
-    asked = [{"scene": scene, "command": command.tolist()} for scene in SCENES]
+    asked = [{"scene": scene, "mass": mass, "command": command.tolist()} for scene, mass in PLAYED]
     (page / "asked.json").write_text(json.dumps({"played": asked}))
     told = answer_of(page, "check.html")
     assert "error" not in told, told["error"]
@@ -91,10 +95,11 @@ def test_a_browser_computes_and_simulates_what_python_does(
         "history",
     }
     np.testing.assert_allclose(told["targets"], golden_targets(exported), rtol=0, atol=TOLERANCE)
-    for scene, rollout in zip(SCENES, told["rollouts"], strict=True):
-        expected = played(exported, robot, scene, command)
+    for (scene, mass), rollout in zip(PLAYED, told["rollouts"], strict=True):
+        expected, held = played(exported, robot, scene, mass, command)
         away = np.abs(np.array(rollout["positions"]) - expected)
         print(f"{scene}: differs by {away.max():.1e} over a second, {rollout['factor']:.2f} x real time")
+        assert mass is None or not held
         assert np.abs(expected[-1] - expected[0]).max() > 0.05
         assert away.max() < PHYSICS
 

@@ -95,7 +95,10 @@ export class Hold {
     const loads = scene.hands.map((hand) => v.length(data.cfrc_ext.slice(6 * hand + 3, 6 * hand + 6)));
     this.borne = 0.5 * (loads[0] + loads[1]);
     if (!this.settings.compliant) return;
-    this.connected = this.connected.map((held, side) => (this.strongest[side] > this.settings.slip_force ? 0 : held));
+    const slips = this.connected.map((held, side) => held && this.strongest[side] > this.settings.slip_force);
+    if (!slips.some(Boolean)) return;
+    this.connected = this.connected.map((held, side) => (slips[side] ? 0 : held));
     this.#connect();
+    this.world.mujoco.mj_step1(this.world.model, data);
   }
 }

@@ -54,6 +54,7 @@ export class World {
     this.model.body_mass[object.body] = mass;
     this.model.body_inertia.set(object.inertia_per_mass.map((value) => value * mass), 3 * object.body);
     this.mujoco.mj_setConst(this.model, this.scratch);
+    this.mujoco.mj_forward(this.model, this.data);
   }
 
   get mass() {
