@@ -1,4 +1,4 @@
-"""Learning curves: one line of JSON an update, kept beside the checkpoint, and their figure."""
+"""Learning curves: one line of JSON an update, kept beside the checkpoint, their table and their figure."""
 
 import csv
 import json
@@ -7,7 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.files import write_whole
+from iowbc.learning.curve_titles import title_of
 
+TABLE, FIGURE = "tables/learning_curves.csv", "figures/learning_curves.png"
+"""What a stage that trains leaves of them."""
+DIGITS = 6
+"""Significant digits that are kept: a training of a night then has 5 MB of curves."""
 OUTLIERS = (1.0, 99.0)
 """Percentiles between which a panel's values always lie inside of it."""
 FLATTENED = 10.0
@@ -34,7 +39,7 @@ class Curves:
 
     def append(self, step: int, values: Mapping[str, float]) -> None:
         """Add a row; step in environment steps."""
-        row = {"step": step, **values}
+        row = {"step": step, **{name: float(f"{value:.{DIGITS}g}") for name, value in values.items()}}
         self.rows.append(row)
         with self.path.open("a") as file:
             file.write(json.dumps(row) + "\n")
@@ -46,6 +51,13 @@ class Curves:
             writer = csv.DictWriter(file, names, restval="")
             writer.writeheader()
             writer.writerows(self.rows)
+
+    @staticmethod
+    def restore(table: Path, path: Path) -> None:
+        """Write the rows of a table that `write_csv` wrote to `path`, as `append` does."""
+        with table.open(newline="") as file:
+            rows = [{name: float(cell) for name, cell in row.items() if cell} for row in csv.DictReader(file)]
+        write_whole(path, "".join(json.dumps(row | {"step": int(row["step"])}) + "\n" for row in rows))
 
     def write_figure(self, path: Path, title: str, panels: Sequence[str]) -> None:
         """One panel a name, those without values left out; an outlier that would flatten the rest lies outside."""
@@ -64,7 +76,8 @@ class Curves:
             low, high = np.percentile([value for _, value in points], OUTLIERS)
             if np.ptp(axes.get_ylim()) > FLATTENED * (high - low) > 0.0:
                 axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
-            axes.set_title(name, fontsize=9)
+                axes.text(0.98, 0.94, "cut: outliers lie beyond", transform=axes.transAxes, ha="right", fontsize=7)
+            axes.set_title(title_of(name), fontsize=9)
             axes.set_xlabel("million environment steps", fontsize=8)
             axes.grid(alpha=0.3)
         figure.savefig(path, dpi=110)
@@ -73,10 +86,10 @@ class Curves:
         self, out: Path, title: str, panels: Sequence[str], terms: Sequence[str] = ()
     ) -> dict[str, float]:
         """Table and figure (of `panels`, then `terms`); returns, of the last row, the metrics of a training stage."""
-        (out / "tables").mkdir()
-        (out / "figures").mkdir()
-        self.write_csv(out / "tables" / "learning_curves.csv")
-        self.write_figure(out / "figures" / "learning_curves.png", title, [*panels, *terms])
+        for name in (TABLE, FIGURE):
+            (out / name).parent.mkdir()
+        self.write_csv(out / TABLE)
+        self.write_figure(out / FIGURE, title, [*panels, *terms])
         last = self.rows[-1] if self.rows else {}
         return {name: last[name] for name in ("step", *panels, "steps_per_second") if name in last}
 

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING
 
+from iowbc.learning.curves import TABLE
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
-from iowbc.stages.training import CURVES, STATE, leave_extendable, train
+from iowbc.stages.training import STATE, leave_extendable, train
 
 if TYPE_CHECKING:
     from iowbc.evaluation.trials.quick import QuickEvaluation
@@ -123,6 +124,6 @@ STAGE = Stage(
     results=("teacher.safetensors", "teacher.json"),
     packages=("stages.teacher", "stages.training", "learning", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",
-    extends_from=(STATE, CURVES),
+    extends_from=(STATE, TABLE),
     counts=("teacher.steps",),
 )

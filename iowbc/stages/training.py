@@ -1,6 +1,5 @@
 """What the stages that train share: updates until the budget is spent, curves, checkpoints, stopping and going on."""
 
-import shutil
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
@@ -35,8 +34,10 @@ class Training(Protocol):
         """Inverse of `arrays`."""
 
 
-STATE, CURVES = "state.safetensors", "curves.jsonl"
-"""Files of an artifact that a longer training goes on from."""
+STATE = "state.safetensors"
+"""File of an artifact that a longer training goes on from, beside the table of its curves."""
+CURVES = "curves.jsonl"
+"""Curves of a training that goes on."""
 
 
 def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[Mapping[str, float]], str]) -> "Curves":
@@ -48,13 +49,13 @@ def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[M
     from safetensors.numpy import load_file
 
     from iowbc.learning.checkpoint import load_checkpoint, save_checkpoint
-    from iowbc.learning.curves import Curves
+    from iowbc.learning.curves import TABLE, Curves
 
     path = job.work / "training.checkpoint"
     found, origin = load_checkpoint(path, job.key, job.report.say), "resumed from its checkpoint"
     if found is None and job.predecessor is not None:
         found, origin = load_file(job.predecessor / STATE), "goes on from a finished training"
-        shutil.copyfile(job.predecessor / CURVES, job.work / CURVES)
+        Curves.restore(job.predecessor / TABLE, job.work / CURVES)
     if found is not None:
         training.restore(found)
         job.report.say(f"{origin} at {training.steps:,} of {training.planned:,} steps")
@@ -77,10 +78,9 @@ def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[M
 
 
 def leave_extendable(job: Job, training: Training) -> None:
-    """Leaves the state in which a training ended, and its curves, so that a longer one can go on from them."""
+    """Leaves the state in which a training ended, so that a longer one can go on from it."""
     import numpy as np
     from safetensors.numpy import save_file
 
     arrays = {name: np.ascontiguousarray(value) for name, value in training.arrays().items()}
     save_file(arrays, job.out / STATE)
-    shutil.copyfile(job.work / CURVES, job.out / CURVES)

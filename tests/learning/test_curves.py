@@ -1,6 +1,8 @@
 from pathlib import Path
 
+from iowbc.learning.curve_titles import title_of
 from iowbc.learning.curves import Curves
+from iowbc.stages import distill, teacher
 
 
 def test_rows_after_the_checkpoint_and_a_torn_last_line_are_dropped(tmp_path: Path) -> None:
@@ -32,6 +34,25 @@ def test_a_damaged_line_costs_no_other(tmp_path: Path) -> None:
     lines = ['{"step": 10, "reward": 1.0}', *damaged, '{"step": 20, "reward": 2.0}']
     path.write_bytes("\n".join(lines).encode("utf-8", "surrogateescape"))
     assert [row["step"] for row in Curves(path, 99).rows] == [10, 20]
+
+
+def test_curves_go_on_from_the_table_that_they_left(tmp_path: Path) -> None:
+    curves = Curves(tmp_path / "curves.jsonl", 0)
+    curves.append(10, {"reward": 0.123456789})
+    curves.append(20, {"reward": 2.0, "late": 1e-12})
+    curves.write_csv(tmp_path / "curves.csv")
+    Curves.restore(tmp_path / "curves.csv", tmp_path / "again.jsonl")
+    again = Curves(tmp_path / "again.jsonl", 20)
+    assert again.rows == curves.rows == [{"step": 10, "reward": 0.123457}, {"step": 20, "reward": 2.0, "late": 1e-12}]
+    again.write_csv(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "curves.csv").read_bytes()
+
+
+def test_panels_say_what_they_show_and_in_what_unit() -> None:
+    for panel in (*teacher.PANELS, *distill.PANELS):
+        assert title_of(panel) != panel
+    assert title_of("reward/sync.height") == "reward of sync.height [1/s]"
+    assert title_of("unlisted") == "unlisted"
 
 
 def test_the_figure_leaves_out_what_was_never_recorded(tmp_path: Path) -> None:
