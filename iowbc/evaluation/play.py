@@ -16,7 +16,7 @@ from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script,
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.viewer import play_in_viewer, require_display
 from iowbc.learning.acting import load_policy
-from iowbc.learning.unfinished import unfinished_teacher
+from iowbc.learning.unfinished import unfinished_policy
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.task.episodes import Episode
@@ -108,4 +108,4 @@ def open_policy(source: Source, environment: VectorEnv) -> Acting:
     if source.policy.is_dir():
         return load_policy(source.policy)
     mirrors = (environment.layout.mirror, action_mirror(load_robot(source.world.robot)))
-    return unfinished_teacher(source.policy, source.key, source.world.recipe.teacher, mirrors)
+    return unfinished_policy(source.policy, source.key, source.world.recipe.teacher, mirrors)

@@ -1,7 +1,8 @@
 """Trained policies as functions of the batched observation, for evaluation and play."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from iowbc.learning.history import History
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
-from iowbc.learning.storage import load_student, load_teacher
+from iowbc.learning.storage import Network, load_network
 
 
 class Policy(Protocol):
@@ -66,7 +67,12 @@ class StudentPolicy:
 
 def load_policy(folder: Path) -> Policy:
     """The policy in the artifact of `teacher` or `distill`. Raises FileNotFoundError where there is none."""
-    if (folder / "teacher.json").is_file():
-        return TeacherPolicy(load_teacher(folder)[0])
-    network, about = load_student(folder)
-    return StudentPolicy(network, int(about["architecture"]["history"]))
+    network, about = load_network(folder)
+    return policy_of(network, about["architecture"])
+
+
+def policy_of(network: Network, architecture: Mapping[str, Any]) -> Policy:
+    """A network as a policy; `architecture`: the arguments that rebuild it."""
+    if isinstance(network, TeacherNetwork):
+        return TeacherPolicy(network)
+    return StudentPolicy(network, int(architecture["history"]))

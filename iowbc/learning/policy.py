@@ -1,15 +1,18 @@
 """Policy and value network in stable-baselines3's terms."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
 
 from iowbc.learning.gaussian import log_density
+from iowbc.learning.history_actor import HistoryActor, HistoryNormalizer, NewestCritic
 from iowbc.learning.networks import Normalizer, mirrors_from_json, perceptron
+from iowbc.learning.perceptron import Perceptron
 from iowbc.robot.mirror import MirrorMap
 
 INVARIANT = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
@@ -18,11 +21,18 @@ HIDDEN_GAIN, POLICY_GAIN, VALUE_GAIN = float(np.sqrt(2.0)), 0.01, 1.0
 """Gains of the orthogonal weights at the start, as stable-baselines3 has them: the policy starts as the reference."""
 
 
+def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
+    """Which standard deviation each action has, (A,): actions that the mirror swaps share one."""
+    own = np.arange(actions) if mirror is None else np.minimum(np.arange(actions), mirror.permutation)
+    return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)
+
+
 class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
     """A Gaussian policy and a value, each a network of its own, over observations that are normalised inside.
 
     With mirrors both commute with them: the mean is mirrored with the observation, the standard deviation is the same
-    on both sides, and the value stays.
+    on both sides, and the value stays. With the architecture of a student the policy is its network, on rows of H_t
+    with s_priv behind; the value sees the newest (s_t, s_priv).
     """
 
     def __init__(
@@ -37,20 +47,30 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         initial_std: float,
         std_learning_rate: float,
         mirrors: Any = None,
+        student: Mapping[str, Any] | None = None,
         use_sde: bool = False,
     ) -> None:
-        """`mirrors`: as `TeacherNetwork` takes them."""
+        """`mirrors`: as `TeacherNetwork` takes them; `student`: arguments of `StudentNetwork`."""
         super().__init__(observation_space, action_space, lr_schedule, net_arch=[], use_sde=use_sde)
         (inputs,), (actions,) = observation_space.shape, action_space.shape
         both = mirrors_from_json(mirrors)
-        self.normalizer = Normalizer(inputs, clip)
-        self.actor = perceptron(inputs, hidden, actions, activation, both)
-        self.critic = perceptron(inputs, hidden, 1, activation, None if both is None else (both[0], INVARIANT))
+        value = None if both is None else (both[0], INVARIANT)
+        self.normalizer: Normalizer
+        self.actor: Perceptron
+        self.critic: Perceptron
+        if student is None:
+            self.normalizer = Normalizer(inputs, clip)
+            self.actor = perceptron(inputs, hidden, actions, activation, both)
+            self.critic = perceptron(inputs, hidden, 1, activation, value)
+        else:
+            newest = inputs - (student["history"] - 1) * student["observation"]
+            self.normalizer = normalizer = HistoryNormalizer(newest, clip, student)
+            self.actor = HistoryActor(student)
+            self.critic = NewestCritic(perceptron(newest, hidden, 1, activation, value), normalizer)
         self.actor.initialize(HIDDEN_GAIN, POLICY_GAIN)
         self.critic.initialize(HIDDEN_GAIN, VALUE_GAIN)
-        own = np.arange(actions) if both is None else np.minimum(np.arange(actions), both[1].permutation)
-        kinds, place = np.unique(own, return_inverse=True)
-        self.log_stds = nn.Parameter(torch.full((len(kinds),), float(np.log(initial_std))))
+        place = std_places(actions, None if both is None else both[1])
+        self.log_stds = nn.Parameter(torch.full((place.max() + 1,), float(np.log(initial_std))))
         """One for each pair of actions that the mirror swaps, and one for each other."""
         self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
         rate = lr_schedule(1)

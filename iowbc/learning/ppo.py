@@ -17,6 +17,7 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor
 
 from iowbc.learning.gaussian import divergence, entropy, log_density
+from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirror_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
@@ -42,7 +43,7 @@ class Learner(PPO):  # type: ignore[misc]
         """What stable-baselines3's constructor does not know; `cores`: on which the networks learn."""
         self.settings, self.side_by_side = teacher, SideBySide(teacher.parts, cores)
         symmetric = teacher.symmetry != "none"
-        (size,) = self.observation_space.shape
+        size = len(self.policy.normalizer.mean)
         self.normalization = Normalization(size, self.n_envs, self.gamma, mirrors[0] if symmetric else None)
         self.mirrored = MirroredSamples(mirrors, teacher.mirror_gap) if teacher.symmetry == "augment" else None
         self.seconds = dict.fromkeys(("simulation", "inference", "learning"), 0.0)
@@ -71,7 +72,7 @@ class Learner(PPO):  # type: ignore[misc]
         observation = self._last_obs
         for step in range(n_rollout_steps):
             with self._timed("inference"), torch.inference_mode():
-                self.normalization.observe(observation, policy.normalizer)
+                self.normalization.observe(policy.normalizer.newest(observation), policy.normalizer)
                 prepared = policy.prepared(torch.from_numpy(observation))
                 mean = policy.actor.head(policy.actor.hidden(prepared))
                 action = mean + torch.randn_like(mean) * torch.exp(policy.log_std)
@@ -221,6 +222,11 @@ def explained_variance(values: Tensor, targets: Tensor) -> float:
 def make_learner(teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int) -> Learner:
     """The learner of a recipe on a vector environment with raw observations and rewards."""
     symmetric = teacher.symmetry == "construction"
+    student = None
+    if teacher.history is not None:
+        size = env.observation_space.shape[0] - len(mirrors[0])
+        observation = size // (teacher.history.length - 1)
+        student = student_architecture(teacher, observation, env.action_space.shape[0], mirrors)
     model = Learner(
         ActorCritic,
         env,
@@ -244,6 +250,7 @@ def make_learner(teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores:
             "initial_std": teacher.initial_std,
             "std_learning_rate": teacher.std_learning_rate,
             "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
+            "student": student,
         },
     )
     model.configure(teacher, mirrors, cores)

@@ -5,46 +5,49 @@ from pathlib import Path
 from typing import Any
 
 from safetensors.torch import load_file, save_file
-from torch import nn
 
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 
-KINDS: dict[str, type[nn.Module]] = {"teacher": TeacherNetwork, "student": StudentNetwork}
+Network = TeacherNetwork | StudentNetwork
+KINDS: dict[str, type[Network]] = {"teacher": TeacherNetwork, "student": StudentNetwork}
+"""By what a policy sees: s_t with s_priv, or H_t."""
+NAMES = ("teacher", "student")
+"""Of the files that the stages `teacher` and `distill` leave."""
 
 
 def save_network(
-    network: nn.Module, architecture: dict[str, Any], folder: Path, kind: str, about: dict[str, Any]
+    network: Network, architecture: dict[str, Any], folder: Path, name: str, about: dict[str, Any]
 ) -> None:
-    """Write `<kind>.safetensors` and `<kind>.json` (the constructor's arguments and what else to know)."""
-    save_file(
-        {name: value.contiguous() for name, value in network.state_dict().items()}, folder / f"{kind}.safetensors"
-    )
+    """Write `<name>.safetensors` and `<name>.json` (its kind, the constructor's arguments and what else to know)."""
+    save_file({key: value.contiguous() for key, value in network.state_dict().items()}, folder / f"{name}.safetensors")
+    kind = next(kind for kind, made in KINDS.items() if isinstance(network, made))
     text = json.dumps({"kind": kind, "architecture": architecture, **about}, indent=1)
-    (folder / f"{kind}.json").write_text(text + "\n")
+    (folder / f"{name}.json").write_text(text + "\n")
 
 
-def load_network(folder: Path, kind: str) -> tuple[nn.Module, dict[str, Any]]:
-    """Read what `save_network` wrote; returns the network in evaluation mode and the JSON."""
-    path = folder / f"{kind}.json"
-    if kind not in KINDS or not path.is_file():
+def load_network(folder: Path) -> tuple[Network, dict[str, Any]]:
+    """Read what `save_network` wrote in a stage's artifact; returns the network in evaluation mode and the JSON."""
+    path = next((folder / f"{name}.json" for name in NAMES if (folder / f"{name}.json").is_file()), None)
+    if path is None:
         found = sorted(p.name for p in folder.glob("*.json"))
-        raise FileNotFoundError(f"{path}: no such network; the folder holds {found}, known kinds are {sorted(KINDS)}")
+        wanted = " or ".join(f"{name}.json" for name in NAMES)
+        raise FileNotFoundError(f"{folder}: no {wanted} there; the folder holds {found}")
     about = json.loads(path.read_text())
-    network = KINDS[kind](**about["architecture"])
-    network.load_state_dict(load_file(folder / f"{kind}.safetensors"))
+    network = KINDS[about["kind"]](**about["architecture"])
+    network.load_state_dict(load_file(path.with_suffix(".safetensors")))
     network.requires_grad_(False)
     return network.eval(), about
 
 
 def load_teacher(folder: Path) -> tuple[TeacherNetwork, dict[str, Any]]:
     """The teacher in a stage's artifact."""
-    network, about = load_network(folder, "teacher")
+    network, about = load_network(folder)
     assert isinstance(network, TeacherNetwork)
     return network, about
 
 
 def load_student(folder: Path) -> tuple[StudentNetwork, dict[str, Any]]:
-    """The student in a stage's artifact."""
-    network, about = load_network(folder, "student")
+    """The policy in a stage's artifact that sees H_t alone, distilled or trained so."""
+    network, about = load_network(folder)
     assert isinstance(network, StudentNetwork)
     return network, about

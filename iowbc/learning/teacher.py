@@ -10,18 +10,21 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
 from iowbc.learning import checkpoint
+from iowbc.learning.acting import Policy, policy_of
 from iowbc.learning.best import Best
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
-from iowbc.learning.networks import Mirrors, TeacherNetwork
+from iowbc.learning.networks import Mirrors
 from iowbc.learning.ppo import make_learner
+from iowbc.learning.storage import Network
+from iowbc.learning.trained import trained_network
 from iowbc.processes import keep_freed_memory
 from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
 """Standard deviations within this factor of their floor count as having arrived there."""
 
-Score = Callable[[TeacherNetwork], Mapping[str, float]]
+Score = Callable[[Policy], Mapping[str, float]]
 """Figures of a policy, `score` among them: the greater the better."""
 
 
@@ -43,7 +46,7 @@ class TeacherTraining:
         `score`: a fixed evaluation, by which the best policy is kept; `say`: is told when the training goes back."""
         torch.set_num_threads(1)
         keep_freed_memory()
-        self.settings, self.environments = settings, environments
+        self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None
         self.say = say
         self.model = make_learner(settings, environments, seed, mirrors, cores)
@@ -88,7 +91,7 @@ class TeacherTraining:
         elif float(deviation.mean()) <= FLOOR_REACHED * self.settings.std_floor:
             why = "exploration died out"
         elif self.score is not None and self._updates % (self.settings.check.every or 1) == 0:
-            found = {f"check/{name}": float(value) for name, value in self.score(self.network()[0]).items()}
+            found = {f"check/{name}": float(value) for name, value in self.score(policy_of(*self.network())).items()}
             figures |= found
             if self.best.collapsed(found["check/score"]):
                 why = f"the score fell from {self.best.score:.3f} to {found['check/score']:.3f}"
@@ -108,7 +111,7 @@ class TeacherTraining:
     def keep_best(self) -> None:
         """Ends the training: what it has learnt is from now on what scored best, the last policy being scored, too."""
         if self.score is not None:
-            self.best.offer(float(self.score(self.network()[0])["score"]), self._learnt())
+            self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._learnt())
             self._learn_again(self.best.learner)
 
     def _learnt(self) -> Arrays:
@@ -150,15 +153,6 @@ class TeacherTraining:
         model.learning_rate = float(arrays["learning_rate"][0])
         checkpoint.restore_random(under("random", arrays))
 
-    def network(self) -> tuple[TeacherNetwork, dict[str, Any]]:
+    def network(self) -> tuple[Network, dict[str, Any]]:
         """The deterministic policy with its normalisation, and the arguments that rebuild it."""
-        policy, own = self.model.policy, self.model.policy_kwargs
-        (inputs,), (actions,) = self.model.observation_space.shape, self.model.action_space.shape
-        shared = {name: own[name] for name in ("hidden", "activation", "clip", "mirrors")}
-        architecture = {"inputs": int(inputs), "actions": int(actions), **shared}
-        with torch.random.fork_rng(devices=()):
-            network = TeacherNetwork(**architecture)
-        network.normalizer.load_state_dict(policy.normalizer.state_dict())
-        network.body.load_state_dict(policy.actor.state_dict())
-        network.log_std.copy_(policy.log_std.detach())
-        return network.requires_grad_(False), architecture
+        return trained_network(checkpoint.module_arrays(self.model.policy), self.settings, self.mirrors)

@@ -5,10 +5,23 @@ from typing import Literal
 from pydantic import Field, PositiveFloat, model_validator
 
 from iowbc.recipe.check import Check
-from iowbc.recipe.section import COSMETIC, DEEPEST, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, Section, Width
 
 LARGEST_UPDATE = 10_000_000
 """Samples that are kept in memory for one update."""
+
+
+class HistoryNetwork(Section):
+    """The student's network as PPO trains it, without a teacher (the paper's "w/o distillation")."""
+
+    length: int = Field(default=25, ge=2, le=1000)
+    """Length of the observation history H_t (paper Table I)."""
+    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
+    """What turns the history into a latent; see `distill.encoder`."""
+    frame_features: int = Field(default=32, ge=1, le=16_384)
+    """Features to which one observation of the history is projected, with the same weights for all."""
+    latent: int = Field(default=64, ge=1, le=16_384)
+    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
 
 
 class Teacher(Section):
@@ -81,6 +94,10 @@ class Teacher(Section):
     one after another, with the same result."""
     check: Check = Check()
     """A small fixed evaluation that keeps the best policy and brings a lost training back to it."""
+    history: HistoryNetwork | None = Field(default=None, json_schema_extra=LATER)
+    """With it the policy sees H_t alone and not s_priv: it is the student's network, needs no distillation, and can be
+    exported. The value network, which nobody deploys, sees the newest s_t and s_priv as ever. `hidden` and `activation`
+    are those behind the encoder."""
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
@@ -99,10 +116,17 @@ class Teacher(Section):
         return self
 
     @model_validator(mode="after")
+    def _history_without_augmentation(self) -> "Teacher":
+        if self.history is not None and self.symmetry == "augment":
+            raise ValueError("symmetry: with `history` it is `construction` or `none`, not `augment`")
+        return self
+
+    @model_validator(mode="after")
     def _units_in_pairs(self) -> "Teacher":
-        unpaired = [units for units in self.hidden if units % 2]
+        latent = () if self.history is None else (self.history.latent,)
+        unpaired = [units for units in (*latent, *self.hidden) if units % 2]
         if self.symmetry == "construction" and unpaired:
-            raise ValueError(f"hidden: the mirror swaps units in pairs; {unpaired[0]} is odd, give an even number")
+            raise ValueError(f"the mirror swaps units of a layer in pairs; {unpaired[0]} is odd, give an even number")
         return self
 
     @model_validator(mode="after")

@@ -1,8 +1,9 @@
 """Stage `distill`: the student drives, the teacher says what it would have done, the student learns it (DAgger)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from iowbc.pipeline.stage import Job, Stage
+from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 from iowbc.stages.training import train
 
@@ -21,6 +22,13 @@ PANELS = (
 """Shown in the figure of the learning curves."""
 FACTS = ("object_mass", "base_linear_velocity")
 """Privileged observations that the student's latent is to tell."""
+
+
+def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    """A teacher that is a student already."""
+    if recipe.teacher.history is not None:
+        text = "with teacher.history PPO trains the student's network itself, and nothing is to be distilled: leave "
+        yield "stages", f"{text}`distill` out, or set teacher.history to null"
 
 
 def run(job: Job) -> None:
@@ -75,6 +83,7 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), "teacher"),
     run=run,
+    problems=problems,
     results=("student.safetensors", "student.json"),
     packages=("stages.distill", "stages.training", "learning", *ENVIRONMENTS),
     counts=("distill.steps",),

@@ -32,19 +32,20 @@ def run(job: Job) -> None:
     from iowbc.export.folder import write_folder
     from iowbc.export.graph import ControllerGraph
     from iowbc.export.onnx_graph import run_torch
-    from iowbc.learning.storage import load_student
+    from iowbc.learning.networks import StudentNetwork
+    from iowbc.learning.storage import load_network
     from iowbc.robot.description import load_robot
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as on the robot, where the controller has one thread
     recipe, task, settings = job.recipe, job.recipe.task, job.recipe.export
     rg, source = job.inputs.get("rg-fit"), job.inputs[policy_stage(job.recipe)]
-    if not (source / "student.json").is_file():
+    student, about = load_network(source)
+    if not isinstance(student, StudentNetwork):
         raise StageFailed(
             f"{source} holds no student: a policy that needs privileged observations cannot run on a robot; "
             "add the stage `distill` to the recipe, or leave `export` out of its stages"
         )
-    student, about = load_student(source)
     robot = load_robot(job.robot)
     graph = ControllerGraph(
         student,

@@ -17,7 +17,7 @@ def generator_stage(recipe: Recipe) -> tuple[str, ...]:
 
 def leaves_student(recipe: Recipe) -> bool:
     """Whether a recipe trains a policy that needs no privileged observation."""
-    return "distill" in recipe.stages
+    return "distill" in recipe.stages or recipe.teacher.history is not None
 
 
 def policy_stage(recipe: Recipe) -> str:

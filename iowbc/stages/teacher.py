@@ -36,7 +36,7 @@ PANELS = (
 def run(job: Job) -> None:
     """Train the teacher; leave its best network, normalisation, curves, and an SB3 zip for users' own code."""
     from iowbc.control.action import action_mirror
-    from iowbc.learning.acting import TeacherPolicy
+    from iowbc.learning.history_environments import HistoryEnvironments
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
@@ -58,10 +58,13 @@ def run(job: Job) -> None:
         score = None
         if settings.check.every is not None:
             check = open_ones.enter_context(_check(world, job.workers))
-            score = lambda network: check.play(TeacherPolicy(network))  # noqa: E731
+            score = check.play
+        rows = environments
+        if settings.history is not None:
+            rows = HistoryEnvironments(environments, environments.layout.state.size, settings.history.length)
         training = TeacherTraining(
             settings,
-            environments,
+            rows,
             (environments.layout.mirror, action_mirror(load_robot(job.robot))),
             recipe.seed,
             cores=available_cores(),

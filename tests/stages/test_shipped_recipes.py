@@ -33,6 +33,10 @@ VARIANTS = {
         "task.reward.sync.support_reference.weight",
         "task.reward.sync.lateral_reference.weight",
     },
+    "wo_distill": {
+        "stages",
+        *(f"teacher.history.{name}" for name in ("length", "encoder", "frame_features", "latent")),
+    },
     "blind": {"task.observation.observe_object"},
 }
 """What each variant changes, beside its name, description and label."""
@@ -84,4 +88,12 @@ def test_a_variant_is_evaluated_in_the_world_where_iowbc_was_trained(name: str) 
 def test_the_papers_recipe_compares_them() -> None:
     study = load_study(RECIPES / "paper.yaml")
     assert study is not None
-    assert [variant.recipe.eval.label for variant in study.variants] == ["IO-WBC", "WBC", "w/o RG"]
+    assert [variant.recipe.eval.label for variant in study.variants] == ["IO-WBC", "WBC", "w/o RG", "w/o distillation"]
+
+
+def test_without_distillation_the_policy_is_the_students_own_network() -> None:
+    ablation, student = recipe("wo_distill").teacher, recipe("full").distill
+    assert ablation.history is not None
+    own = (ablation.history.length, ablation.history.encoder, ablation.history.frame_features, ablation.history.latent)
+    assert own == (student.history, student.encoder, student.frame_features, student.latent)
+    assert (ablation.hidden, ablation.activation) == (student.hidden, student.activation)

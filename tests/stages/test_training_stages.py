@@ -14,11 +14,12 @@ from stage_jobs import make_job
 from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
-from iowbc.learning.acting import load_policy
+from iowbc.learning.acting import StudentPolicy, load_policy
 from iowbc.learning.storage import load_student, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.stages import distill, teacher
+from iowbc.stages import distill, evaluate, export, teacher
+from iowbc.stages.inputs import leaves_student
 from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 
@@ -84,6 +85,18 @@ def test_both_stages_leave_a_policy_its_layout_and_its_curves(trained: Path) -> 
     curriculum = json.loads((trained / "teacher" / "out" / "teacher.json").read_text())["curriculum"]
     assert sum(map(len, curriculum["levels"].values())) == ENVIRONMENTS
     assert (trained / "teacher" / "out" / "teacher_sb3.zip").is_file()
+
+
+def test_ppo_of_the_students_network_leaves_a_policy_that_needs_nothing_privileged(tmp_path: Path) -> None:
+    recipe = small_recipe(history={"length": 5, "frame_features": 4, "latent": 4})
+    teacher.STAGE.run(job := make_job(tmp_path, recipe, workers=0))
+    policy = load_policy(job.out)
+    assert isinstance(policy, StudentPolicy)
+    assert policy.length == 5
+    assert leaves_student(recipe)
+    refused = [text for stage in (distill.STAGE, evaluate.STAGE, export.STAGE) for _, text in stage.problems(recipe)]
+    assert len(refused) == 1
+    assert "nothing is to be distilled" in refused[0]
 
 
 def test_both_trained_networks_obey_the_mirror_of_the_robot(trained: Path) -> None:

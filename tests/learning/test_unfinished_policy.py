@@ -7,10 +7,10 @@ import pytest
 from point_masses import MIRRORS, PointMasses
 
 from iowbc.errors import Damaged
-from iowbc.learning.acting import TeacherPolicy
+from iowbc.learning.acting import policy_of
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.teacher import TeacherTraining
-from iowbc.learning.unfinished import unfinished_teacher
+from iowbc.learning.unfinished import unfinished_policy
 from iowbc.recipe.teacher import Teacher
 
 KEY = "a key"
@@ -26,12 +26,12 @@ def test_the_newest_whole_checkpoint_acts_as_the_training_does(tmp_path: Path, s
     for _ in range(2):
         training.update()
         save_checkpoint(path, KEY, training.arrays())
-        acting.append(TeacherPolicy(training.network()[0]))
+        acting.append(policy_of(*training.network()))
     seen = np.random.default_rng(0).normal(size=(5, MIRRORS[0].sign.size)).astype(np.float32)
     none = np.zeros((5, 0), np.float32)
 
     def shown() -> np.ndarray:
-        return unfinished_teacher(path, KEY, settings, MIRRORS).act(seen, none)
+        return unfinished_policy(path, KEY, settings, MIRRORS).act(seen, none)
 
     np.testing.assert_array_equal(shown(), acting[1].act(seen, none))
     content = path.read_bytes()
@@ -39,4 +39,4 @@ def test_the_newest_whole_checkpoint_acts_as_the_training_does(tmp_path: Path, s
     np.testing.assert_array_equal(shown(), acting[0].act(seen, none))
     assert path.read_bytes() == content[:-1], "who looks on changes nothing"
     with pytest.raises(Damaged, match="no whole checkpoint"):
-        unfinished_teacher(path, "another key", settings, MIRRORS)
+        unfinished_policy(path, "another key", settings, MIRRORS)

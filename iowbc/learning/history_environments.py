@@ -1,0 +1,57 @@
+"""Environments that deliver the history of what they observe: rows of H_t, oldest first, with s_priv behind."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnvWrapper
+
+from iowbc.learning.history import History
+
+
+class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
+    """A vector environment of rows (s_t, s_priv) as one of rows (H_t, s_priv); see `Environments`."""
+
+    def __init__(self, environments: Any, observation: int, length: int) -> None:
+        """`observation`: size of s_t, with which the rows begin; `length`: observations in a history."""
+        (size,) = environments.observation_space.shape
+        self._size, self._length = observation, length
+        self._history = History(environments.num_envs, length, observation)
+        width = length * observation + size - observation
+        super().__init__(environments, observation_space=spaces.Box(-np.inf, np.inf, (width,), np.float32))
+
+    def reset(self) -> NDArray[np.float32]:
+        """Rows at the beginning of an episode everywhere."""
+        row = self.venv.reset()
+        return self._rows(row, np.ones(len(row), np.bool_))
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """As the environments' own; the last observation of an episode comes with the history before it."""
+        row, rewards, dones, infos = self.venv.step_wait()
+        for index in np.flatnonzero(dones).tolist():
+            last = infos[index]["terminal_observation"]
+            past = self._history.frames[index, 1:].ravel()
+            infos[index]["terminal_observation"] = np.concatenate([past, last]).astype(np.float32)
+        return self._rows(row, dones), rewards, dones, infos
+
+    def _rows(self, row: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
+        frames = self._history.push(row[:, : self._size], starts)
+        return np.concatenate([frames.reshape(len(row), -1), row[:, self._size :]], axis=1)
+
+    def statistics(self) -> dict[str, float]:
+        """Figures since the last call."""
+        figures: dict[str, float] = self.venv.statistics()
+        return figures
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything that the future depends on."""
+        own: dict[str, NDArray[Any]] = self.venv.state()
+        return own | {"history": self._history.frames.copy()}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `state`."""
+        own = dict(state)
+        self._history.frames[:] = own.pop("history")
+        self.venv.restore(own)

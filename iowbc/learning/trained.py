@@ -1,0 +1,61 @@
+"""The network that a PPO training leaves: its policy without exploration, value and optimiser."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from iowbc.learning.history_actor import student_architecture
+from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork, mirror_as_json
+from iowbc.learning.policy import std_places
+from iowbc.learning.storage import Network
+from iowbc.recipe.teacher import Teacher
+
+
+def trained_network(
+    policy: Mapping[str, NDArray[Any]], settings: Teacher, mirrors: Mirrors
+) -> tuple[Network, dict[str, Any]]:
+    """The policy's mean action with its normalisation inside, and the arguments that rebuild the network.
+
+    policy: parameters and buffers of an `ActorCritic`; mirrors: of a row (s_t, s_priv) and of an action.
+    """
+    arrays = {name: torch.from_numpy(np.array(value)) for name, value in policy.items()}
+    mean, std = arrays["normalizer.mean"], arrays["normalizer.std"]
+    actions = len(mirrors[1])
+    network: Network
+    with torch.random.fork_rng(devices=()):
+        if settings.history is None:
+            architecture = _teacher_architecture(settings, len(mean), mirrors)
+            network = TeacherNetwork(**architecture)
+            network.body.load_state_dict(_part("actor.", arrays))
+        else:
+            seen = len(arrays["actor.network.normalizer.mean"])
+            architecture = student_architecture(settings, seen, actions, mirrors)
+            network = StudentNetwork(**architecture)
+            network.load_state_dict(_part("actor.network.", arrays))
+            mean, std = mean[:seen], std[:seen]
+    network.normalizer.mean.copy_(mean)
+    network.normalizer.std.copy_(std)
+    symmetric = settings.symmetry == "construction"
+    network.log_std.copy_(arrays["log_stds"][torch.from_numpy(std_places(actions, mirrors[1] if symmetric else None))])
+    network.requires_grad_(False)
+    return network.eval(), architecture
+
+
+def _part(beginning: str, arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    return {name.removeprefix(beginning): value for name, value in arrays.items() if name.startswith(beginning)}
+
+
+def _teacher_architecture(settings: Teacher, inputs: int, mirrors: Mirrors) -> dict[str, Any]:
+    symmetric = settings.symmetry == "construction"
+    return {
+        "inputs": inputs,
+        "actions": len(mirrors[1]),
+        "hidden": list(settings.hidden),
+        "activation": settings.activation,
+        "clip": settings.normalization_clip,
+        "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
+    }

@@ -1,0 +1,116 @@
+"""PPO of the student's own network: it sees the history alone, the value sees what is privileged."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from point_masses import MIRRORS, PointMasses
+
+from iowbc.learning.acting import StudentPolicy, policy_of
+from iowbc.learning.checkpoint import save_checkpoint
+from iowbc.learning.history_environments import HistoryEnvironments
+from iowbc.learning.symmetry import mirror_tensor
+from iowbc.learning.teacher import TeacherTraining
+from iowbc.learning.unfinished import unfinished_policy
+from iowbc.recipe.teacher import HistoryNetwork, Teacher
+from iowbc.robot.mirror import MirrorMap
+
+SEEN, LENGTH = 2, 4
+"""Of a mass its position and velocity are observed; the distance is privileged."""
+NETWORK = HistoryNetwork(length=LENGTH, frame_features=8, latent=8)
+SETTINGS = Teacher(
+    steps=16 * 8 * 60,
+    environments=8,
+    rollout=16,
+    minibatches=2,
+    hidden=(16,),
+    learning_rate=1e-3,
+    gamma=0.9,
+    precision="float32",
+    std_learning_rate=1e-2,
+    history=NETWORK,
+)
+
+
+def training(**changes: Any) -> TeacherTraining:
+    environments = HistoryEnvironments(PointMasses(), SEEN, LENGTH)
+    return TeacherTraining(SETTINGS.model_copy(update=changes), environments, MIRRORS, seed=3)
+
+
+def test_the_history_ends_with_the_newest_observation_and_an_episode_with_its_own() -> None:
+    inner = PointMasses()
+    some = HistoryEnvironments(inner, SEEN, LENGTH)
+    first = some.reset()
+    assert first.shape == (8, LENGTH * SEEN + 1)
+    np.testing.assert_array_equal(first[:, : LENGTH * SEEN], np.tile(inner.observed()[:, :SEEN], LENGTH))
+    before = first
+    for _ in range(20):
+        rows, _, ended, infos = some.step(np.full((8, 1), 0.3, np.float32))
+        for index in np.flatnonzero(ended):
+            last = infos[index]["terminal_observation"]
+            np.testing.assert_array_equal(last[: (LENGTH - 1) * SEEN], before[index, SEEN : LENGTH * SEEN])
+            assert last[-1] == abs(last[-3]), "position, velocity, distance of the moment it ended"
+            np.testing.assert_array_equal(rows[index, : LENGTH * SEEN], np.tile(inner.start[index], LENGTH))
+        goes_on = ~ended
+        np.testing.assert_array_equal(
+            rows[goes_on, : (LENGTH - 1) * SEEN], before[goes_on, SEEN : LENGTH * SEEN], "shifted by one"
+        )
+        before = rows
+
+
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
+def test_it_learns_and_a_resumed_training_is_the_unbroken_one_bit_for_bit(symmetry: str) -> None:
+    unbroken = training(symmetry=symmetry)
+    first = unbroken.update()["reward"]
+    unbroken.update()
+    kept = {name: np.array(value) for name, value in unbroken.arrays().items()}
+    while unbroken.steps < unbroken.planned:
+        last = unbroken.update()["reward"]
+    assert last > 0.5 * first, (first, last)
+    resumed = training(symmetry=symmetry)
+    resumed.restore(kept)
+    while resumed.steps < resumed.planned:
+        resumed.update()
+    for name, value in unbroken.arrays().items():
+        np.testing.assert_array_equal(resumed.arrays()[name], value, err_msg=name)
+
+
+@pytest.mark.parametrize("encoder", ["mlp", "conv1d", "gru"])
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
+def test_what_it_leaves_acts_as_it_trained_and_knows_nothing_privileged(symmetry: str, encoder: str) -> None:
+    some = training(symmetry=symmetry, history=NETWORK.model_copy(update={"encoder": encoder}))
+    some.update()
+    network, architecture = some.network()
+    rows = torch.from_numpy(np.random.default_rng(0).normal(size=(6, LENGTH * SEEN + 1)).astype(np.float32))
+    histories = rows[:, : LENGTH * SEEN].reshape(6, LENGTH, SEEN)
+    policy = some.model.policy
+    with torch.no_grad():
+        torch.testing.assert_close(network(histories), policy.get_distribution(rows).mode(), rtol=0, atol=1e-6)
+        other = rows.clone()
+        other[:, -1] += 1.0
+        assert torch.equal(policy.get_distribution(other).mode(), policy.get_distribution(rows).mode())
+        assert not torch.equal(policy.predict_values(other), policy.predict_values(rows))
+        if symmetry == "construction":
+            mirror = MirrorMap(MIRRORS[0].permutation[:SEEN], MIRRORS[0].sign[:SEEN])
+            mirrored = network(mirror_tensor(mirror, histories))
+            torch.testing.assert_close(mirrored, mirror_tensor(MIRRORS[1], network(histories)), rtol=0, atol=1e-6)
+    assert isinstance(policy_of(network, architecture), StudentPolicy)
+
+
+def test_it_can_be_looked_at_while_it_trains(tmp_path: Path) -> None:
+    some, path = training(), tmp_path / "training.checkpoint"
+    some.update()
+    save_checkpoint(path, "key", some.arrays())
+    shown, own = unfinished_policy(path, "key", SETTINGS, MIRRORS), policy_of(*some.network())
+    seen, none = np.random.default_rng(0).normal(size=(3, 5, SEEN)).astype(np.float32), np.zeros((5, 1), np.float32)
+    for frame in seen:
+        np.testing.assert_array_equal(shown.act(frame, none), own.act(frame, none))
+
+
+def test_mirror_images_of_samples_and_an_odd_latent_are_refused() -> None:
+    with pytest.raises(ValueError, match="construction"):
+        Teacher(symmetry="augment", history=NETWORK)
+    with pytest.raises(ValueError, match="7 is odd"):
+        Teacher(history=HistoryNetwork(latent=7))
