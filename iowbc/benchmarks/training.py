@@ -45,7 +45,7 @@ def main(
     """
     recipe = recipe or Recipe(name="bench")
     folder, cores = robot or robot_folder(recipe.robot), available_cores()
-    only = SceneShares.model_validate(dict.fromkeys(SceneShares.model_fields, 0.0) | {scene: 1.0})
+    only = SceneShares.only(scene)
     recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
     settings = recipe.teacher
     samples, count = settings.environments * settings.rollout, cores if others is None else others

@@ -17,8 +17,8 @@ def simulation(
     runs: Runs, file: Path | None, *, scene: str, environments: int, workers: Sequence[int], others: bool
 ) -> None:
     """Measure the vector environment, of the default recipe or of one in a file. Raises `UsageError`."""
-    require_known(scene, "scene", SCENES)
     recipe = _recipe(file)
+    require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
     require_training("bench")
     require_writable_runs(runs)
     from iowbc.benchmarks import simulation
@@ -29,8 +29,8 @@ def simulation(
 
 def training(runs: Runs, file: Path | None, *, scene: str, turns: int, others: int | None) -> None:
     """Measure the teacher's training, of the default recipe or of one in a file. Raises `UsageError`."""
-    require_known(scene, "scene", SCENES)
     recipe = _recipe(file)
+    require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
     require_training("bench")
     require_writable_runs(runs)
     from iowbc.benchmarks import training

@@ -46,6 +46,8 @@ def _changing(section: dict[str, Any], whole: Mapping[str, Any]) -> dict[str, An
     changed = {name: value for name, value in section.items() if name not in ("required", "$defs")}
     if "properties" in section:
         changed["properties"] = {name: _standing(value, whole) for name, value in section["properties"].items()}
+    if isinstance(section.get("additionalProperties"), Mapping):
+        changed["additionalProperties"] = _standing(section["additionalProperties"], whole, alone=True)
     return changed | ({"$defs": section["$defs"]} if "$defs" in section else {})
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from iowbc.control.action import action_mirror
 from iowbc.deploy import contract
 from iowbc.deploy.controller import Controller
+from iowbc.errors import require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
 from iowbc.evaluation.films import EpisodeFilm, Film
 from iowbc.evaluation.play_request import PlayRequest
@@ -93,7 +94,8 @@ def play(
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
-    """The episode that a request describes."""
+    """The episode that a request describes. Raises UsageError for a scene that the recipe has not."""
+    require_known(request.scene, "scene", recipe.simulation.scenes.names)
     script = command_script(sequence_for(recipe, request.scene, request.sequence), recipe.task.commands)
     fixed = {} if request.disturbances else dict(UNDISTURBED)
     if request.partner_share is not None:

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from iowbc.errors import UsageError, require_known
+from iowbc.errors import UsageError
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.video import Video
-from iowbc.recipe.simulation.holding import FREE, SCENES
+from iowbc.recipe.simulation.holding import FREE
 
 HEAVIEST = 1000.0
 """No object is heavier [kg]."""
@@ -14,7 +14,7 @@ HEAVIEST = 1000.0
 
 @dataclass(frozen=True)
 class PlayRequest:
-    """One episode. Raises UsageError for an unknown scene, or a film that is no mp4."""
+    """One episode. Raises UsageError for a film that is no mp4."""
 
     scene: str = "lift"
     mass: float = 4.0
@@ -32,7 +32,6 @@ class PlayRequest:
     """Of the film; None takes `eval.video`, without its limit of length."""
 
     def __post_init__(self) -> None:
-        require_known(self.scene, "scene", SCENES)
         if not 0.0 <= self.mass <= HEAVIEST:
             raise UsageError(f"--mass {self.mass:g}: should be 0 to {HEAVIEST:g} kg")
         if self.video is not None and self.video.suffix != ".mp4":

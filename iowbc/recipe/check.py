@@ -3,7 +3,8 @@
 from pydantic import Field, NonNegativeFloat
 
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import LATER, Section
+from iowbc.recipe.simulation.holding import ObjectScene
 
 STAND_WALK_TURN = (
     Segment(duration=1.0, ramp=0.0),
@@ -25,6 +26,8 @@ class Check(Section):
     """Masses in the scene `lift` [kg], where the task plays it; 0 is the scene without an object."""
     pushing: tuple[NonNegativeFloat, ...] = (30.0,)
     """Masses in the scene `push` [kg], where the task plays it."""
+    others: dict[ObjectScene, tuple[NonNegativeFloat, ...]] = Field(default_factory=dict, json_schema_extra=LATER)
+    """Masses in other scenes [kg], a recipe's own too, where the task plays them."""
     trials: int = Field(default=2, ge=1, le=1000)
     """Trials at each mass."""
     seed: int = Field(default=5000, ge=0, lt=2**32)

@@ -9,7 +9,8 @@ from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.recipe.section import Section
+from iowbc.recipe.scene_names import misnamed
+from iowbc.recipe.section import Section, Unfitting
 from iowbc.recipe.simulation.simulation import Simulation
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
@@ -62,6 +63,13 @@ class Recipe(Section):
                 f"distill: with teacher.symmetry 'construction' the mirror swaps units of latent and hidden in pairs; "
                 f"{unpaired[0]} is odd, give an even number"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _scenes_are_known(self) -> Self:
+        problems = list(misnamed(self.simulation, self.task, self.teacher, self.eval, self.export))
+        if problems:
+            raise Unfitting(problems)
         return self
 
     @field_validator("stages")

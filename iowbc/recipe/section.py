@@ -1,9 +1,10 @@
 """The base of every recipe section, and which of its values decide results."""
 
+import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
@@ -16,12 +17,55 @@ Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 DEEPEST = 16
 """Hidden layers of the deepest network."""
+OWN_NAME = "[a-z][a-z0-9_]{0,31}"
+"""What a name looks like that a recipe gives to a scene or a term of its own."""
 
 
 class Section(BaseModel):
     """A frozen part of a recipe that refuses keys it does not know."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+class Named(Section):
+    """Entries by name: fields for those that every recipe has, and a recipe's own beside them, all of one type.
+
+    The type of one's own is the annotation of `__pydantic_extra__`.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names, a recipe's own last."""
+        return (*type(self).model_fields, *self.own)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Names that the recipe adds."""
+        return tuple(self.model_extra or ())
+
+    @classmethod
+    def own_type(cls) -> Any:
+        """Annotation of the entries that a recipe adds."""
+        return get_args(cls.__annotations__["__pydantic_extra__"])[1]
+
+    @model_validator(mode="after")
+    def _names_can_be_used(self) -> Self:
+        for name in self.own:
+            if not re.fullmatch(OWN_NAME, name):
+                raise ValueError(f"{name!r} is no name: one begins with a letter and has up to 32 of a-z, 0-9 and _")
+            if hasattr(type(self), name):
+                raise ValueError(f"{name!r} is a word that sections have a use of their own for; take another")
+        return self
+
+
+class Unfitting(ValueError):
+    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value and what is wrong there."""
+
+    def __init__(self, problems: Sequence[tuple[str, str]]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("; ".join(f"{path}: {text}" for path, text in problems))
 
 
 def deciding(section: Section) -> dict[str, Any]:
@@ -35,6 +79,7 @@ def _deciding(value: Any, plain: Any) -> Any:
     if isinstance(value, BaseModel):
         fields = type(value).model_fields.items()
         kept = [name for name, field in fields if not _left_out(field, getattr(value, name))]
+        kept += value.model_extra or ()
         return {name: _deciding(getattr(value, name), plain[name]) for name in kept}
     if isinstance(value, Mapping):
         return {name: _deciding(item, plain[name]) for name, item in value.items()}

@@ -11,6 +11,7 @@ from iowbc.recipe.simulation.holding import SWITCHES
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.sim.shapes import measured
 
 PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
@@ -89,7 +90,7 @@ class Draws:
         self.values["slip_force"] = self._strength.copy()
         self.values["rolling_resistance"] = np.zeros(n)
         self.values["grip_shift"] = np.zeros(n)
-        self._far = np.array([0.5 * scene.object.size[0] if scene.object else 0.0 for scene in scenes])
+        self._far = np.array([measured(scene.object).high[0] if scene.object else 0.0 for scene in scenes])
         self._near = self._far * [scene.grasp.near_end * (scene.kind == "lift") for scene in scenes]
         self._lightest = recipe.randomization.object_mass_scale.low
 

@@ -7,7 +7,8 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.simulation.scene import Grasp, Object
 from iowbc.sim.model_index import Layout
-from iowbc.sim.objects import TORSION, inertia_per_mass
+from iowbc.sim.objects import TORSION
+from iowbc.sim.shapes import measured
 
 TINY = 1e-9
 
@@ -21,7 +22,7 @@ class Grip:
     def __init__(self, batch: Any, layout: Layout, thing: Object, grasp: Grasp, period: float) -> None:
         self._layout, self._grasp, self._period = layout, grasp, period
         self._sites, self._spatial = batch.bind("site_xpos"), batch.bind("cvel")
-        self._about = inertia_per_mass(thing)[1] + grasp.height**2
+        self._about = measured(thing).about_axes[1] + grasp.height**2
         count = len(self._sites)
         self.angle, self.rate = np.zeros(count), np.zeros(count)
 

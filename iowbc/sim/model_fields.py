@@ -8,7 +8,8 @@ import numpy as np
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.sim.model_index import Layout
-from iowbc.sim.objects import TORSION, inertia_per_mass
+from iowbc.sim.objects import TORSION
+from iowbc.sim.shapes import measured
 from iowbc.sim.timing import Timing
 
 FIELDS = (
@@ -29,7 +30,7 @@ class ModelFields:
         names = FIELDS + WHEELS * (scene.kind == "push")
         self._fields = {name: batch.expand(name) for name in names}
         self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
-        self._object_inertia = inertia_per_mass(scene.object) if scene.object is not None else np.zeros(3)
+        self._object_inertia = measured(scene.object).principal if scene.object is not None else np.zeros(3)
         batch.set_const()
         self._batch = batch
         self._yielding = batch.expand("tendon_invweight0") if scene.kind == "push" else None

@@ -1,4 +1,4 @@
-"""Adds a scene's object to a model: a box or tyre between the hands, or a crate on wheels."""
+"""Adds a scene's object to a model: one between the hands, or a crate on wheels."""
 
 from itertools import pairwise
 from typing import Any
@@ -8,6 +8,7 @@ import numpy as np
 
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.robot.description import Robot
+from iowbc.sim.shapes import HOLE, HULL, measured
 from iowbc.sim.timing import Timing
 
 OBJECT_BIT = 4
@@ -21,14 +22,13 @@ PALM_CONDIM = 4
 """Palms resist sliding and twisting."""
 TORSION = 0.02
 """Torsional friction of a palm per unit of sliding friction [m]: two thirds of the radius of a 3 cm contact patch."""
-HOLE = 0.55
-"""Inner radius of a tyre as a part of its outer one."""
 RING_SEGMENTS = 16
 CLEARANCE = 0.06
 """Height of a crate's floor above the ground [m]."""
 CARDBOARD = (0.72, 0.53, 0.34, 1.0)
 RUBBER = (0.13, 0.13, 0.14, 1.0)
 WOOD = (0.62, 0.47, 0.30, 1.0)
+PAINTED = (0.24, 0.42, 0.53, 1.0)
 
 
 def add_object(
@@ -45,15 +45,22 @@ def add_object(
     body.explicitinertial = True
     body.mass = thing.mass
     body.ipos = OFF_CENTRE
-    body.inertia = inertia_per_mass(thing) * thing.mass
-    half = 0.5 * np.asarray(thing.size)
+    shape = measured(thing)
+    body.inertia, body.iquat = shape.principal * thing.mass, shape.turn
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
     bits = {"contype": OBJECT_BIT if by_contact or touched else 0, "conaffinity": ground_bit}
     if thing.shape == "tyre":
         _add_ring(body, thing, bits)
-    else:
+    elif thing.shape == "box":
         colour = WOOD if scene.kind == "push" else CARDBOARD
-        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, group=2, rgba=colour, **bits)
+        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_BOX, size=shape.high, group=2, rgba=colour, **bits)
+    elif thing.shape == "cylinder":
+        sizes = [shape.high[0], shape.high[2], 0.0]
+        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=sizes, group=2, rgba=PAINTED, **bits)
+    else:
+        spec.add_mesh(name="object", uservert=shape.vertices.ravel(), userface=shape.faces.ravel(), inertia=HULL)
+        kind = mujoco.mjtGeom.mjGEOM_MESH
+        body.add_geom(name="object", type=kind, meshname="object", group=2, rgba=PAINTED, **bits)
     if scene.kind == "push":
         _add_wheels(spec, body, thing, dressed)
     else:
@@ -65,20 +72,9 @@ def add_object(
         _add_grips(spec, body, scene)
 
 
-def inertia_per_mass(thing: Object) -> Any:
-    """Principal inertia of a uniform box, or of a uniform ring around x, for unit mass, (3,) [m²]."""
-    x, y, z = thing.size
-    if thing.shape == "box":
-        return np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12.0
-    outer = 0.25 * (y + z)
-    squares = outer**2 * (1.0 + HOLE**2)
-    across = squares / 4.0 + x * x / 12.0
-    return np.array([squares / 2.0, across, across])
-
-
 def resting_height(scene: Scene) -> float:
     """Height of a crate's centre above the ground [m]."""
-    return CLEARANCE + 0.5 * scene.object.size[2] if scene.object is not None else 0.0
+    return CLEARANCE - measured(scene.object).low[2] if scene.object is not None else 0.0
 
 
 def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
@@ -142,9 +138,10 @@ def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
             tendon.wrap_joint(name, part)
     if not dressed:
         return
-    x, y, z = 0.5 * np.asarray(thing.size)
-    for along in (-0.85, 0.85):
-        for across in (-0.85, 0.85):
+    (x, y), z = measured(thing).high[:2], -measured(thing).low[2]
+    corner = 0.85 if thing.shape == "box" else 0.6
+    for along in (-corner, corner):
+        for across in (-corner, corner):
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_SPHERE,
                 size=[0.5 * CLEARANCE, 0.0, 0.0],
@@ -158,7 +155,8 @@ def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
 
 def _add_ring(body: Any, thing: Object, bits: dict[str, int]) -> None:
     """A ring of capsules around the x axis."""
-    outer = 0.25 * (thing.size[1] + thing.size[2])
+    size = measured(thing).size
+    outer = 0.25 * (size[1] + size[2])
     thickness = 0.5 * outer * (1.0 - HOLE)
     middle = outer - thickness
     angles = np.linspace(0.0, 2.0 * np.pi, RING_SEGMENTS + 1)

@@ -13,7 +13,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.objects import inertia_per_mass
+from iowbc.sim.shapes import measured
 from iowbc.sim.state import SimulationState
 
 NOISE_WIDTH = 3
@@ -36,12 +36,12 @@ class Partner:
         self._recipe, self._period = recipe, period
         things = [scene.object for scene in scenes]
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
-        ahead = np.array([0.5 * thing.size[0] if thing else 0.0 for thing in things])
+        ahead = np.array([measured(thing).high[0] if thing else 0.0 for thing in things])
         above = np.array([scene.grasp.height if scene.kind == "lift" else 0.0 for scene in scenes])
         self._places = np.zeros((n, 2, 3))
         """The handle and the centre of mass on the object, object frame [m]."""
         self._places[:, 0, 0], self._places[:, 0, 2] = ahead, above
-        slowest = np.array([inertia_per_mass(thing)[1:].min() if thing else 1.0 for thing in things])
+        slowest = np.array([measured(thing).about_axes[1:].min() if thing else 1.0 for thing in things])
         self._felt = 1.0 / (1.0 + (ahead * ahead + above * above) / slowest)
         self._line = DelayLine(n, FEED, recipe.delay.high / period)
         self._stiffness, self._damping, self._weight = np.zeros(n), np.zeros(n), np.zeros(n)

@@ -379,7 +379,7 @@ def _ignore(message: str) -> None:
 
 
 def _scene(recipe: Recipe, name: str) -> Any:
-    known = tuple(type(recipe.scenes).model_fields)
+    known = recipe.scenes.names
     if name not in known:
         raise KeyError(f"no scene {name!r}; there are: {', '.join(known)}")
     return getattr(recipe.scenes, name)

@@ -17,6 +17,7 @@ from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
 from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
+from iowbc.sim.shapes import measured
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.stability import require_stable
 from iowbc.sim.state import SimulationState
@@ -128,9 +129,9 @@ class World:
         in_heading = rotations.rotate_inverse(turn[:, None], hands)
         middle = 0.5 * (in_heading[:, 0] + in_heading[:, 1])
         radius = self.scene.palm_radius
-        if self.scene.kind == "push":
+        if self.scene.kind == "push" and self.scene.object is not None:
             front = np.max(in_heading[:, :, 0], axis=1) + radius + self.scene.gap
-            middle[:, 0] = front + self.fields.half_size(ids)[:, 0]
+            middle[:, 0] = front - measured(self.scene.object).low[0]
             self.qpos[ids, start : start + 2] = rotations.rotate(turn, middle)[:, :2]
             self.qpos[ids, start + 2] = yaw
             return

@@ -96,11 +96,11 @@ def _check(world: "Specification", workers: int) -> "QuickEvaluation":
     check, shares = world.recipe.teacher.check, world.recipe.task.scenes
     recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence)})
     own = Specification(recipe, world.robot, world.rg)
-    played = {"lift": check.lifting, "push": check.pushing}
+    played = {"lift": check.lifting, "push": check.pushing} | check.others
     trials = [
         trial
         for scene, masses in played.items()
-        if getattr(shares, scene) > 0.0
+        if getattr(shares, scene, 0.0) > 0.0
         for trial in quick_trials(own, scene, masses, check.trials, check.seed)
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)

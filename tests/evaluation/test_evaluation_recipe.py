@@ -8,6 +8,7 @@ from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.suites import HeavyCase, PushLadder, Sweep
 from iowbc.recipe.export import Acceptance
+from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import HOLDABLE, SCENES
 from iowbc.recipe.simulation.simulation import Simulation as SimulationRecipe
 from iowbc.recipe.task.joint_references import Grasps
@@ -80,7 +81,7 @@ def test_wrists_out_of_reach_are_refused(offset: float) -> None:
 
 def test_unknown_scenes_and_quantities_are_named_with_what_is_valid() -> None:
     with pytest.raises(ValidationError, match="no scene 'lft' with an object; valid: lift"):
-        Sweep(scene="lft")
+        Recipe(name="x", eval=Evaluation(lifting=Sweep(scene="lft")))
     with pytest.raises(ValidationError, match=r"no randomised quantity friction; valid: .*ground_friction"):
         Sweep(fixed={"friction": 1.0})
 

@@ -197,9 +197,9 @@ def test_a_damaged_recipe_of_an_export_is_named(done: Job, tmp_path: Path) -> No
             exported_source(folder)
 
 
-def test_what_cannot_be_played_is_refused_with_what_can(tmp_path: Path) -> None:
+def test_what_cannot_be_played_is_refused_with_what_can(done: Job, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="valid: free, lift"):
-        PlayRequest(scene="sofa", video=tmp_path / "out.mp4")
+        play(exported_source(done.out), PlayRequest(scene="sofa", video=tmp_path / "out.mp4"))
     with pytest.raises(UsageError, match="mp4"):
         PlayRequest(video=tmp_path / "out.gif")
 

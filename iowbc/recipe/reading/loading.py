@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, nearest
+from iowbc.recipe.reading.beside import with_files
 from iowbc.recipe.reading.document import Located, leaves, merged, read_document
 from iowbc.recipe.reading.finding import SUFFIXES, known_files, recipe_file
 from iowbc.recipe.reading.overrides import overridden
@@ -49,7 +50,7 @@ def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe
     tree = _resolve(os.fspath(file), (), f"{file}:1:1")
     if isinstance(tree.value, dict) and "name" not in tree.value:
         tree = Located({"name": Located(Path(file).stem.lower(), f"{file}:1:1"), **tree.value}, tree.place)
-    tree = overridden(tree, overrides)
+    tree = with_files(overridden(tree, overrides), Path(file).parent)
     recipe = validate(tree)
     places = {".".join(path): leaf.place for path, leaf in leaves(tree)}
     return LoadedRecipe(recipe, Path(file), tuple(overrides), places)

@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.section import Named, Unfitting
 
 PROBLEMS_TOLD = 50
 """Problems of a recipe that are told; the others are counted."""
@@ -53,8 +54,7 @@ def _defaults() -> Located:
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
     """One problem a place and key: what the members of a union say about the same value is joined."""
     texts: dict[tuple[str, str], list[str]] = {}
-    for error in errors[:PROBLEMS_TOLD]:
-        place, head, text = _problem(tree, error)
+    for place, head, text in (told for error in errors[:PROBLEMS_TOLD] for told in _told(tree, error)):
         texts.setdefault((place, head), [])
         if text not in texts[place, head]:
             texts[place, head].append(text)
@@ -71,27 +71,46 @@ def _position(place: str) -> tuple[str, int, int]:
     return (file, int(line), int(column)) if line.isdecimal() and column.isdecimal() else (place, 0, 0)
 
 
+def _told(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str, str]]:
+    """Place, `key 'x' = value`, and what is valid, for each thing that an error tells."""
+    reason = error.get("ctx", {}).get("error")
+    if isinstance(reason, Unfitting):
+        for dotted, text in reason.problems:
+            path, found = descend(tree, [int(part) if part.isdecimal() else part for part in dotted.split(".")])
+            yield found.place, _head(path, found), text
+    else:
+        yield _problem(tree, error)
+
+
+def _head(path: Sequence[str], found: Located) -> str:
+    head = f"key '{'.'.join(path)}'" if path else "the recipe"
+    return head if isinstance(found.value, dict) else f"{head} = {shown(plain(found))}"
+
+
 def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
-    """Place, `key 'x' = value`, and what is valid."""
     path, found = descend(tree, error["loc"])
     if error["type"] == "missing":
         name = ".".join((*path, str(error["loc"][-1])))
-        return found.place, f"key '{name}'", "is missing and has no default"
-    key = ".".join(path)
+        return found.place, f"key '{name}'", f"is missing and has no default{_meant(path)}"
     if error["type"] == "extra_forbidden":
         section = path[:-1]
-        known = sorted(name for model in _models_at(section) for name in model.model_fields)
+        known = sorted(name for model in models_at(section) for name in model.model_fields)
         where = f"of '{'.'.join(section)}'" if section else "of a recipe"
         hint = nearest(path[-1], known) or _elsewhere(path[-1])
         text = f"is not a key {where}; valid: {', '.join(known) or 'none'}{hint}"
-        return found.place, f"key '{key}' = {shown(plain(found))}", text
-    head = f"key '{key}'" if key else "the recipe"
-    if not isinstance(found.value, dict):
-        head += f" = {shown(plain(found))}"
+        return found.place, f"key '{'.'.join(path)}' = {shown(plain(found))}", text
     text = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
     if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
         text += nearest(found.value, re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", ""))))
-    return found.place, head, text
+    return found.place, _head(path, found), text
+
+
+def _meant(path: Sequence[str]) -> str:
+    """`; did you mean 'x'?` where an entry of a recipe's own lacks something and its name is nearly a known one."""
+    for model in models_at(path[:-1]) if path else ():
+        if issubclass(model, Named) and path[-1] not in model.model_fields:
+            return nearest(path[-1], model.model_fields)
+    return ""
 
 
 def descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ...], Located]:
@@ -108,7 +127,7 @@ def descend(tree: Located, location: Sequence[int | str]) -> tuple[tuple[str, ..
     return tuple(path), tree
 
 
-def _models_at(path: Sequence[str]) -> list[type[BaseModel]]:
+def models_at(path: Sequence[str]) -> list[type[BaseModel]]:
     """The sections that may stand at a path."""
     candidates: list[Any] = [Recipe]
     for name in path:
@@ -131,6 +150,8 @@ def _inside(annotation: Any, name: str) -> Iterator[Any]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if name in annotation.model_fields:
             yield annotation.model_fields[name].annotation
+        elif issubclass(annotation, Named):
+            yield annotation.own_type()
     elif get_origin(annotation) in (Union, types.UnionType):
         for member in get_args(annotation):
             yield from _inside(member, name)

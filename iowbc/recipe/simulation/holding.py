@@ -10,11 +10,9 @@ from iowbc.recipe.simulation.randomization import Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
 SCENES = tuple(Scenes.model_fields)
-"""Names of the scenes."""
+"""Names of the scenes that every recipe has."""
 FREE = "free"
 """The scene without an object."""
-LOADED = tuple(name for name in SCENES if name != FREE)
-"""Scenes with an object."""
 SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale", "resistance_scale")
 """Factors on impulses, pushes and sensor noise, on how far the object's mass may rise above the lower end of its range,
 and on a crate's rolling resistance (fifty times as much blocks it). One unless held at another value; zero switches
@@ -33,8 +31,8 @@ HOLDABLE = (
 
 
 def _with_object(name: str) -> str:
-    if name not in LOADED:
-        raise ValueError(f"no scene {name!r} with an object; valid: {', '.join(LOADED)}; a mass of 0 is without one")
+    if name == FREE:
+        raise ValueError(f"the scene {FREE} has no object; name another: a mass of 0 is without one")
     return name
 
 
@@ -45,5 +43,8 @@ def _known_quantities(held: dict[str, float]) -> dict[str, float]:
     return held
 
 
-ObjectScene = Annotated[str, AfterValidator(_with_object), Field(json_schema_extra={"enum": list(LOADED)})]
+ObjectScene = Annotated[
+    str, AfterValidator(_with_object), Field(json_schema_extra={"examples": [name for name in SCENES if name != FREE]})
+]
+"""A scene with an object; which ones there are, the recipe says."""
 Held = Annotated[dict[str, float], AfterValidator(_known_quantities)]

@@ -1,10 +1,11 @@
-"""The worlds that a robot can be put in: nothing, an object held between the wrists, a crate to push."""
+"""The worlds that a robot can be put in: nothing, an object held between the wrists, a crate to push, one's own."""
 
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.beside import MeshFile
+from iowbc.recipe.section import LATER, Named, Section
 
 Size = tuple[float, float, float]
 
@@ -52,14 +53,32 @@ class Grasp(Section):
 class Object(Section):
     """A rigid object, uniform at its nominal mass."""
 
-    shape: Literal["box", "tyre"]
-    """A box, or a ring that stands across the robot's way, so that the hands hold its rim on both sides."""
-    size: Size
-    """Extent along x (forward), y (left) and z (up) [m]."""
+    shape: Literal["box", "tyre", "cylinder", "mesh"]
+    """A box; a ring that stands across the robot's way, so that the hands hold its rim on both sides; an upright
+    cylinder; or a file's triangles, of which the convex hull touches and has the inertia."""
+    size: Size | None = None
+    """Extent along x (forward), y (left) and z (up) [m]; empty for a mesh, which has that of its file."""
     mass: float = Field(gt=0.0)
     """Nominal mass [kg]."""
     smallest_mass: float = Field(default=0.05, gt=0.0)
     """Lighter masses, zero too, are simulated as this [kg]: a free body needs inertia."""
+    mesh: MeshFile | None = Field(default=None, json_schema_extra=LATER)
+    """An .obj or .stl file beside the recipe, x forward and z up."""
+    scale: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)
+    """Metres for a unit of the mesh: 0.001 for a file in millimetres."""
+
+    @model_validator(mode="after")
+    def _has_a_size(self) -> Self:
+        if (self.shape == "mesh") != (self.mesh is not None):
+            raise ValueError(f"shape {self.shape!r}: {'give its file, `mesh`' if self.mesh is None else 'has no mesh'}")
+        if (self.shape == "mesh") != (self.size is None):
+            text = "has the size of its file: leave size out, change `scale`" if self.size else "give its size"
+            raise ValueError(f"shape {self.shape!r}: {text}")
+        if self.size is not None and min(self.size) <= 0.0:
+            raise ValueError(f"size: {list(self.size)} should be positive")
+        if self.shape == "cylinder" and self.size is not None and self.size[0] != self.size[1]:
+            raise ValueError(f"size: a cylinder is as long as it is wide, got {self.size[0]:g} and {self.size[1]:g} m")
+        return self
 
 
 class Scene(Section):
@@ -86,12 +105,16 @@ class Scene(Section):
     def _object_fits_kind(self) -> Self:
         if (self.kind == "free") != (self.object is None):
             raise ValueError(f"a {self.kind} scene {'has no' if self.kind == 'free' else 'needs an'} object")
+        by_contact = self.kind == "lift" and self.grasp.kind == "contact"
+        if by_contact and self.object is not None and self.object.shape != "box":
+            raise ValueError(f"a grasp by contact holds a box, whose width fits the hands, not a {self.object.shape}")
         return self
 
 
-class Scenes(Section):
-    """The scenes by name."""
+class Scenes(Named):
+    """The scenes by name; a recipe may add its own, with `task.references.grasps` and `.loads` of the same name."""
 
+    __pydantic_extra__: dict[str, Scene] = Field(init=False)
     free: Scene = Scene(kind="free")
     """No object."""
     lift: Scene = Scene(kind="lift", object=Object(shape="box", size=(0.30, 0.25, 0.30), mass=7.0))

@@ -1,17 +1,18 @@
 """How a command becomes joint references."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Named, Section
 
 Vector = tuple[float, float, float]
 
 
-class Grasps(Section):
+class Grasps(Named):
     """Base grasp of each scene: left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
 
+    __pydantic_extra__: dict[str, Vector] = Field(init=False)
     free: Vector = (0.30, 0.16, 0.12)
     """Forearms before the body, as when carrying."""
     lift: Vector = (0.30, 0.16, 0.26)
@@ -25,9 +26,10 @@ class Grasps(Section):
     """Behind the crate's upper edge."""
 
 
-class Loads(Section):
+class Loads(Named):
     """What the arms expect to carry in each scene [kg]: as much lighter or heavier objects lift or lower the hands."""
 
+    __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.0, ge=0.0)
     """Nothing."""
     lift: float = Field(default=3.5, ge=0.0)

@@ -1,10 +1,10 @@
 """The Markov decision process."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Named, Section
 from iowbc.recipe.task.action import Action
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
@@ -14,9 +14,10 @@ from iowbc.recipe.task.reward import Reward
 from iowbc.recipe.task.termination import Termination
 
 
-class SceneShares(Section):
+class SceneShares(Named):
     """Which part of the environments plays which scene of `simulation.scenes`; only the proportions matter."""
 
+    __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.1, ge=0.0)
     """No object: walking, standing and posture alone."""
     lift: float = Field(default=0.9, ge=0.0)
@@ -30,7 +31,7 @@ class SceneShares(Section):
 
     @classmethod
     def only(cls, scene: str) -> Self:
-        """One scene alone. Raises ValidationError for a name that no scene has."""
+        """One scene alone."""
         return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
 
     @model_validator(mode="after")

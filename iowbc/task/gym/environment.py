@@ -40,6 +40,8 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
         if render_mode not in (None, RENDER_MODE):
             raise ValueError(f"render_mode is None or {RENDER_MODE!r}, got {render_mode!r}")
         recipe = recipe or Recipe(name=scene)
+        if scene not in recipe.simulation.scenes.names:
+            raise ValueError(f"no scene {scene!r}; the recipe's are: {', '.join(recipe.simulation.scenes.names)}")
         task = recipe.task
         shares = SceneShares.only(scene)
         curriculum = task.curriculum.model_copy(update={"enabled": False})
