@@ -70,6 +70,13 @@ class FileBeside(Section):
         return {"anyOf": [{"type": "string", "description": "Path from the recipe's file."}, taken]}
 
 
+class ModuleFile(FileBeside):
+    """Python code. Reading a recipe or an artifact does not execute it, and neither do plans and trials."""
+
+    suffixes: ClassVar[tuple[str, ...]] = (".py",)
+    largest: ClassVar[int] = 100_000
+
+
 class MeshFile(FileBeside):
     """Triangles of an object. A few thousand describe any: what touches is their convex hull."""
 

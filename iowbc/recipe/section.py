@@ -26,6 +26,11 @@ class Section(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
+    @property
+    def idle(self) -> bool:
+        """Whether an entry of a mapping does nothing, so that it might as well not be there."""
+        return False
+
 
 class Named(Section):
     """Entries by name: fields for those that every recipe has, and a recipe's own beside them, all of one type.
@@ -82,14 +87,21 @@ def _deciding(value: Any, plain: Any) -> Any:
         kept += value.model_extra or ()
         return {name: _deciding(getattr(value, name), plain[name]) for name in kept}
     if isinstance(value, Mapping):
-        return {name: _deciding(item, plain[name]) for name, item in value.items()}
+        return {name: _deciding(item, plain[name]) for name, item in _acting(value).items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_deciding(item, below) for item, below in zip(value, plain, strict=True)]
     return plain
 
 
+def _acting(value: Any) -> Any:
+    """A mapping without its idle entries; anything else as it is."""
+    if not isinstance(value, Mapping):
+        return value
+    return {name: item for name, item in value.items() if not (isinstance(item, Section) and item.idle)}
+
+
 def _left_out(field: FieldInfo, value: Any) -> bool:
     marks = field.json_schema_extra if isinstance(field.json_schema_extra, Mapping) else {}
     if marks.get("later"):
-        return bool(value == field.get_default(call_default_factory=True))
+        return bool(_acting(value) == field.get_default(call_default_factory=True))
     return bool(marks.get("cosmetic"))

@@ -83,6 +83,7 @@ class Batch:
             lateral=self.robot.lateral,
             holding=self._holding,
             followable=~pushing & (episodes is None),
+            own_terms=episodes is None,
             period=period,
         )
         self._pushes = PlannedPushes(schedule.pushes, period)

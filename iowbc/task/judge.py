@@ -43,15 +43,16 @@ class Judge:
         lateral: Indices,
         holding: Mask,
         followable: Mask,
+        own_terms: bool,
         period: float,
     ) -> None:
         """`support`: places of the support joints; `lateral`: places among them, see `Robot.lateral`; `holding`:
         environments that begin with an object in the hands; `followable`: those whose command can be followed, at least
-        in the recipe's own ranges; (n,) each."""
+        in the recipe's own ranges; (n,) each; `own_terms`: execute the reward's terms in a user's file."""
         self._task, self._height = recipe.task, recipe.rg.height
         self._support, self._lateral = support, lateral
         self._holding, self._followable, self._period = holding, followable, period
-        self._reward = RewardFunction(recipe.task.reward, period)
+        self._reward = RewardFunction(recipe.task.reward, period, own=own_terms)
         self._velocity = np.zeros((len(holding), 3))
 
     def motion(self, state: SimulationState) -> Motion:

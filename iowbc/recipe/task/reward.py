@@ -1,8 +1,11 @@
 """Terms and weights of the reward."""
 
+from typing import Annotated
+
 from pydantic import Field
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.beside import ModuleFile
+from iowbc.recipe.section import LATER, OWN_NAME, Section
 
 
 class Kernel(Section):
@@ -92,6 +95,24 @@ class GaitConstraint(Section):
     """Lateral distance of the feet below which `foot_distance` counts [m]."""
 
 
+class OwnTerm(Section):
+    """A term that is a function in a file of one's own."""
+
+    module: ModuleFile
+    """Python file beside the recipe, which may import what is installed, and no file beside it."""
+    function: str = Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)
+    """Its function: takes a `Step` (iowbc/task/rewards/table.py) of n environments, returns a value for each, (n,)."""
+    weight: float
+    """Reward a second at the value 1; at 0 the file is not executed, and no key knows of the term."""
+    width: float | None = Field(default=None, gt=0.0)
+    """Makes it a kernel: the value, (n,) or (n, k), is a squared error, and the reward falls to 37 % at this error."""
+
+    @property
+    def idle(self) -> bool:
+        """Without a weight."""
+        return self.weight == 0.0
+
+
 class Reward(Section):
     """Sum of the terms, per second; a step's reward is the sum times the control period, plus the cost of a fall."""
 
@@ -107,3 +128,12 @@ class Reward(Section):
     """Reward a second for not having fallen."""
     termination: float = -3.0
     """Added once when an episode ends in a fall or a drop, not scaled by the control period."""
+    own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnTerm] = Field(
+        default_factory=dict, json_schema_extra=LATER
+    )
+    """Terms of one's own, by a name for their curve; training alone executes them."""
+
+    @property
+    def own_terms(self) -> dict[str, OwnTerm]:
+        """Those with a weight."""
+        return {name: term for name, term in self.own.items() if not term.idle}

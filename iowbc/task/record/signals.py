@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from iowbc.task.rewards.table import TERMS
 from iowbc.task.vector.shared import Fields
 
 NO_SIGNALS: Mapping[str, int] = MappingProxyType({})
@@ -74,8 +73,9 @@ def trial_signals(joints: int) -> dict[str, int]:
     return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints)
 
 
-def buffer_fields(observation: int, action: int, extra: Mapping[str, int] = NO_SIGNALS) -> Fields:
-    """Everything that passes between a batch and its parent; `extra`: signals beside the usual ones, with sizes."""
+def buffer_fields(observation: int, action: int, terms: int, extra: Mapping[str, int] = NO_SIGNALS) -> Fields:
+    """Everything that passes between a batch and its parent; `terms`: number of the reward's; `extra`: signals beside
+    the usual ones, with sizes."""
     return {
         "action": ((action,), "float32"),
         "observation": ((observation,), "float32"),
@@ -86,6 +86,6 @@ def buffer_fields(observation: int, action: int, extra: Mapping[str, int] = NO_S
         "episode_return": ((), "float64"),
         "episode_length": ((), "int64"),
         "counters": ((len(COUNTERS),), "float64"),
-        "terms": ((len(TERMS),), "float64"),
+        "terms": ((terms,), "float64"),
         **{f"signal/{name}": ((size,), "float64") for name, size in (SIGNALS | dict(extra)).items()},
     }

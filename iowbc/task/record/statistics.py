@@ -7,7 +7,6 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.task.curriculum import AXES
 from iowbc.task.record.signals import CAUSES, COUNTERS, ERRORS, KINDS, REASONS
-from iowbc.task.rewards.table import TERMS
 
 EPISODIC = (
     *("episode_seconds", "episode_return"),
@@ -20,9 +19,9 @@ EPISODIC = (
 class Statistics:
     """Figures since they were last read; all of them are always there, and finite."""
 
-    def __init__(self, period: float, scenes: Sequence[str]) -> None:
-        """`period`: control period [s]; `scenes`: name of each environment's."""
-        self._period = period
+    def __init__(self, period: float, scenes: Sequence[str], terms: Sequence[str]) -> None:
+        """`period`: control period [s]; `scenes`: name of each environment's; `terms`: names of the reward's."""
+        self._period, self._terms = period, tuple(terms)
         names = np.array(scenes)
         self._scenes = {name: names == name for name in dict.fromkeys(scenes)}
         self._kept = len(EPISODIC)
@@ -31,7 +30,7 @@ class Statistics:
         """The last values of what not every stretch has: `EPISODIC`, and the errors."""
 
     def read(self, counters: Array, terms: Array, levels: Array) -> dict[str, float]:
-        """Figures from counters (n, len(COUNTERS)), sums of the reward's terms (n, len(TERMS)) and levels (n, axes);
+        """Figures from counters (n, len(COUNTERS)), sums of the reward's terms (n, terms) and levels (n, axes);
         sets counters and sums back.
 
         Rewards are means per second, terminations and falls parts of the episodes that ended, divergences a number,
@@ -39,7 +38,7 @@ class Statistics:
         """
         total = dict(zip(COUNTERS, counters.sum(axis=0).tolist(), strict=True))
         rewards = dict(
-            zip(TERMS, (terms.sum(axis=0) / (max(total["steps"], 1.0) * self._period)).tolist(), strict=True)
+            zip(self._terms, (terms.sum(axis=0) / (max(total["steps"], 1.0) * self._period)).tolist(), strict=True)
         )
         self._carry_errors(counters)
         counters[:], terms[:] = 0.0, 0.0

@@ -9,6 +9,7 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.reward import Kernel, Reward
 from iowbc.task.rewards.kernel import kernel
+from iowbc.task.rewards.own import load_terms
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
 
 
@@ -19,7 +20,7 @@ class Scored:
     reward: Array
     """(n,)."""
     terms: Array
-    """Each term's part of the reward, in the order of the table, (n, terms)."""
+    """Each term's part of the reward, in the order of `term_names`, (n, terms)."""
     tracking: Array
     """The scores of the terms `TRACKED`, between 0 and 1, (n, tracked)."""
 
@@ -29,7 +30,7 @@ class WeightedTerm:
     """A term as a recipe wants it."""
 
     column: int
-    """Its place in the table."""
+    """Its place among all."""
     function: Term
     weight: float
     """Reward of a control step at the value 1."""
@@ -44,21 +45,35 @@ class WeightedTerm:
         return value if value.ndim == 1 else value.sum(axis=1)
 
 
+def term_names(recipe: Reward) -> tuple[str, ...]:
+    """Names of all terms: those of the table by dotted path, then those of the recipe's own that have a weight."""
+    return (*TERMS, *(f"own.{name}" for name in recipe.own_terms))
+
+
 class RewardFunction:
     """The reward of a recipe. Terms without a weight are not computed, unless they say how well it tracks."""
 
-    def __init__(self, recipe: Reward, period: float, terms: Mapping[str, Term] | None = None) -> None:
-        """`period`: control period [s]; `terms`: by dotted path in the recipe, by default those of the table."""
+    def __init__(
+        self, recipe: Reward, period: float, terms: Mapping[str, Term] | None = None, *, own: bool = False
+    ) -> None:
+        """`period`: control period [s]; `terms`: by dotted path in the recipe, by default those of the table; `own`:
+        execute the recipe's own terms, which else count nothing. Raises StageFailed for one that cannot be used."""
         table = TERMS if terms is None else terms
-        self._columns = len(table)
+        self._columns = len(table) + len(recipe.own_terms)
         weighted = {
             path: _weighted(column, function, attrgetter(path)(recipe), 1.0 if path in ONCE else period)
             for column, (path, function) in enumerate(table.items())
         }
+        if own:
+            for column, (name, function) in enumerate(load_terms(recipe).items(), len(table)):
+                term = recipe.own[name]
+                setting = term.weight if term.width is None else Kernel(weight=term.weight, width=term.width)
+                weighted[f"own.{name}"] = _weighted(column, function, setting, period)
         self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
         self._tracked = [weighted[path].column for path in TRACKED]
         self._once = [weighted[path].column for path in ONCE]
-        self._weights = np.array([term.weight for term in weighted.values()])
+        self._weights = np.zeros(self._columns)
+        self._weights[[term.column for term in weighted.values()]] = [term.weight for term in weighted.values()]
 
     def __call__(self, step: Step, diverged: Mask) -> Scored:
         """Reward of one control step. What diverged, (n,), cannot be judged: it costs like a fall, and no more."""

@@ -13,6 +13,7 @@ from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import buffer_fields, trial_signals
+from iowbc.task.rewards.reward import term_names
 from iowbc.task.scenes import scene_of
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
@@ -48,7 +49,9 @@ class Setup:
         """What passes between the environments and the learner."""
         robot = load_robot(self.specification.robot)
         extra = {} if self.episodes is None else trial_signals(len(robot.joints))
-        return buffer_fields(full_layout(self.specification.recipe, robot).size, len(robot.support), extra)
+        recipe = self.specification.recipe
+        terms = len(term_names(recipe.task.reward))
+        return buffer_fields(full_layout(recipe, robot).size, len(robot.support), terms, extra)
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""

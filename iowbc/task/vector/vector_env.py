@@ -19,6 +19,8 @@ from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import REASONS, SIGNALS
 from iowbc.task.record.statistics import Statistics
+from iowbc.task.rewards.own import load_terms
+from iowbc.task.rewards.reward import term_names
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.snapshots import join, split
@@ -48,11 +50,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         every reset. `divergences`: folder for simulations that diverged.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
-        raises.
+        raises, and StageFailed where episodes are drawn and a term of the reward in a user's file cannot be used.
         """
         trials = None if episodes is None else tuple(episodes)
         self.setup = Setup(specification, num_envs, seed, trials, divergences)
         recipe = specification.recipe
+        if trials is None:
+            load_terms(recipe.task.reward)  # what is wrong with them is told here, before processes start
         self.layout = full_layout(recipe, load_robot(specification.robot))
         self._scenes = self.setup.scenes
         self.workers: Workers = WorkerProcesses(self.setup, workers, patience) if workers else InProcess(self.setup)
@@ -65,7 +69,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """Values of the last step, before an automatic reset, (num_envs, k); see `iowbc.task.record.signals`."""
         self.period = 1.0 / recipe.task.control_frequency
         """Time of a control step [s]."""
-        self._statistics = Statistics(self.period, self._scenes)
+        self._statistics = Statistics(self.period, self._scenes, term_names(recipe.task.reward))
         self._began = time.monotonic()
         bound, actions = recipe.task.action.bound, self._buffers["action"].shape[1]
         super().__init__(

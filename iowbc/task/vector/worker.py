@@ -11,6 +11,7 @@ import traceback
 from multiprocessing.connection import Connection
 from typing import IO
 
+from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
 
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
@@ -54,6 +55,8 @@ def _serve(connection: Connection, memory: int) -> None:
             connection.send_bytes(pickle.dumps((True, getattr(batch, request)(*arguments))))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
+    except IowbcError as error:
+        connection.send((False, str(error)))
     except BaseException:
         connection.send((False, traceback.format_exc()))
 
