@@ -2,13 +2,14 @@
 # make run    sets everything up, then the quickstart recipe
 # make measure   makes the tables of the README anew
 # make chaos   disturbs runs 200 times and counts what is lost (docs/reliability.md)
+# make docs   builds the documentation's site into build/site, to be opened without a network
 # make leaks   watches memory and descriptors of a training for an hour
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup test lint types run measure chaos leaks image clean
+.PHONY: setup test lint types run measure docs chaos leaks image clean
 
 setup: $(READY)
 
@@ -38,6 +39,11 @@ measure: run
 	$(BIN)/iowbc bench rg
 	$(BIN)/iowbc bench sim
 	$(BIN)/iowbc bench train
+
+docs: setup
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo build/site/index.html
 
 chaos: setup
 	$(BIN)/python tests/chaos/chaos.py --events 200

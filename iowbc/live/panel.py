@@ -14,7 +14,6 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.stage import Shown
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.simulation.holding import SCENES
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.commands.drawing import nominal_command
 
@@ -98,7 +97,7 @@ class Panel:
 
     def _conditions(self) -> None:
         request, gui = self._request, self._gui
-        self.scene = gui.add_dropdown("Scene", SCENES, initial_value=request.scene)
+        self.scene = gui.add_dropdown("Scene", self._recipe.simulation.scenes.names, initial_value=request.scene)
         most = max(request.mass, self._heaviest(request.scene))
         self.mass = gui.add_slider("Mass [kg]", 0.0, most, 0.5, request.mass, hint="0 is without an object")
         share = request.partner_share or 0.0

@@ -12,7 +12,8 @@ from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
-from iowbc.sim.objects import HANDS, TORSION, inertia_per_mass
+from iowbc.sim.objects import HANDS, TORSION
+from iowbc.sim.shapes import measured
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
@@ -37,7 +38,7 @@ HEAVIEST = 1.5
 def web_scenes(world: Specification, robot: Robot) -> dict[str, Any]:
     """Every scene that a page can show, by name, at the nominal values of all that training draws."""
     scenes = world.recipe.simulation.scenes
-    return {name: _web_scene(world, robot, name) for name, scene in scenes if scene.kind in KINDS}
+    return {name: _web_scene(world, robot, name) for name, scene in scenes if _playable(scene)}
 
 
 def first_scene(recipe: Recipe) -> str:
@@ -49,7 +50,12 @@ def accepted(recipe: Recipe) -> list[tuple[str, float]]:
     """Scenes and masses [kg] of objects in the hands with which the exported controller was tried."""
     scenes = recipe.simulation.scenes
     trials = [(trial.scene, trial.mass) for trial in recipe.export.acceptance if trial.mass > 0.0]
-    return [(name, mass) for name, mass in trials if getattr(scenes, name).kind in KINDS]
+    return [(name, mass) for name, mass in trials if _playable(getattr(scenes, name))]
+
+
+def _playable(scene: Scene) -> bool:
+    """Whether the page can simulate and draw a scene; it draws no meshes."""
+    return scene.kind in KINDS and (scene.object is None or scene.object.mesh is None)
 
 
 def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
@@ -86,7 +92,7 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
         return described | {"object": None, "hold": None}
     count = started.model.nbody
     hands, wrists = (np.arange(count)[places].tolist() for places in (layout.hands, layout.wrists))
-    inertia = inertia_per_mass(scene.object)
+    shape = measured(scene.object)
     thing = {
         "body": layout.object,
         "shape": scene.object.shape,
@@ -94,10 +100,14 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
         "first": next((mass for place, mass in accepted(recipe) if place == name), scene.object.mass),
         "least": scene.object.smallest_mass,
         "most": HEAVIEST * scene.object.mass,
-        "inertia_per_mass": inertia.tolist(),
+        "inertia_per_mass": shape.principal.tolist(),
     }
     hold = _hold(
-        started, robot, scene, inertia, {key: float(drawn[key][0]) for key in ("slip_force", "surface_friction")}
+        started,
+        robot,
+        scene,
+        shape.about_axes,
+        {key: float(drawn[key][0]) for key in ("slip_force", "surface_friction")},
     )
     return described | {"object": thing, "hold": hold, "hands": hands, "wrists": wrists}
 

@@ -1,0 +1,111 @@
+"""The tutorials, as a reader follows them, at the smallest size."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+import typer
+import yaml
+from pages import DOCS, commands, write
+from stage_jobs import make_job
+
+from iowbc.cli import app
+from iowbc.learning.curves import TABLE
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.robot.description import load_robot
+from iowbc.stages import teacher
+from iowbc.task.specification import Specification
+from iowbc.task.vector.vector_env import VectorEnv
+
+ROOT = DOCS.parent
+TINY = (
+    *("task.references.use_rg=false", "task.episode_duration=[0.2, 1.0]", "teacher.environments=4"),
+    *("teacher.rollout=16", "teacher.steps=64", "teacher.minibatches=2", "teacher.epochs=1", "teacher.hidden=[16, 8]"),
+    *("teacher.check.every=1", "teacher.check.trials=1", "teacher.check.sequence=[{duration: 0.2, ramp: 0.0}]"),
+)
+PAGES = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.glob("tutorials/*.md"))
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A folder such as `iowbc init` makes."""
+    for name in ("recipes", "robots"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+def test_there_are_four_and_the_site_lists_them() -> None:
+    listed = (ROOT / "mkdocs.yml").read_text()
+    assert len(PAGES) == 4
+    assert all(page in listed for page in PAGES)
+    assert all(path.name in listed for path in DOCS.glob("*.md"))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_a_tutorial_types_is_understood(page: str) -> None:
+    program = typer.main.get_command(app)
+    for words in commands(page):
+        command, context = program, click.Context(program, info_name="iowbc")
+        while isinstance(command, click.Group):
+            name, found, words = command.resolve_command(context, list(words))
+            assert found is not None, name
+            command = found
+            context = click.Context(command, info_name=name, parent=context)
+        command.make_parser(context).parse_args(list(words))
+
+
+def trained(recipe_file: Path, folder: Path) -> str:
+    """The table of curves of the smallest training."""
+    job = make_job(folder, load_recipe(recipe_file, TINY).recipe, workers=1)
+    teacher.run(job)
+    return (job.out / TABLE).read_text()
+
+
+def test_change_a_reward(place: Path, tmp_path: Path) -> None:
+    write("tutorials/reward.md", place)
+    changed = load_recipe(place / "recipes" / "calmer.yaml").recipe.task.reward
+    assert (changed.smooth.action_rate, changed.sync.height.weight) == (-0.05, 2.0)
+    curves = trained(place / "recipes" / "symmetric.yaml", tmp_path / "job")
+    assert "reward/own.leg_symmetry" in curves.splitlines()[0]
+
+
+def test_add_an_object(place: Path) -> None:
+    write("tutorials/object.md", place)
+    corners = [(x, y, z) for x in (0, 300) for y in (0, 250) for z in (0, 200)]
+    sides = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {a} {b} {c} {d}" for a, b, c, d in sides]
+    (place / "recipes" / "crag.obj").write_text("\n".join(lines))
+    for name in ("barrel", "crag"):
+        recipe = load_recipe(place / "recipes" / f"{name}.yaml", ["task.references.use_rg=false"]).recipe
+        env = VectorEnv(Specification(recipe, place / "robots" / "g1"), num_envs=10, workers=0, seed=0)
+        try:
+            env.reset()
+            for _ in range(3):
+                env.step(np.zeros((10, 15), np.float32))
+            assert env.get_attr("scene").count("barrel") == 6
+            assert not env.signals["diverged"].any()
+        finally:
+            env.close()
+
+
+def test_add_a_robot(place: Path) -> None:
+    write("tutorials/robot.md", place)
+    subprocess.run([sys.executable, "make_g1_23.py"], cwd=place, check=True)
+    robot = load_robot(place / "robots" / "g1_23")
+    assert len(robot.joints) == 23
+    recipe = load_recipe(place / "recipes" / "g1_23.yaml", TINY).recipe
+    assert recipe.robot == "g1_23"
+    env = VectorEnv(Specification(recipe, robot.folder), num_envs=2, workers=0, seed=0)
+    env.reset()
+    env.close()
+
+
+def test_the_documentations_files_are_yaml_that_recipes_can_be(place: Path) -> None:
+    for page in PAGES:
+        write(page, place)
+    for path in (place / "recipes").glob("*.yaml"):
+        assert isinstance(yaml.safe_load(path.read_text()), dict), path
