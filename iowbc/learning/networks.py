@@ -8,6 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from iowbc.learning.encoders import ENCODERS, EncoderName, MirroredEncoder
+from iowbc.learning.estimate import Estimate
 from iowbc.learning.perceptron import DenseMlp, Perceptron
 from iowbc.learning.symmetric import SymmetricMlp, paired
 from iowbc.robot.mirror import MirrorMap, side_by_side
@@ -93,8 +94,8 @@ def swap(pairs: int) -> MirrorMap:
 class StudentNetwork(nn.Module):
     """Mean action of the student: the history H_t, shape (n, K, S), oldest first, to a, shape (n, A).
 
-    An encoder turns the history into a latent of what the load does to the robot; the body sees it beside the newest
-    observation.
+    An encoder turns the history into a latent of what the load does to the robot; the body sees it, or the s_priv that
+    is read from it, beside the newest observation.
     """
 
     log_std: Tensor
@@ -111,11 +112,16 @@ class StudentNetwork(nn.Module):
         clip: float,
         encoder: EncoderName = "mlp",
         mirrors: Any = None,
+        privileged: Any = None,
     ) -> None:
-        """`mirrors`: of observation and action, as `mirror_as_json` gives them; the network then commutes with them."""
+        """`mirrors`: of observation and action, as `mirror_as_json` gives them; the network then commutes with them.
+
+        `privileged`: mirror of s_priv, where the body is to see an estimate of it: what a teacher's body sees.
+        """
         super().__init__()
         self.normalizer = Normalizer(observation, clip)
         both = mirrors_from_json(mirrors)
+        extra = None if privileged is None else mirror_from_json(privileged)
         make = ENCODERS[encoder]
         body = None
         if both is None:
@@ -123,8 +129,10 @@ class StudentNetwork(nn.Module):
         else:
             half = make(observation, history, frame_features, paired(latent), activation)
             self.encoder = MirroredEncoder(half, both[0])
-            body = side_by_side((both[0], swap(paired(latent)))), both[1]
-        self.body = perceptron(observation + latent, hidden, actions, activation, body)
+            body = side_by_side((both[0], swap(paired(latent)) if extra is None else extra)), both[1]
+        self.estimate = None if extra is None else Estimate(latent, len(extra), None if both is None else extra)
+        seen = observation + (latent if extra is None else len(extra))
+        self.body = perceptron(seen, hidden, actions, activation, body)
         self.register_buffer("log_std", torch.zeros(actions))
 
     def forward(self, history: Tensor) -> Tensor:
@@ -137,4 +145,5 @@ class StudentNetwork(nn.Module):
 
     def act(self, newest: Tensor, latent: Tensor) -> Tensor:
         """The mean action."""
-        return cast(Tensor, self.body(torch.cat([newest, latent], dim=1)))
+        told = latent if self.estimate is None else self.estimate(latent)
+        return cast(Tensor, self.body(torch.cat([newest, told], dim=1)))

@@ -33,6 +33,7 @@ class Rows:
     facts: NDArray[np.int64]
     """What the latent is to tell: places of the object's mass and the base's velocity."""
     observation_mirror: MirrorMap
+    privileged_mirror: MirrorMap
     facts_mirror: MirrorMap
     action_mirror: MirrorMap
 
@@ -45,11 +46,13 @@ class StudentTraining:
         settings: Distillation,
         environments: Environments,
         teacher: TeacherNetwork,
+        teachers: Mapping[str, Any],
         rows: Rows,
         symmetry: Symmetry,
         seed: int,
     ) -> None:
-        """`symmetry`: as the teacher's. Observations are normalised as the teacher's are."""
+        """`teachers`: arguments that rebuild the teacher; `symmetry`: as the teacher's. Observations are normalised as
+        the teacher's are."""
         torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
         torch.manual_seed(seed)
         keep_freed_memory()
@@ -57,19 +60,23 @@ class StudentTraining:
         self.teacher = TeacherPolicy(teacher)
         size, actions = rows.observation.stop, environments.action_space.shape[0]
         mirrors = [mirror_as_json(rows.observation_mirror), mirror_as_json(rows.action_mirror)]
+        inherits = settings.start == "teacher"
         self.architecture: dict[str, Any] = {
             "observation": size,
             "history": settings.history,
             "actions": actions,
             "frame_features": settings.frame_features,
             "latent": settings.latent,
-            "hidden": list(settings.hidden),
-            "activation": settings.activation,
+            "hidden": list(teachers["hidden"] if inherits else settings.hidden),
+            "activation": teachers["activation"] if inherits else settings.activation,
             "clip": teacher.normalizer.clip,
             "encoder": settings.encoder,
             "mirrors": mirrors if symmetry == "construction" else None,
+            "privileged": mirror_as_json(rows.privileged_mirror) if inherits else None,
         }
         self.network = StudentNetwork(**self.architecture)
+        if inherits:
+            self.network.body.load_state_dict(teacher.body.state_dict())
         self.network.normalizer.mean.copy_(teacher.normalizer.mean[rows.observation])
         self.network.normalizer.std.copy_(teacher.normalizer.std[rows.observation])
         floor = float(np.log(settings.std_floor))

@@ -26,10 +26,14 @@ class Distillation(Section):
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1, le=16_384)
     """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
+    start: Literal["teacher", "anew"] = "teacher"
+    """What the body behind the encoder begins as. `teacher`: the teacher's own body; where that sees s_priv, it sees
+    what a linear map reads from the latent, at first the mean of training. Nothing of the teacher has to be learnt
+    again, and all that is learnt is what the history tells. `anew`: from nothing, on the latent itself."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
-    """Hidden layers behind the encoder (paper Table I)."""
+    """Hidden layers behind the encoder (paper Table I), where they start anew; else they are the teacher's."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
-    """Activation of the hidden layers."""
+    """Activation of the encoder, and of the hidden layers where they start anew."""
     learning_rate: float = Field(default=5e-4, gt=0)
     """Adam's step size at the start; it falls to a tenth along a cosine."""
     gradient_norm: float = Field(default=1.0, gt=0)

@@ -60,10 +60,13 @@ def run(job: Job) -> None:
             privileged=layout.privileged,
             facts=np.concatenate([np.arange(layout.size)[layout.slices[f"privileged/{name}"]] for name in FACTS]),
             observation_mirror=layout.state.mirror,
+            privileged_mirror=layout.extra.mirror,
             facts_mirror=side_by_side([own[name] for name in FACTS]),
             action_mirror=action_mirror(robot),
         )
-        training = StudentTraining(settings, environments, teacher, rows, recipe.teacher.symmetry, recipe.seed)
+        training = StudentTraining(
+            settings, environments, teacher, about["architecture"], rows, recipe.teacher.symmetry, recipe.seed
+        )
         curves = train(job, training, settings.checkpoint_every, _note)
     finally:
         environments.close()
@@ -79,7 +82,7 @@ def _note(values: Mapping[str, float]) -> str:
 
 STAGE = Stage(
     name="distill",
-    version=3,
+    version=4,
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
     reads=lambda recipe: (*generator_stage(recipe), "teacher"),
     run=run,

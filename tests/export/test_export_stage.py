@@ -21,6 +21,7 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.viewer import require_display
 from iowbc.export import golden
 from iowbc.export.graph import ControllerGraph
+from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.evaluation.segment import Segment
@@ -148,6 +149,8 @@ def test_targets_that_differ_from_the_simulations_fail_the_stage(
 
 def test_a_privileged_policy_is_not_exported(robot: Robot, rg: Path, tmp_path: Path) -> None:
     (tmp_path / "teacher").mkdir()
+    about: dict[str, Any] = {"inputs": 9, "actions": 15, "hidden": [8], "activation": "elu", "clip": 10.0}
+    save_network(TeacherNetwork(**about), about, tmp_path / "teacher", "teacher", {})
     with pytest.raises(StageFailed, match="holds no student"):
         export.run(job(tmp_path, robot, rg, tmp_path / "teacher"))
 

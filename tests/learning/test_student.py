@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from point_masses import MIRRORS, PointMasses
 
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.encoders import ENCODERS, EncoderName
-from iowbc.learning.networks import StudentNetwork, mirror_as_json
+from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
 from iowbc.learning.storage import load_student, save_network
+from iowbc.learning.student import Rows, StudentTraining
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap
@@ -58,6 +60,63 @@ def test_every_encoder_sees_the_oldest_observation_and_any_length_of_history(
         changed[:, 0] += 5.0
         assert network(history).shape == (3, 3)
         assert not torch.allclose(network(history), network(changed))
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_what_is_read_from_the_latent_is_mirrored_as_s_priv_is(symmetric: bool) -> None:
+    torch.manual_seed(0)
+    network = StudentNetwork(**architecture("mlp", symmetric), privileged=mirror_as_json(FACTS))
+    assert network.estimate is not None
+    for parameter in network.estimate.parameters():
+        torch.nn.init.normal_(parameter)
+    history = torch.randn(40, 9, 4)
+    with torch.no_grad():
+        told, seen = (network.estimate(network.read(h)[1]) for h in (history, mirror_tensor(OBSERVATION, history)))
+        action, mirrored = network(history), network(mirror_tensor(OBSERVATION, history))
+    assert told.shape == (40, 2)
+    assert torch.allclose(seen, mirror_tensor(FACTS, told), atol=1e-5) == symmetric
+    assert torch.allclose(mirrored, mirror_tensor(ACTION, action), atol=1e-5) == symmetric
+
+
+def students_training(symmetry: Symmetry, **changes: Any) -> tuple[StudentTraining, TeacherNetwork]:
+    """Of a teacher of unit masses that sees their distance, which the student does not."""
+    torch.manual_seed(0)
+    mirrors = [mirror_as_json(mirror) for mirror in MIRRORS] if symmetry == "construction" else None
+    architecture = {"inputs": 3, "actions": 1, "hidden": [16], "activation": "elu", "clip": 10.0, "mirrors": mirrors}
+    teacher = TeacherNetwork(**architecture)
+    teacher.normalizer.mean[2], teacher.normalizer.std[2] = 0.5, 0.3
+    seen = MirrorMap(MIRRORS[0].permutation[:2], MIRRORS[0].sign[:2])
+    alone = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
+    rows = Rows(slice(0, 2), slice(2, 3), np.array([2]), seen, alone, alone, MIRRORS[1])
+    settings = Distillation(
+        environments=8,
+        rollout=8,
+        history=3,
+        frame_features=8,
+        latent=8,
+        hidden=(16,),
+        batch=64,
+        buffer=512,
+        steps=2560,
+        learning_rate=2e-3,
+    ).model_copy(update=changes)
+    return StudentTraining(settings, PointMasses(), teacher, architecture, rows, symmetry, seed=0), teacher
+
+
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
+def test_a_student_begins_as_the_teacher_that_is_told_the_mean_and_learns_the_rest(symmetry: Any) -> None:
+    training, teacher = students_training(symmetry)
+    newest = torch.randn(20, 2)
+    told = torch.cat([newest, torch.full((20, 1), 0.5)], dim=1)
+    with torch.no_grad():
+        torch.testing.assert_close(training.network(newest[:, None].repeat(1, 3, 1)), teacher(told))
+    first, *_, last = [training.update()["action_rmse"] for _ in range(40)]
+    assert last < 0.5 * first, (first, last)
+    kept = {name: np.array(value) for name, value in training.arrays().items()}
+    again, _ = students_training(symmetry)
+    again.restore(kept)
+    for name, value in again.arrays().items():
+        np.testing.assert_array_equal(value, kept[name], err_msg=name)
 
 
 @pytest.mark.parametrize("encoder", list(ENCODERS))
