@@ -11,7 +11,7 @@ from iowbc.commands.in_training import InTraining, in_training
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
 from iowbc.commands.training import require_training
-from iowbc.errors import Damaged, Interrupted, UsageError
+from iowbc.errors import Damaged, Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import remaking
@@ -29,7 +29,7 @@ CONTRACT = "contract.json"
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
-    source = named_source(store, console, word, stage)
+    source = named_source(store, console, word, stage, request.scene)
 
     from iowbc.evaluation.play import play
 
@@ -45,8 +45,9 @@ def play_word(store: Store, console: Console, word: str, stage: str | None, requ
     return 0
 
 
-def named_source(store: Store, console: Console, word: str, stage: str | None) -> "Source":
-    """What a word and `--stage` name, told on the console while it is trained. Raises `UsageError`."""
+def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
+    """What a word and `--stage` name, told on the console while it is trained. Raises `UsageError`, also for a `scene`
+    that its recipe has not."""
     from iowbc.evaluation.play import exported_source
 
     if (Path(word) / CONTRACT).is_file():
@@ -56,7 +57,11 @@ def named_source(store: Store, console: Console, word: str, stage: str | None) -
         console.print(training.text, markup=False, highlight=False, soft_wrap=True)
         if training.recipe is not None:
             return _training_source(store, training, training.recipe)
-    return artifact_source(store, playable(store, word, stage))
+    artifact = playable(store, word, stage)
+    scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
+    if scene is not None and scenes:
+        require_known(scene, "scene", scenes)
+    return artifact_source(store, artifact)
 
 
 def artifact_source(store: Store, artifact: Artifact) -> "Source":
