@@ -1,6 +1,7 @@
 """The contract of an exported policy: everything that a caller on the robot must know, as JSON beside the graph."""
 
 import hashlib
+import json
 import math
 import os
 from collections.abc import Iterator
@@ -195,10 +196,21 @@ def readable(part: Path) -> Iterator[None]:
 
 
 def exported_folder(word: Path | str) -> Path:
-    """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`."""
-    folder = Path(word)
-    named = Path(os.environ.get("IOWBC_RUNS") or "runs") / word / "export"
-    return named if not (folder / CONTRACT).is_file() and (named / CONTRACT).is_file() else folder
+    """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`; where it was
+    not run here, what came with the repository."""
+    folder, runs = Path(word), Path(os.environ.get("IOWBC_RUNS") or "runs")
+    made, published = runs / word / "export", sorted(runs.glob("published/export/*"))
+    shipped = [place for place in published if _recipe_name(place) == str(word)]
+    return next((place for place in (folder, made, *shipped) if (place / CONTRACT).is_file()), folder)
+
+
+def _recipe_name(folder: Path) -> str | None:
+    """Name of the recipe that an exported folder was made by, if it can be read."""
+    try:
+        name = json.loads((folder / RECIPE).read_bytes())["name"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return name if isinstance(name, str) else None
 
 
 def read_contract(folder: Path | str) -> Contract:

@@ -62,6 +62,16 @@ def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     assert exported_folder("mine") == Path("runs/mine/export")
     assert exported_folder("nothing") == Path("nothing")
+    shipped = Path("runs/published/export/0123")
+    shipped.mkdir(parents=True)
+    (shipped / "contract.json").write_text("{}")
+    for text in ("", "[]", '{"name": 3}'):
+        (shipped / "recipe.json").write_text(text)
+        assert exported_folder("shipped") == Path("shipped")
+    (shipped / "recipe.json").write_text('{"name": "shipped"}')
+    assert exported_folder("shipped") == shipped
+    (shipped / "recipe.json").write_text('{"name": "mine"}')
+    assert exported_folder("mine") == Path("runs/mine/export"), "what was made here comes first"
     monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
     monkeypatch.chdir("/")
     assert exported_folder("mine") == export

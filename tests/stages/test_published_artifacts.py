@@ -7,11 +7,12 @@ import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
+from iowbc.deploy.controller import Controller
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("recipe", "last"), [("full", "teacher"), ("teacher", "teacher"), ("quickstart", "export")])
+@pytest.mark.parametrize(("recipe", "last"), [("full", "teacher"), ("teacher", "teacher")])
 def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last: str, tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
@@ -22,3 +23,11 @@ def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last:
     states = {stage["stage"]: stage["cached"] and stage["published"] for stage in plan["stages"]}
     assert all(states.values()), (states, plan["stages"])
     assert last in states
+
+
+def test_a_fresh_clone_has_a_controller_to_try(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IOWBC_RUNS", str(ROOT / "runs"))
+    controller = Controller.load("quickstart")
+    assert controller.robot.name == "g1"
+    (folder,) = (ROOT / "runs" / "published" / "export").iterdir()
+    assert json.loads((folder / "summary.json").read_text())["metrics"]["acceptance_survived"] >= 4
