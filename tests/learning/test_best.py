@@ -8,6 +8,7 @@ import torch
 from point_masses import MIRRORS, PointMasses
 
 from iowbc.errors import StageFailed
+from iowbc.learning.acting import Policy, TeacherPolicy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.check import Check
@@ -23,8 +24,9 @@ class Scores:
         self.scores = list(scores)
         self.networks: list[TeacherNetwork] = []
 
-    def __call__(self, network: TeacherNetwork) -> dict[str, float]:
-        self.networks.append(network)
+    def __call__(self, policy: Policy) -> dict[str, float]:
+        assert isinstance(policy, TeacherPolicy)
+        self.networks.append(policy.network)
         return {"score": self.scores[len(self.networks) - 1]}
 
 
