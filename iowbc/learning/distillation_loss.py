@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iowbc.learning.gaussian import divergence
+from iowbc.learning.gaussian import divergence, std_places
 from iowbc.learning.networks import StudentNetwork, perceptron, swap
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap
@@ -46,10 +46,8 @@ class DistillationLoss(nn.Module):
         self.register_buffer("teacher_log_std", teacher_log_std.clone())
         self.actions, facts = len(teacher_log_std), len(mirrors.facts_mirror)
         symmetric = symmetry == "construction"
-        own = np.arange(self.actions)
-        kinds, place = np.unique(
-            np.minimum(own, mirrors.action_mirror.permutation) if symmetric else own, return_inverse=True
-        )
+        place = std_places(self.actions, mirrors.action_mirror if symmetric else None)
+        kinds = np.unique(place, return_index=True)[1]
         self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
         self.log_stds = nn.Parameter(teacher_log_std[kinds].clone(), requires_grad=settings.std == "learnt")
         """One for each pair of actions that the mirror swaps, and one for each other."""

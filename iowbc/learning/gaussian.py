@@ -2,8 +2,12 @@
 
 import math
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
+
+from iowbc.robot.mirror import MirrorMap
 
 LOG_TWO_PI = math.log(2.0 * math.pi)
 
@@ -23,3 +27,9 @@ def divergence(mean: Tensor, log_std: Tensor, other_mean: Tensor, other_log_std:
     """D_KL(N(mean, std²) || N(other_mean, other_std²)) in closed form, summed over the action, (n, A) to (n,)."""
     squares = torch.exp(2.0 * log_std) + (mean - other_mean) ** 2
     return (other_log_std - log_std + 0.5 * squares * torch.exp(-2.0 * other_log_std) - 0.5).sum(-1)
+
+
+def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
+    """Which standard deviation each action has, (A,): actions that the mirror swaps share one."""
+    own = np.arange(actions) if mirror is None else np.minimum(np.arange(actions), mirror.permutation)
+    return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)

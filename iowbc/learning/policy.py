@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
 
-from iowbc.learning.gaussian import log_density
+from iowbc.learning.gaussian import log_density, std_places
 from iowbc.learning.history_actor import HistoryActor, HistoryNormalizer, NewestCritic
 from iowbc.learning.networks import Normalizer, mirrors_from_json, perceptron
 from iowbc.learning.perceptron import Perceptron
@@ -19,12 +18,6 @@ INVARIANT = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
 """Mirror of the value: a state and its mirror image are worth the same."""
 HIDDEN_GAIN, POLICY_GAIN, VALUE_GAIN = float(np.sqrt(2.0)), 0.01, 1.0
 """Gains of the orthogonal weights at the start, as stable-baselines3 has them: the policy starts as the reference."""
-
-
-def std_places(actions: int, mirror: MirrorMap | None) -> NDArray[np.int64]:
-    """Which standard deviation each action has, (A,): actions that the mirror swaps share one."""
-    own = np.arange(actions) if mirror is None else np.minimum(np.arange(actions), mirror.permutation)
-    return np.asarray(np.unique(own, return_inverse=True)[1], np.int64)
 
 
 class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]

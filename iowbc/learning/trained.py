@@ -8,9 +8,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from iowbc.learning.gaussian import std_places
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork, mirror_as_json
-from iowbc.learning.policy import std_places
 from iowbc.learning.storage import Network
 from iowbc.recipe.teacher import Teacher
 

@@ -7,12 +7,26 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
+from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap
 
 MIRRORS = (
     MirrorMap(np.array([0, 1, 2]), np.array([-1, -1, 1], np.float32)),
     MirrorMap(np.array([0]), np.array([-1], np.float32)),
 )
+
+SETTINGS = Teacher(
+    steps=16 * 8 * 6,
+    environments=8,
+    rollout=16,
+    minibatches=2,
+    hidden=(16,),
+    learning_rate=1e-3,
+    gamma=0.9,
+    precision="float32",
+    std_learning_rate=1e-2,
+)
+"""With which a training learns it in seconds."""
 
 
 class PointMasses(VecEnv):  # type: ignore[misc]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from point_masses import MIRRORS, PointMasses
+from point_masses import SETTINGS as POINT_MASSES
 
 from iowbc.learning.acting import StudentPolicy, policy_of
 from iowbc.learning.checkpoint import save_checkpoint
@@ -20,18 +21,7 @@ from iowbc.robot.mirror import MirrorMap
 SEEN, LENGTH = 2, 4
 """Of a mass its position and velocity are observed; the distance is privileged."""
 NETWORK = HistoryNetwork(length=LENGTH, frame_features=8, latent=8)
-SETTINGS = Teacher(
-    steps=16 * 8 * 60,
-    environments=8,
-    rollout=16,
-    minibatches=2,
-    hidden=(16,),
-    learning_rate=1e-3,
-    gamma=0.9,
-    precision="float32",
-    std_learning_rate=1e-2,
-    history=NETWORK,
-)
+SETTINGS = POINT_MASSES.model_copy(update={"steps": 16 * 8 * 60, "history": NETWORK})
 
 
 def training(**changes: Any) -> TeacherTraining:

@@ -4,24 +4,12 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from point_masses import MIRRORS, PointMasses
+from point_masses import MIRRORS, SETTINGS, PointMasses
 
 from iowbc.learning import ppo
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
-
-SETTINGS = Teacher(
-    steps=16 * 8 * 6,
-    environments=8,
-    rollout=16,
-    minibatches=2,
-    hidden=(16,),
-    learning_rate=1e-3,
-    gamma=0.9,
-    precision="float32",
-    std_learning_rate=1e-2,
-)
 
 
 def training(**changes: Any) -> TeacherTraining:
