@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import DEEPEST, Section, Width
+from iowbc.recipe.section import DEEPEST, LATER, Section, Width
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -89,6 +89,10 @@ class Problem(Section):
     """Leg joints about other axes (roll, yaw) against the default posture [1/rad²]."""
     waist_weight: Positive = 5.0
     """Waist joints [1/rad²]. Without it hips and waist share the pitch arbitrarily, and the optimum jumps."""
+    waist_share: Share = Field(default=0.0, json_schema_extra=LATER)
+    """Part of the commanded torso pitch that the waist is drawn to, as far as it turns; hips take the rest. At 1 the
+    pelvis stays level up to a bow of 0.5 rad, as the gait has it, and a load that the waist's motors cannot hold
+    there sinks no further than the joint's stop."""
     friction: Positive = 0.6
     """Friction coefficient of the soles that a label may use; the simulation draws 0.5 to 1.2."""
     sole_fraction: Annotated[float, Field(gt=0, le=1)] = 0.9

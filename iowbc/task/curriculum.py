@@ -112,6 +112,8 @@ def _success(curriculum: Curriculum, played: Array, course: Course) -> Mask:
     there = (course.covered >= curriculum.progress) & (course.heading <= curriculum.heading)
     beyond = course.infeasible | (played[:, LOCOMOTION] > OWN_RANGES + ROUNDING)
     success = np.repeat(steady[:, None], len(AXES), axis=1)
+    carried = ~walked | course.infeasible | (course.covered >= curriculum.load_progress)
+    success[:, LOAD] &= carried
     success[:, LOCOMOTION] = walked & course.survived & np.where(beyond, steady, there)
     return success
 

@@ -49,6 +49,15 @@ def test_standing_where_walking_is_asked_for_raises_everything_but_locomotion_an
     assert moved(replace(WELL, heading=np.array([0.9])))["locomotion"] == 0.0
 
 
+def test_a_load_grows_only_where_it_was_carried_along() -> None:
+    recipe = RECIPE.model_copy(update={"load_progress": 0.4})
+    short = replace(WELL, covered=np.array([0.3]))
+    assert moved(short, recipe=recipe) == {"posture": 0.1, "locomotion": 0.0, "load": 0.0, "disturbance": 0.1}
+    assert moved(replace(short, walked=np.ones(1)), recipe=recipe)["load"] == 0.1
+    assert moved(replace(short, infeasible=YES), recipe=recipe)["load"] == 0.1
+    assert moved(WELL, recipe=recipe)["load"] == 0.1
+
+
 def test_an_episode_without_walking_says_nothing_about_locomotion() -> None:
     assert moved(replace(WELL, walked=np.zeros(1), covered=np.ones(1)))["locomotion"] == 0.0
 

@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import LATER, Section
 
 
 class Scale(Section):
@@ -85,6 +85,9 @@ class Curriculum(Section):
     progress: float = Field(default=0.6, ge=0.0, le=1.0)
     """Part of the commanded displacement that a success of locomotion covers, counted along the command and no faster
     than it; 1 is the command itself. Above level 1, where a command may be infeasible, posture counts in its place."""
+    load_progress: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
+    """Part of the commanded displacement that an episode with walking covers before its load grows; 0 asks for none.
+    Crates grow heavier behind statues, too, until nobody has seen one roll."""
     heading: float = Field(default=0.5, gt=0.0)
     """Mean heading error [rad] that a success of locomotion may have; above level 1 it does not count."""
     lagging: float = Field(default=0.2, ge=0.0, le=1.0)

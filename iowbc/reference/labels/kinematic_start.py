@@ -16,10 +16,9 @@ class KinematicStart:
 
     def __init__(self, support: SupportModel, height: Literal["pelvis", "com"]) -> None:
         self.support, self.height = support, height
-        self.rest = support.start()
         problem = support.problem
         task = [problem.com_weight] * 2 + [problem.height_weight] + [problem.torso_weight] * 3
-        self.angle_rows = np.eye(len(self.rest) - 7, support.model.nv, 6)
+        self.angle_rows = np.eye(len(support.robot.support), support.model.nv, 6)
         self.weight = np.sqrt(np.concatenate([task, posture_weights(support.robot, problem)]))
 
     def posture(self, sample: Sample) -> Array:
@@ -29,9 +28,10 @@ class KinematicStart:
         Raises `Rejected` where the feet cannot stay in place.
         """
         support, problem = self.support, self.support.problem
-        q, largest = self.rest.copy(), problem.largest_step
+        q, largest = support.rest(sample), problem.largest_step
+        rest = q[7:].copy()
         for _ in range(problem.iterations):
-            gradient, residual, equality, error = self._linearise(q, sample)
+            gradient, residual, equality, error = self._linearise(q, sample, rest)
             lower, upper = np.maximum(support.lower - q[7:], -largest), np.minimum(support.upper - q[7:], largest)
             step = constrained_step(gradient, residual, equality, error, self.angle_rows, lower, upper)
             q = pinocchio.integrate(support.model, q, step)
@@ -39,7 +39,7 @@ class KinematicStart:
                 break
         return q
 
-    def _linearise(self, q: Array, sample: Sample) -> tuple[Array, Array, Array, Array]:
+    def _linearise(self, q: Array, sample: Sample, rest: Array) -> tuple[Array, Array, Array, Array]:
         support, model, data = self.support, self.support.model, self.support.data
         com_rows = pinocchio.jacobianCenterOfMass(model, data, q)
         pinocchio.updateFramePlacements(model, data)
@@ -49,7 +49,7 @@ class KinematicStart:
         lift = com[2] if of_com else data.oMf[support.base].translation[2]
         turn = pinocchio.log3(sample.torso_rotation().T @ data.oMf[support.torso].rotation)
         gradient = np.concatenate([com_rows[:2], (com_rows if of_com else base)[2:3], torso[3:], self.angle_rows])
-        residual = np.concatenate([com[:2], [lift - sample.height], turn, (q - self.rest)[7:]])
+        residual = np.concatenate([com[:2], [lift - sample.height], turn, q[7:] - rest])
         equality = np.concatenate([pinocchio.getFrameJacobian(model, data, f, pinocchio.LOCAL) for f in support.soles])
         error = np.concatenate(
             [

@@ -34,7 +34,6 @@ class OptimalControlMethod:
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
         if self.actuation.nu != len(support.robot.support):
             raise ValueError(f"crocoddyl sees {self.actuation.nu} actuated joints, not {len(support.robot.support)}")
-        self.rest = np.concatenate([support.start(), np.zeros(support.model.nv)])
         self.kinematic = KinematicStart(support, recipe.height)
         self.posture = posture_weights(support.robot, recipe.problem)
         self.limits = sole_limits(support.robot, recipe.problem)
@@ -87,6 +86,7 @@ class OptimalControlMethod:
         factor = self.ocp.terminal_factor if terminal else 1.0
         velocity = self.ocp.terminal_velocity_weight / factor if terminal else self.ocp.velocity_weight
         costs = crocoddyl.CostModelSum(state, nu)
+        rest = np.concatenate([support.rest(sample), np.zeros(support.model.nv)])
 
         def add(name: str, residual: Any, weights: Array) -> None:
             activation = crocoddyl.ActivationModelWeightedQuad(weights)
@@ -102,21 +102,21 @@ class OptimalControlMethod:
         turn = crocoddyl.ResidualModelFrameRotation(state, support.torso, sample.torso_rotation(), nu)
         add("torso", turn, np.full(3, problem.torso_weight))
         weights = np.concatenate([np.zeros(6), self.posture, np.full(support.model.nv, velocity)])
-        add("posture", crocoddyl.ResidualModelState(state, self.rest, nu), weights)
-        self._add_limits(costs, factor)
+        add("posture", crocoddyl.ResidualModelState(state, rest, nu), weights)
+        self._add_limits(costs, rest, factor)
         if not terminal:
             add("torque", crocoddyl.ResidualModelControl(state, nu), np.full(nu, problem.torque_weight))
             self._add_cones(costs)
         return costs
 
-    def _add_limits(self, costs: Any, factor: float) -> None:
+    def _add_limits(self, costs: Any, rest: Array, factor: float) -> None:
         support, nv = self.support, self.support.model.nv
         free = np.full(nv, np.inf)
-        angle = self.rest[7 : support.model.nq]
+        angle = rest[7 : support.model.nq]
         lower = np.concatenate([-free[:6], support.lower - angle, -free])
         upper = np.concatenate([free[:6], support.upper - angle, free])
         barrier = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(lower, upper))
-        residual = crocoddyl.ResidualModelState(self.state, self.rest, self.actuation.nu)
+        residual = crocoddyl.ResidualModelState(self.state, rest, self.actuation.nu)
         cost = crocoddyl.CostModelResidual(self.state, barrier, residual)
         costs.addCost("joint limits", cost, factor * self.ocp.limit_weight)
 

@@ -53,22 +53,23 @@ class StaticMethod:
         """The label of a sample. Raises `Rejected` with "infeasible" or "not converged"."""
         support, problem = self.support, self.problem
         support.lock(sample)
+        rest = support.rest(sample)[7:]
         torso = pinocchio.SE3(sample.torso_rotation(), np.zeros(3))
         q = self.start.copy()
         wrench = np.zeros((2, 6))
         wrench[:, 2] = 0.5 * self.weight
         for _ in range(problem.iterations):
-            step, forces = self._step(q, wrench, sample, torso)
+            step, forces = self._step(q, wrench, sample, rest, torso)
             q = pinocchio.integrate(support.model, q, step)
             wrench = wrench + forces
             if np.abs(step).max() < problem.tolerance:
                 return Posture(q, wrench)
         raise Rejected("not converged")
 
-    def _step(self, q: Array, wrench: Array, sample: Sample, torso: Any) -> tuple[Array, Array]:
+    def _step(self, q: Array, wrench: Array, sample: Sample, rest: Array, torso: Any) -> tuple[Array, Array]:
         """One Gauss-Newton step: tangent (21,) and change of the wrenches (2, 6)."""
         support, nv = self.support, self.velocities
-        residual, gradient, torque, torque_rows, equality, error = self._linearise(q, wrench, sample, torso)
+        residual, gradient, torque, torque_rows, equality, error = self._linearise(q, wrench, sample, rest, torso)
         angle, largest = q[7:], self.problem.largest_step
         rows = np.concatenate([self.angle_rows, torque_rows, self.cone_rows])
         lower = np.concatenate(
@@ -85,7 +86,7 @@ class StaticMethod:
         return step[:nv], step[nv:].reshape(2, 6)
 
     def _linearise(
-        self, q: Array, wrench: Array, sample: Sample, torso: Any
+        self, q: Array, wrench: Array, sample: Sample, rest: Array, torso: Any
     ) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Weighted residual and its Jacobian, joint torques and theirs, equality Jacobian and error, at (q, wrench)."""
         support, nv, joints = self.support, self.velocities, self.joints
@@ -123,7 +124,7 @@ class StaticMethod:
                 [height - sample.height],
                 pinocchio.log3(torso.rotation.T @ data.oMf[support.torso].rotation),
                 static[6:],
-                q[7:] - self.start[7:],
+                q[7:] - rest,
             ]
         )
         weighted = self.root_weight[:, None] * gradient

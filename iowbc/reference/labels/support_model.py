@@ -71,6 +71,14 @@ class SupportModel:
         q[:3] = -0.5 * (soles[0] + soles[1])
         return q
 
+    def rest(self, sample: Sample) -> Array:
+        """The posture that a label is drawn to, shape (22,): the default one, with the waist's part of the lean."""
+        q = self.start()
+        waist = self.robot.waist_pitch
+        lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / len(waist)
+        q[7 + waist] = np.clip(lean, self.lower[waist], self.upper[waist])
+        return q
+
     def external(self, wrench: Array) -> Any:
         """Ground wrenches (2, 6) as pinocchio's list of forces in the joints' frames."""
         forces = pinocchio.StdVec_Force()

@@ -7,7 +7,7 @@ import pinocchio
 import pytest
 
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.generator import LabelGates, ReferenceGenerator
+from iowbc.recipe.generator import LabelGates, Problem, ReferenceGenerator
 from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.gates import Judge
@@ -36,6 +36,15 @@ def test_mid_horizon_postures_equal_static_labels(
     for height, pitch in COMMANDS:
         sample = command(height, pitch)
         np.testing.assert_allclose(method.solve(sample).support, static.solve(sample).support, atol=0.02)
+
+
+def test_its_waist_takes_the_lean_as_that_of_static_labels_does(robot: Robot, command: Callable[..., Sample]) -> None:
+    recipe = ReferenceGenerator(problem=Problem(waist_share=1.0))
+    support = SupportModel(robot, recipe.problem)
+    sample = command(0.66, 0.35)
+    solved = OptimalControlMethod(support, recipe).solve(sample).support
+    np.testing.assert_allclose(solved, StaticMethod(support, "pelvis").solve(sample).support, atol=0.02)
+    assert solved[robot.waist_pitch].sum() > 0.3
 
 
 def test_its_postures_pass_the_physical_gates(

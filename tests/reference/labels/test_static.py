@@ -10,7 +10,7 @@ import pytest
 
 from iowbc.errors import Rejected
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.recipe.generator import Problem, ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.static import StaticMethod
@@ -121,17 +121,30 @@ def test_no_neighbour_that_is_in_equilibrium_costs_less(
     support.lock(sample)
     lowest = cost(method, support, sample, best)
     random = np.random.default_rng(0)
-    torso = pinocchio.SE3(sample.torso_rotation(), np.zeros(3))
+    torso, rest = pinocchio.SE3(sample.torso_rotation(), np.zeros(3)), support.rest(sample)[7:]
     for _ in range(30):
         q = pinocchio.integrate(support.model, best.configuration, 0.02 * random.normal(size=support.model.nv))
         wrench = best.wrench.copy()
         for _ in range(5):  # back onto feet and equilibrium, by the least change
-            *_, equality, error = method._linearise(q, wrench, sample, torso)
+            *_, equality, error = method._linearise(q, wrench, sample, rest, torso)
             change = -np.linalg.pinv(equality) @ error
             q = pinocchio.integrate(support.model, q, change[: support.model.nv])
             wrench = wrench + change[support.model.nv :].reshape(2, 6)
         assert np.abs(error).max() < 1e-6
         assert cost(method, support, sample, Posture(q, wrench)) > lowest - 1e-4
+
+
+def test_a_waist_that_takes_the_lean_keeps_the_pelvis_level_as_far_as_it_turns(
+    robot: Robot, command: Callable[..., Sample]
+) -> None:
+    method = StaticMethod(SupportModel(robot, Problem(waist_share=1.0)), "pelvis")
+    upright = method.solve(command(0.66, 0.0)).support
+    for pitch in (-0.3, 0.2, 0.4):
+        bent = method.solve(command(0.66, pitch)).support
+        assert bent[robot.waist_pitch].sum() == pytest.approx(pitch, abs=0.06)
+        assert bent[0] == pytest.approx(upright[0], abs=0.1), "the hip's pitch"
+    stop = method.support.upper[robot.waist_pitch]
+    np.testing.assert_allclose(method.solve(command(0.66, 0.8)).support[robot.waist_pitch], stop, atol=1e-3)
 
 
 def test_what_cannot_be_reached_is_rejected(method: StaticMethod, command: Callable[..., Sample]) -> None:
