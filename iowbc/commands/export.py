@@ -41,7 +41,7 @@ def exported_folder(store: Store, word: str) -> Path:
     """The exported folder that a word names: a folder, a recipe, `RECIPE/export` or a key. Raises `UsageError`."""
     if (Path(word) / CONTRACT).is_file():
         return Path(word)
-    found = named(store, word).artifacts
+    found = named(store, word).usable
     if "export" not in found:
         raise UsageError(
             f"{word}: no exported controller; finished: {', '.join(found) or 'none'}; "

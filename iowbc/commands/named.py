@@ -1,7 +1,7 @@
 """What a user calls an artifact or a recipe, and what is meant."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,13 @@ class Named:
     """By stage: all that a recipe used last, or the one artifact that was named."""
     recipe: Mapping[str, Any] | None = None
     """The resolved recipe, where the word names a recipe."""
+    shipped: Mapping[str, Artifact] = field(default_factory=dict)
+    """By stage: what came with the repository under the recipe's name, where it has used nothing else yet."""
+
+    @property
+    def usable(self) -> dict[str, Artifact]:
+        """By stage: all that there is to play or to take along."""
+        return {**self.shipped, **self.artifacts}
 
 
 def named(store: Store, word: str) -> Named:
@@ -40,10 +47,10 @@ def named(store: Store, word: str) -> Named:
     name = _name_in(Path(name)) if Path(name).suffix in SUFFIXES else name
     if slash and name in recipes:
         found = _recipe(store, word, name, recipes)
-        if stage not in found.artifacts:
-            stages = ", ".join(found.artifacts) or "none"
+        if stage not in found.usable:
+            stages = ", ".join(found.usable) or "none"
             raise UsageError(f"{word}: recipe {name} has no finished stage '{stage}'; finished: {stages}")
-        return Named(word, {stage: found.artifacts[stage]})
+        return Named(word, {stage: found.usable[stage]})
     artifact = _by_key(store, word)
     return Named(word, {artifact.manifest.stage: artifact})
 
@@ -52,7 +59,7 @@ def open_artifact(word: str, runs: Path | str = "runs") -> Artifact:
     """From Python: the artifact that `RECIPE/STAGE` or the first characters of a key name. Raises `UsageError`."""
     found = named(Store(Runs(Path(runs))), word)
     if found.recipe is not None:
-        stages = ", ".join(f"{word}/{stage}" for stage in found.artifacts)
+        stages = ", ".join(f"{word}/{stage}" for stage in found.usable)
         raise UsageError(f"'{word}' is a recipe; name one of its artifacts: {stages or 'none is stored'}")
     (artifact,) = found.artifacts.values()
     return artifact
@@ -77,10 +84,12 @@ def _recipe(store: Store, word: str, name: str, recipes: list[str]) -> Named:
     if name not in recipes:
         listing = ", ".join(recipes) or "none"
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
-    if name in known_recipes(store):
-        return Named(word, last_used(store, name), recall(store.runs, name)["recipe"])
-    artifacts = _published(store)[name]
-    return Named(word, artifacts, list(artifacts.values())[-1].recipe)
+    shipped = _published(store).get(name, {})
+    if name not in known_recipes(store):
+        return Named(word, shipped, list(shipped.values())[-1].recipe)
+    used = last_used(store, name)
+    others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
+    return Named(word, used, recall(store.runs, name)["recipe"], others)
 
 
 def _name_in(file: Path) -> str:

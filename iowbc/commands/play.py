@@ -58,6 +58,9 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         if training.recipe is not None:
             return _training_source(store, training, training.recipe)
     artifact = playable(store, word, stage)
+    if artifact.published:
+        text = f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
     scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
     if scene is not None and scenes:
         require_known(scene, "scene", scenes)
@@ -76,14 +79,14 @@ def artifact_source(store: Store, artifact: Artifact) -> "Source":
 
 def playable(store: Store, word: str, stage: str | None) -> Artifact:
     """The policy that a word and `--stage` name. Raises `UsageError`."""
-    found = named(store, word)
-    ready = [name for name in POLICIES if name in found.artifacts]
+    found = named(store, word).usable
+    ready = [name for name in POLICIES if name in found]
     if not ready or (stage is not None and stage not in ready):
         raise UsageError(
             f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
-            f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found.artifacts) or 'none'}"
+            f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found) or 'none'}"
         )
-    return found.artifacts[stage or ready[0]]
+    return found[stage or ready[0]]
 
 
 def _check_whole(store: Store, artifact: Artifact) -> None:

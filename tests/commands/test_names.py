@@ -9,7 +9,12 @@ from pathlib import Path
 import pytest
 
 from iowbc import open_artifact
+from iowbc.commands.export import exported_folder as exported_by
+from iowbc.commands.named import named
+from iowbc.commands.play import playable
 from iowbc.deploy.contract import exported_folder
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 Key = Callable[[str, str], str]
@@ -53,6 +58,26 @@ def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(folder: 
         shutil.rmtree(folder / "runs" / name)
     assert "teacher" in command("show", "first").stdout
     assert open_artifact("first/export", folder / "runs").published
+
+
+def test_a_run_that_has_begun_does_not_hide_what_is_published_until_it_has_its_own(
+    folder: Path, command: Command, key: Key
+) -> None:
+    assert command("publish", "first.yaml").returncode == 0
+    for name in ("store", "recipes", "first", "second"):
+        shutil.rmtree(folder / "runs" / name)
+    (folder / "first.yaml").write_text("seed: 5\nexecution: {track: false}\n")
+    assert command("run", "first.yaml", "--until", "teacher").returncode == 0
+    store = Store(Runs(folder / "runs"))
+    shipped = open_artifact("first/export", folder / "runs")
+    assert shipped.published
+    assert playable(store, "first", None) == shipped
+    assert exported_by(store, "first") == shipped.folder
+    assert playable(store, "first", "teacher").manifest.key == key("first", "teacher")
+    assert [*named(store, "first").artifacts] == ["rg-dataset", "rg-fit", "teacher"], "those of this run alone"
+    assert command("run", "first.yaml").returncode == 0
+    assert playable(store, "first", None).manifest.key == key("first", "export")
+    assert not playable(store, "first", None).published
 
 
 def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
