@@ -32,6 +32,8 @@ class Rows:
     """s_priv."""
     facts: NDArray[np.int64]
     """What the latent is to tell: places of the object's mass and the base's velocity."""
+    withheld: NDArray[np.int64]
+    """Places in s_priv of what the teacher is not told."""
     observation_mirror: MirrorMap
     privileged_mirror: MirrorMap
     facts_mirror: MirrorMap
@@ -137,7 +139,7 @@ class StudentTraining:
         errors, squares = [], []
         for _ in range(self.settings.rollout):
             frame = self.observation[:, self.rows.observation]
-            target = self.teacher.act(frame, self.observation[:, self.rows.privileged])
+            target = self.teacher.act(frame, self._told(self.observation[:, self.rows.privileged]))
             facts = (self.observation[:, self.rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
             frames = self.history.push(frame, self.starts)
             with torch.inference_mode():
@@ -148,6 +150,12 @@ class StudentTraining:
             driven = np.where((self.teacher_drives < teacher_share)[:, None], target, action)
             self.observation, _, self.starts, _ = self.environments.step(driven)
         return np.mean(errors), np.mean(squares)
+
+    def _told(self, privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        """s_priv (n, P) as the teacher is told it: what is withheld is at its mean."""
+        withheld, told = self.rows.withheld, privileged.copy()
+        told[:, withheld] = self.teacher.network.normalizer.mean[self.rows.privileged][withheld]
+        return told
 
     def _gradient_step(self) -> dict[str, float]:
         """One step, of a gradient no larger than the recipe's, down the loss; its figures as they were before."""

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import COSMETIC, DEEPEST, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, Section, Width
 
 
 class Distillation(Section):
@@ -46,6 +46,10 @@ class Distillation(Section):
     """Samples that are kept, the newest."""
     teacher_share: float = Field(default=0.1, ge=0, le=1)
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
+    withheld: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
+    """Parts of s_priv, by name, that the teacher is not told when it drives or answers: it takes each for its mean in
+    training. What no history shows, such as a motor's strength, the student cannot answer to as the teacher does; and a
+    teacher that walks loses nothing without it."""
     std: Literal["learnt", "shared"] = "learnt"
     """Standard deviation of the student's Gaussian. `learnt`: its own, which grows where its action is uncertain
     (paper eq. 7). `shared`: the teacher's, and the loss is a squared error that it scales."""

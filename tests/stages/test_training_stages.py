@@ -99,6 +99,15 @@ def test_ppo_of_the_students_network_leaves_a_policy_that_needs_nothing_privileg
     assert "nothing is to be distilled" in refused[0]
 
 
+def test_only_parts_of_s_priv_can_be_withheld_from_the_teacher() -> None:
+    recipe = small_recipe()
+    settings = recipe.distill.model_copy(update={"withheld": ("encoder_bias", "motor_stength")})
+    (path, text), *others = distill.STAGE.problems(recipe.model_copy(update={"distill": settings}))
+    assert (path, others) == ("distill.withheld", [])
+    assert text.startswith("'motor_stength' is no part of s_priv: object_mass, ")
+    assert not list(distill.STAGE.problems(recipe))
+
+
 def test_both_trained_networks_obey_the_mirror_of_the_robot(trained: Path) -> None:
     robot = load_robot(robot_folder("g1"))
     layout = full_layout(small_recipe(), robot)

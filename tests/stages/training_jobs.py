@@ -39,6 +39,7 @@ def small_recipe(**teacher: Any) -> Recipe:
                 "batch": 32,
                 "buffer": 256,
                 "gradient_steps": 2,
+                "withheld": ["motor_effort"],
             },
         }
     )
