@@ -1,12 +1,15 @@
 """Kills, stops, full disks and flipped bits, at random moments of a recipe's run: `make chaos`.
 
-python tests/chaos/chaos.py [--recipe FILE] [--events 200] [--seed 0]
+python tests/chaos/chaos.py [--recipe FILE] [--events 200] [--seed 0] [--record FILE]
 
 A recipe is run once undisturbed; then again and again, disturbed, in a folder of its own, each run going on from what
 the one before has left. Lost is: an artifact that was whole before an event and is not after it, unless the event hit
-it; and a result of a run that came to its end and differs from the undisturbed one. Also counted are tracebacks, and
-processes that outlive their run (MLflow's sender aside). The seed decides kinds, moments and places. Without `--recipe`
-the small stages of the test suite run, which count instead of learn.
+it; and a result of a run that came to its end and differs from the undisturbed one. Also counted are tracebacks and
+errors that nobody foresaw, and processes that outlive their run (MLflow's sender aside). The seed decides kinds,
+moments and places. Without `--recipe` the small stages of the test suite run, which count instead of learn.
+
+What happened is told and kept as it goes, in `build/chaos/`. The same command goes on from there: an hour that was cut
+short is not lost, and a larger `--events` only adds. Another recipe or a changed program begins a record of its own.
 """
 
 import argparse
@@ -25,11 +28,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
+from tally import ENDED, Tally, Turn
 
 from iowbc.errors import Damaged
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.digests import PACKAGE, data_digest, folder_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.loading import load_recipe
 
 SMALL_STAGES = Path(__file__).parents[1] / "pipeline" / "fake_stages.py"
 SMALL_RECIPE = "seed: 3\nexecution: {tracking_patience: 0, line_interval: 0.1}\n"
@@ -40,16 +46,8 @@ PATIENCE = 900.0
 """Seconds within which a run that was asked to stop, or met a full disk, has ended."""
 LEAVING = 20.0
 """Seconds within which the processes of a run that was killed are gone."""
-
-
-@dataclass
-class Count:
-    """What came of the events of one kind."""
-
-    events: int = 0
-    lost: int = 0
-    tracebacks: int = 0
-    left: int = 0
+RECORDS = Path("build", "chaos")
+"""Where records stand that have no file of their own."""
 
 
 @dataclass
@@ -59,14 +57,14 @@ class Chaos:
     command: Sequence[str]
     recipe: Path
     folder: Path
-    random: random.Random
-    counts: dict[str, Count] = field(default_factory=dict)
+    seed: int
+    tally: Tally
+    draws: random.Random = field(default_factory=random.Random)
+    """Of the present turn."""
     wanted: dict[str, str] = field(default_factory=dict)
     """Digest of each stage's results in the undisturbed run."""
     seconds: float = 0.0
     """Time that the undisturbed run took [s]."""
-    finished: int = 0
-    """Disturbed runs that came to their end."""
 
     @property
     def store(self) -> Store:
@@ -74,7 +72,14 @@ class Chaos:
 
     def start(self, *words: str) -> "subprocess.Popen[bytes]":
         """A command in the folder, with its output in files."""
-        settings = {**os.environ, "FAKE_BEHAVIOUR": json.dumps(SMALL_BEHAVIOUR), "IOWBC_RUNS": "runs"}
+        settings = {
+            **os.environ,
+            "FAKE_BEHAVIOUR": json.dumps(SMALL_BEHAVIOUR),
+            "IOWBC_RUNS": "runs",
+            "TMPDIR": str(self.folder),
+        }
+        for details in self.folder.glob("iowbc-*.txt"):
+            details.unlink()
         with (self.folder / "output.txt").open("wb") as output, (self.folder / "errors.txt").open("wb") as errors:
             return subprocess.Popen(
                 [*self.command, *words], cwd=self.folder, env=settings, stdout=output, stderr=errors
@@ -108,42 +113,51 @@ class Chaos:
         return found
 
     def said(self) -> str:
-        return "".join((self.folder / name).read_text(errors="replace") for name in ("output.txt", "errors.txt"))
+        """What the last command printed, and the details that it wrote elsewhere."""
+        files = [*(self.folder / name for name in ("output.txt", "errors.txt")), *self.folder.glob("iowbc-*.txt")]
+        return "".join(path.read_text(errors="replace") for path in files)
 
-    def event(self) -> None:
-        """One disturbance of a drawn kind at a drawn moment, then a look at what is left."""
-        kind = self.random.choice(sorted(KINDS))
-        moment = self.random.random()
-        process, count = self.run(), self.counts.setdefault(kind, Count())
-        family: list[psutil.Process] = []
+    def turn(self) -> None:
+        """One run with one disturbance of a drawn kind at a drawn moment, then a look at what is left."""
+        number = len(self.tally.turns)
+        self.draws.seed(f"{self.seed}/{number}")
+        kind, moment = self.draws.choice(sorted(KINDS)), self.draws.random() * self.seconds
+        process, tracebacks = self.run(), []
         try:
-            process.wait(moment * self.seconds)
+            process.wait(moment)
         except subprocess.TimeoutExpired:
-            before = self.whole()
-            family = psutil.Process(process.pid).children(recursive=True)
+            before, family = self.whole(), psutil.Process(process.pid).children(recursive=True)
             hit = KINDS[kind](self, process)
-            count.events += 1
-            print(f"{moment * self.seconds:.1f} s: {kind}", file=sys.stderr, flush=True)
+            tracebacks += self._unforeseen()
             kept = self.whole()
-            count.lost += sum(folder not in kept and folder != hit for folder in before)
+            lost = [str(folder.relative_to(self.folder)) for folder in before if folder not in kept and folder != hit]
+            left = self._left(family)
         else:
-            self._ended(process.returncode, count)
-        if "Traceback" in self.said():
-            count.tracebacks += 1
-            print(f"a traceback after '{kind}':\n{self.said()}", file=sys.stderr, flush=True)
-        count.left += self._left(family)
-        if self.start("status").wait() or "Traceback" in self.said():
-            count.tracebacks += 1
-            print(f"status after '{kind}':\n{self.said()}", file=sys.stderr, flush=True)
+            kind, left = ENDED, []
+            lost = self._ended(process.returncode)
+            tracebacks += self._unforeseen()
+            self._forget()
+        finally:
+            process.kill()
+        if code := self.start("status").wait():
+            tracebacks.append(f"status ended with {code} after this:\n{self.said()}")
+        else:
+            tracebacks += self._unforeseen()
+        self.tally.add(Turn(number, kind, round(moment, 2), tuple(lost), tuple(tracebacks), tuple(left)))
 
-    def _ended(self, code: int, count: Count) -> None:
-        """A run came to its end before anything happened to it: compare what it made, and begin again."""
-        self.finished += 1
+    def _unforeseen(self) -> list[str]:
+        said = self.said()
+        return [said] if "Traceback" in said or "nobody foresaw" in said else []
+
+    def _ended(self, code: int) -> list[str]:
+        """What a run that came to its end before anything happened to it has made otherwise than the undisturbed."""
         found = self.results()
-        if code or found != self.wanted:
-            count.lost += max(1, sum(found.get(stage) != digest for stage, digest in self.wanted.items()))
-            print(f"a run ended with {code}, results {found} instead of {self.wanted}:\n{self.said()}", file=sys.stderr)
-        self._forget()
+        other = [
+            f"{stage}: {found.get(stage)} instead of {digest}"
+            for stage, digest in self.wanted.items()
+            if found.get(stage) != digest
+        ]
+        return [*other, f"the run ended with {code}:\n{self.said()}"] if code or other else []
 
     def _forget(self) -> None:
         """Begin again with an empty folder."""
@@ -153,20 +167,20 @@ class Chaos:
                 return
             time.sleep(0.1)
 
-    def _left(self, family: Sequence[psutil.Process]) -> int:
+    def _left(self, family: Sequence[psutil.Process]) -> list[str]:
         """Processes of a run that are still there, without MLflow's sender, which has a session of its own."""
         own = [process for process in family if process.is_running() and not _sends(process)]
         _, alive = psutil.wait_procs(own, timeout=LEAVING)
-        return len(alive)
+        return [" ".join(process.cmdline()) for process in alive]
 
     def flip(self, files: Sequence[Path]) -> Path | None:
         """Change one bit of one of the files; returns which."""
         filled = sorted(path for path in files if path.is_file() and path.stat().st_size)
         if not filled:
             return None
-        path = self.random.choice(filled)
+        path = self.draws.choice(filled)
         content = bytearray(path.read_bytes())
-        content[self.random.randrange(len(content))] ^= 1 << self.random.randrange(8)
+        content[self.draws.randrange(len(content))] ^= 1 << self.draws.randrange(8)
         path.write_bytes(content)
         return path
 
@@ -187,13 +201,13 @@ def kill_child(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
     """Kill a worker where there is one; the run then goes on or fails with a sentence. It is stopped either way."""
     children = psutil.Process(process.pid).children(recursive=True)
     if children:
-        chaos.random.choice(sorted(children, key=lambda child: child.pid)).kill()
+        chaos.draws.choice(sorted(children, key=lambda child: child.pid)).kill()
         time.sleep(1.0)
     stop(chaos, process)
 
 
 def stop(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
-    process.send_signal(chaos.random.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
+    process.send_signal(chaos.draws.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
     process.wait(PATIENCE)
 
 
@@ -249,45 +263,51 @@ KINDS: dict[str, Callable[[Chaos, "subprocess.Popen[bytes]"], Path | None]] = {
 """Each returns the artifact that it damaged, if any."""
 
 
-def play(recipe: Path | None, events: int, seed: int, folder: Path) -> Chaos:
-    """Disturb a recipe's runs so many times."""
+def play(recipe: Path | None, events: int, seed: int, folder: Path, record: Path | None = None) -> Tally:
+    """Disturb a recipe's runs until so many events are recorded, and run it once more to the end."""
     command = [sys.executable, "-m", "iowbc"]
     if recipe is None:
         command = [sys.executable, str(SMALL_STAGES)]
         recipe = folder / "small.yaml"
         recipe.write_text(SMALL_RECIPE)
-    chaos = Chaos(command, recipe.absolute(), folder, random.Random(seed))
+    tally = Tally.of(record or RECORDS / _record_name(recipe, seed))
+    if tally.turns:
+        print(f"{tally.file} has {tally.line}", flush=True)
+    if tally.events >= events:
+        return tally
+    chaos = Chaos(command, recipe.absolute(), folder, seed, tally)
     chaos.undisturbed()
-    while sum(count.events for count in chaos.counts.values()) < events:
-        chaos.event()
-    last = chaos.counts.setdefault("the last run, undisturbed", Count())
-    chaos._ended(chaos.run().wait(), last)
-    return chaos
+    while tally.events < events:
+        chaos.turn()
+        last = tally.turns[-1]
+        print(f"{last.moment:.1f} s, {last.kind}; {tally.line}", *last.findings, sep="\n", flush=True)
+    lost = chaos._ended(chaos.run().wait())
+    tally.add(Turn(len(tally.turns), ENDED, chaos.seconds, tuple(lost), tuple(chaos._unforeseen())))
+    return tally
 
 
-def table(chaos: Chaos) -> str:
-    """The counts in Markdown."""
-    rows = ["| kind | count | lost | tracebacks | processes left |", "|---|---|---|---|---|"]
-    for kind, count in sorted(chaos.counts.items()):
-        rows.append(f"| {kind} | {count.events} | {count.lost} | {count.tracebacks} | {count.left} |")
-    total = [sum(getattr(c, name) for c in chaos.counts.values()) for name in ("events", "lost", "tracebacks", "left")]
-    rows.append(f"| all | {' | '.join(map(str, total))} |")
-    return "\n".join(rows)
+def _record_name(recipe: Path, seed: int) -> str:
+    """Of a record that belongs to this recipe, this program and this seed."""
+    what = data_digest([load_recipe(recipe).recipe.model_dump(mode="json"), folder_digest(PACKAGE)])
+    return f"{recipe.stem}-seed-{seed}-{what[:8]}.jsonl"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--recipe", type=Path, help="recipe to run; the small stages of the test suite")
-    parser.add_argument("--events", type=int, default=200)
+    parser.add_argument("--events", type=int, default=200, help="how many there are in the record in the end")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--record", type=Path, help="file to go on from and to add to; one in build/chaos")
     asked = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="iowbc-chaos-", ignore_cleanup_errors=True) as folder:
-        chaos = play(asked.recipe, asked.events, asked.seed, Path(folder))
-    print(table(chaos))
-    lost = sum(count.lost for count in chaos.counts.values())
-    clean = not any(count.tracebacks or count.left for count in chaos.counts.values())
-    print(f"seed {asked.seed}, {chaos.finished} runs came to their end; lost {lost}")
-    return 0 if lost == 0 and clean else 1
+    try:
+        with tempfile.TemporaryDirectory(prefix="iowbc-chaos-", ignore_cleanup_errors=True) as folder:
+            tally = play(asked.recipe, asked.events, asked.seed, Path(folder), asked.record)
+    except KeyboardInterrupt:
+        print("interrupted; the same command goes on from what was told last", file=sys.stderr)
+        return 130
+    print(tally.table())
+    print(f"seed {asked.seed}; each turn is in {tally.file}")
+    return 0 if tally.clean else 1
 
 
 if __name__ == "__main__":

@@ -1,0 +1,92 @@
+"""What a series of disturbances came to, a line of JSON each; a later series goes on from it."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+ENDED = "none, the run came to its end"
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One run, and what disturbed it."""
+
+    number: int
+    kind: str
+    """What happened to the run, or `ENDED`."""
+    moment: float
+    """When, after its start [s]."""
+    lost: tuple[str, ...] = ()
+    """What is not there any more, or is another than it should be."""
+    tracebacks: tuple[str, ...] = ()
+    """What was printed with a traceback, or of something that nobody foresaw."""
+    left: tuple[str, ...] = ()
+    """Processes that outlived the run."""
+
+    @property
+    def findings(self) -> list[str]:
+        """All that should not be, in words."""
+        named = {"lost": self.lost, "printed": self.tracebacks, "left": self.left}
+        return [f"{what}: {text}" for what, texts in named.items() for text in texts]
+
+
+@dataclass
+class Tally:
+    """The turns so far, and the file that keeps them."""
+
+    file: Path
+    turns: list[Turn] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, file: Path) -> "Tally":
+        """What a file has kept; a last line that was cut off does not count."""
+        lines = file.read_text(encoding="utf-8").splitlines(keepends=True) if file.is_file() else []
+        whole = [line for line in lines if line.endswith("\n")]
+        if whole != lines:
+            file.write_text("".join(whole), encoding="utf-8")
+        kept = (json.loads(line) for line in whole)
+        return cls(
+            file, [Turn(**{k: tuple(v) if isinstance(v, list) else v for k, v in turn.items()}) for turn in kept]
+        )
+
+    def add(self, turn: Turn) -> None:
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with self.file.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(turn)) + "\n")
+        self.turns.append(turn)
+
+    @property
+    def events(self) -> int:
+        """Runs that were disturbed."""
+        return sum(turn.kind != ENDED for turn in self.turns)
+
+    @property
+    def clean(self) -> bool:
+        return not any(turn.findings for turn in self.turns)
+
+    @property
+    def line(self) -> str:
+        """The counts so far, in a few words."""
+        lost, tracebacks, left = (sum(len(getattr(turn, name)) for turn in self.turns) for name in COUNTED)
+        return f"{self.events} events: lost {lost}, tracebacks {tracebacks}, processes left {left}"
+
+    def table(self) -> str:
+        """The counts by kind, in Markdown."""
+        rows = ["| kind | count | lost | tracebacks | processes left |", "|---|---|---|---|---|"]
+        kinds = sorted({turn.kind for turn in self.turns} - {ENDED})
+        for kind in [*kinds, ENDED]:
+            rows.append(_row(kind, [turn for turn in self.turns if turn.kind == kind]))
+        return "\n".join([*rows, _row("all", self.turns)])
+
+
+COUNTED = ("lost", "tracebacks", "left")
+
+
+def _turn(kept: dict[str, Any]) -> Turn:
+    return Turn(**{name: tuple(value) if isinstance(value, list) else value for name, value in kept.items()})
+
+
+def _row(name: str, turns: list[Turn]) -> str:
+    sums = [sum(len(getattr(turn, counted)) for turn in turns) for counted in COUNTED]
+    return f"| {' | '.join(map(str, (name, len(turns), *sums)))} |"
