@@ -1,13 +1,16 @@
 """Interaction-oriented whole-body control: recipes, training, evaluation and export of the paper's controller.
 
-The names below are what users' own code imports; each is read from its module when it is first asked for.
+The names below are what users' own code imports; each is read from its module when it is first asked for. Nothing else
+is imported here, not even `typing`: Ctrl-C is answered as soon as this file has been read (`iowbc/__main__.py`).
 """
 
 import os
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from iowbc.commands.named import open_artifact
     from iowbc.control.sensors import Measured
     from iowbc.deploy.controller import Controller, Targets
@@ -45,7 +48,7 @@ _PLACES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _PLACES:
         raise AttributeError(f"module 'iowbc' has no attribute '{name}'; it has: {', '.join(__all__)}")
     return getattr(import_module(_PLACES[name]), name)

@@ -4,10 +4,15 @@ import os
 import signal
 
 
-def main() -> None:
-    """Run a command and exit; see `iowbc.cli.main`."""
+def leave_while_reading() -> None:
+    """From now on Ctrl-C ends the process at once and without a word, unless it was started to ignore it."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
+
+def main() -> None:
+    """Run a command and exit; see `iowbc.cli.main`."""
+    leave_while_reading()
     from iowbc.cli import main as command
 
     command()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from iowbc.commands import completion
+from iowbc.commands.interrupt import leave
 from iowbc.commands.streams import let_go, outlasting_readers, prepare_streams
 from iowbc.commands.unforeseen import told
 
@@ -454,14 +455,9 @@ def _runs(folder: Path | None) -> "Runs":
     return Runs(folder or Path("runs"))
 
 
-def _leave(number: int, frame: object) -> None:
-    """Ctrl-C before a run has begun, or in any other command."""
-    sys.exit(130)
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 a stage failed, 2 the recipe or the usage is wrong, 130 interrupted."""
-    signal.signal(signal.SIGINT, _leave)
+    signal.signal(signal.SIGINT, leave)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     prepare_streams()
     code: str | int | None = 1

@@ -38,6 +38,13 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
 
 SMALL_STAGES = Path(__file__).parents[1] / "pipeline" / "fake_stages.py"
+SMALL_PROGRAM = f"""
+from iowbc.__main__ import leave_while_reading
+leave_while_reading()
+import runpy
+runpy.run_path({str(SMALL_STAGES)!r}, run_name="__main__")
+"""
+"""The command line on the small stages, which answers Ctrl-C as early as `iowbc` does."""
 SMALL_RECIPE = "seed: 3\nexecution: {tracking_patience: 0, line_interval: 0.1}\n"
 SMALL_BEHAVIOUR = {
     name: {"steps": 10, "pause": 0.02} for name in ("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export")
@@ -267,7 +274,7 @@ def play(recipe: Path | None, events: int, seed: int, folder: Path, record: Path
     """Disturb a recipe's runs until so many events are recorded, and run it once more to the end."""
     command = [sys.executable, "-m", "iowbc"]
     if recipe is None:
-        command = [sys.executable, str(SMALL_STAGES)]
+        command = [sys.executable, "-c", SMALL_PROGRAM]
         recipe = folder / "small.yaml"
         recipe.write_text(SMALL_RECIPE)
     tally = Tally.of(record or RECORDS / _record_name(recipe, seed))
