@@ -355,9 +355,11 @@ class Simulation:
         return self.worlds[self._owner[env]], int(self._index[env])
 
     def physics_model(self, env: int) -> tuple[Any, Any]:
-        """Copies of the MuJoCo model and data with which an environment is stepped."""
+        """A copy of the MuJoCo model with which an environment is stepped, and data of its state."""
         world, index = self.world_of(env)
-        return world.batch.get_model(index), world.batch.get_data(index)
+        model, data = world.batch.get_model(index), world.batch.get_data(index)
+        mujoco.mj_forward(model, data)
+        return model, data
 
     def partner_handle(self, env: int) -> Array:
         """Where the partner takes hold, (3,) [m]."""

@@ -35,8 +35,9 @@ PRESSED = 0.001
 class World:
     """n simulations of one scene, and their place among all environments.
 
-    One `mjData` per simulation: MuJoCo then computes positions and velocities of the new state as the first half of the
-    next step, so that exact observations cost nothing.
+    One `mjData` for all of them, which stays in the processor's cache. To compute positions and velocities of the new
+    state once for the observation and once more in the next step costs less than an `mjData` per simulation, which
+    could keep them, but comes from memory every time.
     """
 
     def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing) -> None:
@@ -46,7 +47,7 @@ class World:
         if physics.pd == "explicit":
             require_stable(self.model, robot, timing)
         self.layout = Layout.of(self.model, robot)
-        self.batch = Batch(self.model, len(rows), nthread=1, persistent=True)
+        self.batch = Batch(self.model, len(rows), nthread=1)
         self.fields = ModelFields(self.batch, self.layout, scene, timing)
         bind = self.batch.bind
         self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
