@@ -1,6 +1,7 @@
 """A stage's report: to the console, to the tracking journal, and to its record on disk."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.store.workspace import Workspace
@@ -32,6 +33,11 @@ class StageReport:
         self._view.progress(done, total, note)
         self._workspace.progress(done, total, note)
         self._display.moved(self._view)
+
+    def files(self, path: Path) -> None:
+        """Let tracking have a file or folder of the stage while it runs; it may be told again."""
+        if self._tracker is not None:
+            self._tracker.files(self._view.name, path)
 
     def say(self, text: str) -> None:
         """Print one line, with the stage's name before it."""

@@ -3,7 +3,7 @@
 from pydantic import Field, NonNegativeFloat
 
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.section import LATER, Section
+from iowbc.recipe.section import COSMETIC, LATER, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 
 STAND_WALK_TURN = (
@@ -32,6 +32,9 @@ class Check(Section):
     """Trials at each mass."""
     seed: int = Field(default=5000, ge=0, lt=2**32)
     """Seed of the first trial: apart from those of training, evaluation and export."""
+    films: int = Field(default=0, ge=0, le=100, json_schema_extra=COSMETIC)
+    """Films of a trial of a middling load, one each time a further such part of the training is done; each takes some
+    15 s without a graphics card. 0 makes none."""
     sequence: tuple[Segment, ...] = Field(default=STAND_WALK_TURN, min_length=1)
     """Commands of a trial, in order."""
     collapse: float = Field(default=1 / 3, gt=0, lt=1)

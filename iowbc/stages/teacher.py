@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import ExitStack, closing
+from functools import partial
 from typing import TYPE_CHECKING
 
 from iowbc.learning.curves import TABLE
@@ -10,9 +11,13 @@ from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
 from iowbc.stages.training import STATE, leave_extendable, train
 
 if TYPE_CHECKING:
+    from iowbc.evaluation.training_films import TrainingFilms
     from iowbc.evaluation.trials.quick import QuickEvaluation
+    from iowbc.learning.teacher import TeacherTraining
     from iowbc.task.specification import Specification
 
+VIDEOS = "videos"
+"""Folder of the films made while training."""
 PANELS = (
     "episode_seconds",
     "terminations/fallen",
@@ -55,10 +60,10 @@ def run(job: Job) -> None:
             divergences=job.work / "divergences",
         )
         open_ones.enter_context(closing(environments))
-        score = None
+        score, films = None, None
         if settings.check.every is not None:
             check = open_ones.enter_context(_check(world, job.workers))
-            score = check.play
+            score, films = check.play, _films(check, job)
         rows = environments
         if settings.history is not None:
             rows = HistoryEnvironments(environments, environments.layout.state.size, settings.history.length)
@@ -71,7 +76,7 @@ def run(job: Job) -> None:
             score=score,
             say=job.report.say,
         )
-        curves = train(job, training, settings.checkpoint_every, _note)
+        curves = train(job, training, settings.checkpoint_every, _note, partial(_film, job, training, films))
         leave_extendable(job, training)
         training.keep_best()
         about = {"layout": environments.layout.describe(), "curriculum": environments.curriculum()}
@@ -79,8 +84,9 @@ def run(job: Job) -> None:
     network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
     training.model.save(job.out / "teacher_sb3.zip")
-    if (job.work / "divergences").is_dir():
-        (job.work / "divergences").rename(job.out / "divergences")
+    for name in ("divergences", VIDEOS):
+        if (job.work / name).is_dir():
+            (job.work / name).rename(job.out / name)
     terms = sorted({name for row in curves.rows for name in row if name.startswith(("level/", "falls/", "reward/"))})
     figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     kept = {"best_score": training.best.score} if settings.check.every is not None else {}
@@ -105,6 +111,25 @@ def _check(world: "Specification", workers: int) -> "QuickEvaluation":
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
     return QuickEvaluation(own, trials, workers=min(workers, len(trials)))
+
+
+def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
+    """Films of the check, where the recipe asks for any."""
+    parts = job.recipe.teacher.check.films
+    if not parts:
+        return None
+    from iowbc.evaluation.training_films import TrainingFilms
+
+    return TrainingFilms(check.world, check.middle, job.work / VIDEOS, parts)
+
+
+def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms | None") -> None:
+    """Makes the film that is due after an update, if there is one, and shows it."""
+    from iowbc.learning.acting import policy_of
+
+    path = None if films is None else films.due(training.steps, training.planned)
+    if films is not None and path is not None and films.make(path, policy_of(*training.network()), job.report.say):
+        job.report.files(path.parent)
 
 
 def _note(values: Mapping[str, float]) -> str:

@@ -40,11 +40,17 @@ CURVES = "curves.jsonl"
 """Curves of a training that goes on."""
 
 
-def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[Mapping[str, float]], str]) -> "Curves":
+def train(
+    job: Job,
+    training: Training,
+    checkpoint_every: int,
+    note: Callable[[Mapping[str, float]], str],
+    look: Callable[[], None] = lambda: None,
+) -> "Curves":
     """Goes on from the job's checkpoint, or from its predecessor's end, to the end of the training; returns its curves.
 
     `checkpoint_every`: updates between two checkpoints; `note`: what to say beside the progress, from the figures of an
-    update. Raises Interrupted, with a checkpoint written, once the job is asked to stop.
+    update; `look`: called after each. Raises Interrupted, with a checkpoint written, once the job is asked to stop.
     """
     from safetensors.numpy import load_file
 
@@ -74,6 +80,7 @@ def train(job: Job, training: Training, checkpoint_every: int, note: Callable[[M
             save_checkpoint(path, job.key, training.arrays())
         if stop:
             raise Interrupted(f"stopped at {training.steps:,} of {training.planned:,} steps, checkpoint written")
+        look()
     return curves
 
 

@@ -60,6 +60,17 @@ def test_a_longer_training_goes_on_from_the_finished_one_as_if_it_had_never_stop
     assert rows(tmp_path / "unbroken" / "work") == rows(tmp_path / "extended" / "work")
 
 
+def test_a_training_is_filmed_at_its_parts_and_learns_the_same(trained: Path, tmp_path: Path) -> None:
+    check = small_recipe().teacher.check.model_copy(update={"films": 2})
+    job = make_job(tmp_path, small_recipe(check=check), workers=0)
+    teacher.STAGE.run(job)
+    half, end = (f"{steps:010}_steps.mp4" for steps in (64, 128))
+    assert job.report.shown == [[half], [half, end]]  # type: ignore[attr-defined]
+    assert sorted(path.name for path in (job.out / "videos").iterdir()) == [half, end]
+    for name in teacher.STAGE.results:
+        assert (job.out / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
+
+
 def test_a_student_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(trained: Path, tmp_path: Path) -> None:
     inputs = {"teacher": trained / "teacher" / "out"}
     resumed = stopped_and_resumed(distill.STAGE, tmp_path, small_recipe(), inputs)

@@ -44,10 +44,15 @@ class QuickEvaluation:
 
     def __init__(self, world: Specification, trials: Sequence[Trial], *, workers: int = 0) -> None:
         """`workers`: processes; 0 steps the trials in this one. The figures do not depend on it."""
-        self.trials, self.recipe = tuple(trials), world.recipe
+        self.world, self.trials, self.recipe = world, tuple(trials), world.recipe
         self._measure = measure_of(world.recipe, load_robot(world.robot).joints)
         episodes = [trial.episode for trial in trials]
         self._environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=episodes)
+
+    @property
+    def middle(self) -> Trial:
+        """The one in the middle: with as many trials of each load, one of a middling load."""
+        return self.trials[(len(self.trials) - 1) // 2]
 
     def play(self, policy: Acting) -> dict[str, float]:
         """Means over all trials: see `figures`."""

@@ -84,6 +84,10 @@ class Tracker:
         """Values of a stage at a step."""
         self._journal.write("metrics", id=name, values=cleaned(values), step=step)
 
+    def files(self, name: str, path: Path) -> None:
+        """A file or folder of a stage that is still running; a folder's further files follow when it is told again."""
+        self._journal.write("files", id=name, paths=[os.path.relpath(path, self.runs.root)])
+
     def end(self, name: str, status: str, message: str = "") -> None:
         """A stage that ran has ended with MLflow's status FAILED or KILLED."""
         if message:
