@@ -1,13 +1,18 @@
-"""A small untrained policy and its reference generator, for tests of exporting and of what was exported."""
+"""A small untrained policy and its reference generator, for tests of exporting and of what was exported.
+
+The fixtures are those of every folder of tests whose `conftest.py` imports them.
+"""
 
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.observation import observation_layout
+from iowbc.control.observation import ObservationLayout, observation_layout
+from iowbc.export.folder import write_folder
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.recipe import Recipe
@@ -46,13 +51,42 @@ def untrained(recipe: Recipe, robot: Robot, rg: Path | None, observe_object: boo
     torch.manual_seed(0)
     layout = observation_layout(robot, observe_object)
     student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16], "elu", 10.0)
+    return graph_of(student, HISTORY, recipe, robot, layout, rg)
+
+
+def graph_of(
+    student: StudentNetwork, history: int, recipe: Recipe, robot: Robot, layout: ObservationLayout, rg: Path | None
+) -> ControllerGraph:
+    """The graph of a student that sees so many moments."""
     return ControllerGraph(
         student,
         None if rg is None else ReferenceNetwork.load(rg),
         robot,
         layout,
         recipe.task.references.gait,
-        history=HISTORY,
+        history=history,
         action_scale=robot.action_scale,
         action_bound=recipe.task.action.bound,
     )
+
+
+@pytest.fixture(scope="session")
+def recipe() -> Recipe:
+    return Recipe.model_validate({"name": "test", "export": {"acceptance": [], "golden_steps": 5}})
+
+
+@pytest.fixture(scope="session")
+def rg(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made_up_generator(robot, tmp_path_factory.mktemp("rg"))
+
+
+@pytest.fixture(scope="session")
+def graph(recipe: Recipe, robot: Robot, rg: Path) -> ControllerGraph:
+    return untrained(recipe, robot, rg)
+
+
+@pytest.fixture(scope="session")
+def exported(recipe: Recipe, graph: ControllerGraph, rg: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("exported")
+    write_folder(folder, graph, recipe, rg, {"rg-fit": "a" * 8})
+    return folder

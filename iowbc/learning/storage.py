@@ -44,10 +44,3 @@ def load_teacher(folder: Path) -> tuple[TeacherNetwork, dict[str, Any]]:
     network, about = load_network(folder)
     assert isinstance(network, TeacherNetwork)
     return network, about
-
-
-def load_student(folder: Path) -> tuple[StudentNetwork, dict[str, Any]]:
-    """The policy in a stage's artifact that sees H_t alone, distilled or trained so."""
-    network, about = load_network(folder)
-    assert isinstance(network, StudentNetwork)
-    return network, about

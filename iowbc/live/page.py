@@ -9,10 +9,10 @@ import viser
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
+from iowbc.live.drawing import Drawing
 from iowbc.live.figures import figures
 from iowbc.live.panel import LIVE, PAST, Panel
 from iowbc.live.session import Pushed, Session
-from iowbc.live.stage import Stage
 from iowbc.live.track import Track
 from iowbc.live.trials import played_again, trial_titles
 
@@ -41,7 +41,7 @@ class Page:
         self.server, self.session, self._evaluated = server, session, evaluated
         recipe, robot = session.source.world.recipe, session.environment.batch.robot
         self.panel = Panel(server.gui, recipe, session.request, self._trials)
-        self.stage = Stage(server.scene, robot, session.pull)
+        self.drawing = Drawing(server.scene, robot, session.pull)
         server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
         self.paused = False
         self.track: Track = session.track
@@ -186,7 +186,7 @@ class Page:
     def _draw(self, now: float) -> None:
         moment = self.track.moments[self.place]
         with self.server.atomic():
-            self.stage.show(self.track.model, moment, self.panel.shown)
+            self.drawing.show(self.track.model, moment, self.panel.shown)
         if now >= self._read + READING:
             self.panel.status.content = self._status(now)
             self.panel.figures.content = figures(moment, self.track.readings(self.place))

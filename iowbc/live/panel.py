@@ -12,7 +12,7 @@ from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, VELOCITY
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
-from iowbc.live.stage import Shown
+from iowbc.live.drawing import Shown
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.commands.drawing import nominal_command

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from exported_policies import graph_of
 from test_graph import random_inputs
 
 from iowbc.control.action import action_mirror
 from iowbc.control.observation import observation_layout
 from iowbc.deploy.session import open_session, run
 from iowbc.export.golden import largest_difference
-from iowbc.export.graph import ControllerGraph
 from iowbc.export.onnx_graph import run_torch, write_onnx
 from iowbc.learning.encoders import ENCODERS, EncoderName
 from iowbc.learning.networks import StudentNetwork, mirror_as_json
@@ -30,16 +30,7 @@ def test_a_symmetric_student_is_exported_with_its_encoder(
     layout = observation_layout(robot, True)
     mirrors = [mirror_as_json(layout.mirror), mirror_as_json(action_mirror(robot))]
     student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16, 8], "elu", 10.0, encoder, mirrors)
-    graph = ControllerGraph(
-        student,
-        None,
-        robot,
-        layout,
-        recipe.task.references.gait,
-        history=HISTORY,
-        action_scale=robot.action_scale,
-        action_bound=recipe.task.action.bound,
-    )
+    graph = graph_of(student, HISTORY, recipe, robot, layout, None)
     write_onnx(graph, tmp_path / "policy.onnx", 18, {})
     inputs = random_inputs(graph, 5)
     theirs = run(open_session(tmp_path / "policy.onnx"), inputs)

@@ -6,7 +6,7 @@ import torch
 
 from iowbc.learning.acting import StudentPolicy, load_policy
 from iowbc.learning.networks import StudentNetwork
-from iowbc.learning.storage import load_student, save_network
+from iowbc.learning.storage import load_network, save_network
 
 ARCHITECTURE = {
     "observation": 3,
@@ -24,7 +24,7 @@ def test_a_network_is_read_back_with_its_normalisation(tmp_path: Path) -> None:
     network = StudentNetwork(**ARCHITECTURE)  # type: ignore[arg-type]
     network.normalizer.mean.uniform_()
     save_network(network, ARCHITECTURE, tmp_path, "student", {})
-    again, _ = load_student(tmp_path)
+    again, _ = load_network(tmp_path)
     x = torch.randn(5, 4, 3)
     torch.testing.assert_close(again(x), network(x), rtol=0, atol=0)
 

@@ -13,7 +13,7 @@ from point_masses import MIRRORS, PointMasses
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.encoders import ENCODERS, EncoderName
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
-from iowbc.learning.storage import load_student, save_network
+from iowbc.learning.storage import load_network, save_network
 from iowbc.learning.student import Rows, StudentTraining
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.recipe.distillation import Distillation
@@ -130,7 +130,7 @@ def test_a_student_is_read_back_whatever_its_encoder(encoder: EncoderName, tmp_p
     about = architecture(encoder, symmetric=True)
     network = StudentNetwork(**about)
     save_network(network, about, tmp_path, "student", {})
-    again, _ = load_student(tmp_path)
+    again, _ = load_network(tmp_path)
     history = torch.randn(5, 9, 4)
     torch.testing.assert_close(again(history), network(history), rtol=0, atol=0)
 

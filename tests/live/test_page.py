@@ -106,7 +106,7 @@ def test_the_past_of_a_live_episode_can_be_looked_at(page: Page) -> None:
     moment = page.track.moments[page.place]
     assert moment.seconds == pytest.approx(page.track.end - 0.2)
     pelvis = page.track.model.body("pelvis").id
-    assert page.stage._bodies[pelvis].position == pytest.approx(moment.bodies[pelvis, :3], abs=1e-6)
+    assert page.drawing._bodies[pelvis].position == pytest.approx(moment.bodies[pelvis, :3], abs=1e-6)
     page.panel._pressed.put("pause")
     clock.run(0.1)
     assert (page.paused, page.panel.time.value) == (False, 0.0)
@@ -136,15 +136,15 @@ def test_the_mass_suits_the_scene(page: Page) -> None:
 def test_what_is_drawn_follows_the_boxes(page: Page) -> None:
     clock = Clock(page)
     clock.run(0.1)
-    assert page.stage._forces.visible
-    assert not any(ghost.visible for ghost in page.stage._ghosts.values())
+    assert page.drawing._forces.visible
+    assert not any(ghost.visible for ghost in page.drawing._ghosts.values())
     page.panel._shown["forces"].value = False
     page.panel._shown["reference"].value = True
     page.panel._shown["collision"].value = True
     clock.run(0.1)
-    assert not page.stage._forces.visible
-    assert all(ghost.visible for ghost in page.stage._ghosts.values())
-    assert not any(handle.visible for handle in page.stage._looks)
+    assert not page.drawing._forces.visible
+    assert all(ghost.visible for ghost in page.drawing._ghosts.values())
+    assert not any(handle.visible for handle in page.drawing._looks)
 
 
 def test_a_trial_is_looked_through_as_it_was_recorded(session: Session, actor: Actor) -> None:
@@ -167,7 +167,7 @@ def test_a_trial_is_looked_through_as_it_was_recorded(session: Session, actor: A
         for seconds, step in ((0.14, 7), (0.04, 2)):
             page.panel.time.value = seconds
             clock.run(0.06)
-            shown = page.stage._bodies[pelvis].position
+            shown = page.drawing._bodies[pelvis].position
             assert shown == pytest.approx(recorded.base_position[step - 1], abs=1e-6)
         page.panel.showing.value = LIVE
         clock.run(0.06)

@@ -15,7 +15,7 @@ from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
 from iowbc.learning.acting import StudentPolicy, load_policy
-from iowbc.learning.storage import load_student, load_teacher
+from iowbc.learning.storage import load_network, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import distill, evaluate, export, teacher
@@ -123,7 +123,7 @@ def test_both_trained_networks_obey_the_mirror_of_the_robot(trained: Path) -> No
     robot = load_robot(robot_folder("g1"))
     layout = full_layout(small_recipe(), robot)
     teacher_network, _ = load_teacher(trained / "teacher" / "out")
-    student_network, about = load_student(trained / "distill" / "out")
+    student_network, about = load_network(trained / "distill" / "out")
     torch.manual_seed(0)
     rows = 2.0 * torch.randn(40, layout.size)
     histories = 2.0 * torch.randn(40, about["architecture"]["history"], layout.state.size)

@@ -44,7 +44,7 @@ class Shown:
     follow: bool = True
 
 
-class Stage:
+class Drawing:
     """The scene of a server. `build` it for a model, then `show` its moments."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, pull: Pull) -> None:

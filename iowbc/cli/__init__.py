@@ -1,0 +1,100 @@
+"""The commands. Nothing heavy is imported before a command needs it, so that `iowbc --help` answers at once."""
+
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from iowbc.cli.comparing import compare, diff, report, ui
+from iowbc.cli.listing import gc, list_, show, status
+from iowbc.cli.measuring import bench_reference, bench_simulation, bench_training
+from iowbc.cli.playing import export, play
+from iowbc.cli.preparing import doctor, init, schema
+from iowbc.cli.running import plan, publish, run, sweep
+from iowbc.commands.interrupt import leave
+from iowbc.commands.streams import let_go, prepare_streams
+from iowbc.commands.unforeseen import told
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "run": run,
+    "sweep": sweep,
+    "plan": plan,
+    "publish": publish,
+    "init": init,
+    "status": status,
+    "ls": list_,
+    "show": show,
+    "diff": diff,
+    "compare": compare,
+    "report": report,
+    "export": export,
+    "gc": gc,
+    "play": play,
+    "ui": ui,
+    "schema": schema,
+    "doctor": doctor,
+}
+"""In the order of `iowbc --help`."""
+BENCHMARKS: dict[str, Callable[..., None]] = {"sim": bench_simulation, "train": bench_training, "rg": bench_reference}
+
+app = typer.Typer(
+    help="Train, test and export a whole-body controller of a humanoid robot that carries and pushes heavy objects.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"max_content_width": 120},
+)
+bench = typer.Typer(help="Measure the speed of this machine.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(bench, name="bench")
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"iowbc {version('iowbc')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """What comes before a command."""
+
+
+for name, command in COMMANDS.items():
+    app.command(name)(command)
+for name, command in BENCHMARKS.items():
+    bench.command(name)(command)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command and exit: 0 done, 1 a stage failed, 2 the recipe or the usage is wrong, 130 interrupted."""
+    signal.signal(signal.SIGINT, leave)
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    prepare_streams()
+    code: str | int | None = 1
+    try:
+        try:
+            app(arguments, prog_name="iowbc")
+        except SystemExit as ended:
+            code = ended.code
+            sys.stdout.flush()
+    except BrokenPipeError:
+        code = 1  # a reader that has gone away, as of `| head`
+    except Exception as error:
+        from iowbc.errors import IowbcError
+
+        foreseen = isinstance(error, IowbcError)
+        code = error.exit_code if isinstance(error, IowbcError) else 1
+        with contextlib.suppress(OSError):
+            print(error if foreseen else told(error, arguments or sys.argv[1:]), file=sys.stderr)
+    let_go()
+    sys.exit(code)

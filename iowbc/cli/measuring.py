@@ -1,0 +1,43 @@
+"""`bench sim`, `bench train` and `bench rg`: the speed of this machine."""
+
+from typing import Annotated
+
+import typer
+
+from iowbc.cli.options import BenchRecipe, BenchWorkers, RunsFolder, SceneName, runs_folder
+
+
+def bench_simulation(
+    recipe: BenchRecipe = None,
+    scene: SceneName = "lift",
+    environments: Annotated[int, typer.Option(help="Environments a worker.", min=1)] = 48,
+    workers: BenchWorkers = None,
+    others: Annotated[bool, typer.Option(help="Also measure the usual vector environments.")] = True,
+    runs: RunsFolder = None,
+) -> None:
+    """Measure how fast the vector environment steps, against a bare loop of MuJoCo; the figures go to MLflow."""
+    from iowbc.commands.bench import simulation
+
+    simulation(runs_folder(runs), recipe, scene=scene, environments=environments, workers=workers or (), others=others)
+
+
+def bench_training(
+    recipe: BenchRecipe = None,
+    scene: SceneName = "lift",
+    turns: Annotated[int, typer.Option(help="Updates to measure.", min=1)] = 6,
+    others: Annotated[
+        int | None, typer.Option(help="Processes of stable-baselines3; one a core, 0 leaves it out.", min=0)
+    ] = None,
+    runs: RunsFolder = None,
+) -> None:
+    """Measure how fast the teacher trains, against plain stable-baselines3; the figures go to MLflow."""
+    from iowbc.commands.bench import training
+
+    training(runs_folder(runs), recipe, scene=scene, turns=turns, others=others)
+
+
+def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: RunsFolder = None) -> None:
+    """Measure how fast the reference generator's samples are labelled, by each method; the figures go to MLflow."""
+    from iowbc.commands.bench import reference
+
+    reference(runs_folder(runs), recipe, workers=workers or ())

@@ -1,0 +1,84 @@
+"""What several commands take, and what they are given by it."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from iowbc.commands import completion
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from iowbc.pipeline.store.runs import Runs
+    from iowbc.pipeline.store.store import Store
+
+PIPE_WIDTH = 160
+"""Characters in a line of a table where the output is not a terminal."""
+RecipeFile = Annotated[
+    str,
+    typer.Argument(help="Recipe, a YAML file or the name of one.", metavar="RECIPE", autocompletion=completion.recipes),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Change a value of the recipe; repeat for more.",
+        metavar="A.B.C=VALUE",
+        autocompletion=completion.paths,
+    ),
+]
+RunsFolder = Annotated[
+    Path | None,
+    typer.Option("--runs", help="Folder of artifacts and tracking; IOWBC_RUNS, else ./runs.", envvar="IOWBC_RUNS"),
+]
+SweepFile = Annotated[
+    Path | None, typer.Option("--from", help="File with a grid, draws or both: what a sweep varies.", metavar="YAML")
+]
+Until = Annotated[
+    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
+]
+Force = Annotated[
+    list[str] | None,
+    typer.Option(help="Make this stage anew; repeat for more.", metavar="STAGE", autocompletion=completion.stages),
+]
+Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
+SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
+BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe, a YAML file; the defaults.", metavar="RECIPE")]
+BenchWorkers = Annotated[
+    list[int] | None, typer.Option("--workers", help="Worker processes; repeat to measure several.", min=1)
+]
+OnCodeChange = Annotated[
+    Literal["report", "rerun"], typer.Option(help="What to do about a cached stage whose code has changed since.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
+Named = Annotated[
+    str,
+    typer.Argument(
+        help="Recipe (name or file), RECIPE/STAGE, or first characters of a key.",
+        metavar="WHAT",
+        autocompletion=completion.artifacts,
+    ),
+]
+
+
+def console() -> "Console":
+    from rich.console import Console
+
+    columns = os.environ.get("COLUMNS", "")
+    width = int(columns) if columns.isdecimal() and int(columns) > 0 else PIPE_WIDTH
+    return Console(width=None if sys.stdout.isatty() else width)
+
+
+def store_in(folder: Path | None) -> "Store":
+    from iowbc.pipeline.store.store import Store
+
+    return Store(runs_folder(folder))
+
+
+def runs_folder(folder: Path | None) -> "Runs":
+    from iowbc.pipeline.store.runs import Runs
+
+    return Runs(folder or Path("runs"))

@@ -1,0 +1,32 @@
+"""`init`, `schema` and `doctor`: before the first run."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from iowbc.cli.options import RunsFolder, console, runs_folder
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder to make or to fill.", metavar="DIR")],
+    robot: Annotated[str, typer.Option(help="Robot whose description is copied.")] = "g1",
+) -> None:
+    """Copy the recipes and a robot's description into a folder to begin from."""
+    from iowbc.commands.init import begin
+
+    begin(folder, robot, console())
+
+
+def schema(output: Annotated[Path | None, typer.Option(help="File to write to, instead of printing.")] = None) -> None:
+    """Write the JSON Schema of recipes, for editors."""
+    from iowbc.commands.schema import write_schema
+
+    write_schema(output)
+
+
+def doctor(runs: RunsFolder = None) -> None:
+    """Check versions, binaries, rendering, cores, memory and disk."""
+    from iowbc.commands.doctor import examine
+
+    raise typer.Exit(examine(runs_folder(runs), console()))

@@ -1,0 +1,135 @@
+"""`run`, `sweep`, `plan` and `publish`: what makes a recipe's artifacts, or says what would."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from iowbc.cli.options import (
+    AsJson,
+    Force,
+    OnCodeChange,
+    Overrides,
+    RecipeFile,
+    RunsFolder,
+    SweepFile,
+    Until,
+    Workers,
+    console,
+    runs_folder,
+)
+from iowbc.commands import completion
+from iowbc.commands.streams import outlasting_readers
+
+if TYPE_CHECKING:
+    from iowbc.commands.request import Request
+
+
+def run(
+    recipe: RecipeFile,
+    overrides: Overrides = None,
+    until: Until = None,
+    force: Force = None,
+    workers: Workers = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
+    on_code_change: OnCodeChange = "report",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print a plain line for every step of progress.")
+    ] = False,
+    runs: RunsFolder = None,
+) -> None:
+    """Run a recipe: make every stage that is not cached, and resume what was interrupted."""
+    from iowbc.commands.plan import plan as print_plan
+    from iowbc.commands.run import run as run_recipe
+    from iowbc.stages.registry import STAGES
+
+    request = request_of(recipe, overrides, until, force, workers, on_code_change, runs)
+    if dry_run:
+        print_plan(request, STAGES, console())
+    else:
+        with outlasting_readers():
+            raise typer.Exit(
+                run_recipe(request, STAGES, console(), "quiet" if quiet else "verbose" if verbose else "usual")
+            )
+
+
+def sweep(
+    recipe: RecipeFile,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="Vary a value (a,b or 0..4), or change it for all; repeat for a grid.",
+            metavar="A.B.C=VALUES",
+            autocompletion=completion.paths,
+        ),
+    ] = None,
+    file: SweepFile = None,
+    jobs: Annotated[int, typer.Option(help="Points that run at the same time; they share the cores.", min=1)] = 1,
+    until: Until = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes of each point.", min=1)] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
+    on_code_change: OnCodeChange = "report",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="With --dry-run: print JSON.")] = False,
+    runs: RunsFolder = None,
+) -> None:
+    """Run a recipe with every combination of some values; stages that points share are made once."""
+    from iowbc.commands.sweep import SweepRequest, plan_sweep
+    from iowbc.commands.sweep import sweep as run_sweep
+    from iowbc.stages.registry import STAGES
+
+    asked = SweepRequest(request_of(recipe, overrides, until, None, workers, on_code_change, runs), file, jobs)
+    if dry_run:
+        plan_sweep(asked, STAGES, console(), as_json)
+    else:
+        with outlasting_readers():
+            raise typer.Exit(run_sweep(asked, STAGES, console(), quiet))
+
+
+def plan(
+    recipe: RecipeFile,
+    overrides: Overrides = None,
+    until: Until = None,
+    force: Force = None,
+    on_code_change: OnCodeChange = "report",
+    as_sweep: Annotated[bool, typer.Option("--sweep", help="Of a sweep, where --set may name several values.")] = False,
+    file: SweepFile = None,
+    as_json: AsJson = False,
+    runs: RunsFolder = None,
+) -> None:
+    """Say for each stage whether it is cached or would run, why, and how long it takes."""
+    from iowbc.commands.plan import plan as print_plan
+    from iowbc.commands.sweep import SweepRequest, plan_sweep
+    from iowbc.stages.registry import STAGES
+
+    request = request_of(recipe, overrides, until, force, None, on_code_change, runs)
+    if as_sweep or file is not None:
+        plan_sweep(SweepRequest(request, file, 1), STAGES, console(), as_json)
+    else:
+        print_plan(request, STAGES, console(), as_json)
+
+
+def publish(recipe: RecipeFile, overrides: Overrides = None, until: Until = None, runs: RunsFolder = None) -> None:
+    """Put a recipe's finished artifacts into the repository (runs/published): a fresh clone starts from them."""
+    from iowbc.commands.publish import publish_recipe
+    from iowbc.stages.registry import STAGES
+
+    publish_recipe(request_of(recipe, overrides, until, None, None, "report", runs), STAGES, console())
+
+
+def request_of(
+    recipe: str,
+    overrides: list[str] | None,
+    until: str | None,
+    force: list[str] | None,
+    workers: int | None,
+    on_code_change: Literal["report", "rerun"],
+    runs: Path | None,
+) -> "Request":
+    from iowbc.commands.request import Request
+    from iowbc.pipeline.planner import Options
+
+    options = Options(until, frozenset(force or ()), on_code_change, workers)
+    return Request(recipe, tuple(overrides or ()), runs_folder(runs), options)
