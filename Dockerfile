@@ -5,13 +5,15 @@ RUN apt-get update \
  && apt-get install --yes --no-install-recommends libgomp1 libosmesa6 \
  && rm -rf /var/lib/apt/lists/*
 
+# `train,cluster` brings Ray, too.
+ARG EXTRAS=train
 WORKDIR /iowbc
 COPY pyproject.toml constraints.txt ./
 # The heavy packages are a layer of their own, made again only when the versions change.
 RUN python3 -m venv /opt/venv \
  && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt torch==2.13.0 \
  && mkdir iowbc recipes robots && touch iowbc/__init__.py README.md LICENSE NOTICE \
- && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt --editable '.[train]'
+ && /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt --editable ".[${EXTRAS}]"
 COPY README.md LICENSE NOTICE ./
 COPY iowbc iowbc
 COPY robots robots

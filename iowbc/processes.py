@@ -36,14 +36,14 @@ def keep_freed_memory() -> None:
             library.mallopt(option, size)
 
 
-def die_with_parent(parent: int, *, bound: bool = True) -> None:
+def die_with_parent(parent: int, *, bound: bool = True, number: int = signal.SIGKILL) -> None:
     """Ends this process when its parent, process number `parent`, is gone: at once where it already is.
 
-    `bound`: let the kernel kill it. Only a process that the parent's main thread started may ask for that, for what
-    counts is the end of the thread.
+    `bound`: let the kernel send it signal `number`. Only a process that the parent's main thread started may ask for
+    that, for what counts is the end of the thread.
     """
     if bound:
-        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, number, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
 

@@ -1,9 +1,10 @@
 """Jobs for tests that run a stage, and a report that keeps what it is told."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
@@ -30,6 +31,22 @@ class Heard:
 
     def files(self, path: Path) -> None:
         self.shown.append(sorted(found.name for found in path.iterdir()))
+
+
+class Backwards:
+    """Stands for other machines: makes each call here, the last one first."""
+
+    width = 2
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(
+        self, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+    ) -> Iterator[tuple[int, Any]]:
+        for place in reversed(range(len(calls))):
+            self.calls += 1
+            yield place, function(*calls[place], **folders)
 
 
 def make_job(

@@ -44,6 +44,15 @@ Force = Annotated[
     list[str] | None,
     typer.Option(help="Make this stage anew; repeat for more.", metavar="STAGE", autocompletion=completion.stages),
 ]
+Engine = Annotated[
+    Literal["local", "ray"] | None, typer.Option(help="Where stages run: in processes here, or on a Ray cluster.")
+]
+Address = Annotated[
+    str | None,
+    typer.Option(
+        help="Ray cluster: local, local:NODES (both here), auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"
+    ),
+]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
 SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe, a YAML file; the defaults.", metavar="RECIPE")]

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from iowbc.cli.options import (
+    Address,
     AsJson,
+    Engine,
     Force,
     OnCodeChange,
     Overrides,
@@ -31,6 +33,8 @@ def run(
     until: Until = None,
     force: Force = None,
     workers: Workers = None,
+    engine: Engine = None,
+    address: Address = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
     on_code_change: OnCodeChange = "report",
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
@@ -44,7 +48,7 @@ def run(
     from iowbc.commands.run import run as run_recipe
     from iowbc.stages.registry import STAGES
 
-    request = request_of(recipe, overrides, until, force, workers, on_code_change, runs)
+    request = request_of(recipe, overrides, until, force, workers, on_code_change, runs, engine, address)
     if dry_run:
         print_plan(request, STAGES, console())
     else:
@@ -66,9 +70,14 @@ def sweep(
         ),
     ] = None,
     file: SweepFile = None,
-    jobs: Annotated[int, typer.Option(help="Points that run at the same time; they share the cores.", min=1)] = 1,
+    jobs: Annotated[
+        int | None,
+        typer.Option(help="Points at the same time, which share the cores; one, or all cores of Ray.", min=1),
+    ] = None,
     until: Until = None,
     workers: Annotated[int | None, typer.Option(help="Worker processes of each point.", min=1)] = None,
+    engine: Engine = None,
+    address: Address = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
     on_code_change: OnCodeChange = "report",
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
@@ -80,7 +89,8 @@ def sweep(
     from iowbc.commands.sweep import sweep as run_sweep
     from iowbc.stages.registry import STAGES
 
-    asked = SweepRequest(request_of(recipe, overrides, until, None, workers, on_code_change, runs), file, jobs)
+    request = request_of(recipe, overrides, until, None, workers, on_code_change, runs, engine, address)
+    asked = SweepRequest(request, file, jobs)
     if dry_run:
         plan_sweep(asked, STAGES, console(), as_json)
     else:
@@ -106,7 +116,7 @@ def plan(
 
     request = request_of(recipe, overrides, until, force, None, on_code_change, runs)
     if as_sweep or file is not None:
-        plan_sweep(SweepRequest(request, file, 1), STAGES, console(), as_json)
+        plan_sweep(SweepRequest(request, file, None), STAGES, console(), as_json)
     else:
         print_plan(request, STAGES, console(), as_json)
 
@@ -127,9 +137,11 @@ def request_of(
     workers: int | None,
     on_code_change: Literal["report", "rerun"],
     runs: Path | None,
+    engine: Literal["local", "ray"] | None = None,
+    address: str | None = None,
 ) -> "Request":
     from iowbc.commands.request import Request
     from iowbc.pipeline.planner import Options
 
-    options = Options(until, frozenset(force or ()), on_code_change, workers)
+    options = Options(until, frozenset(force or ()), on_code_change, workers, engine, address)
     return Request(recipe, tuple(overrides or ()), runs_folder(runs), options)

@@ -1,4 +1,4 @@
-"""Runs several recipes at once, each in a process of its own with its own log."""
+"""Runs several recipes at once, each in a process or a thread of its own with its own log."""
 
 import multiprocessing
 import os
@@ -6,8 +6,11 @@ import re
 import signal
 import sys
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor
+from concurrent.futures import wait as futures_wait
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkProcess
@@ -29,6 +32,8 @@ LOG_WIDTH = 160
 """Characters in a line of a table in a log."""
 FAILURE = re.compile(r"^\S+ failed: .*")
 """The line of a log that says what failed."""
+Codes = dict[str, int | None]
+"""Exit code of each run by its name; None of one that never began."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +44,53 @@ class Task:
     log: Path
     """What it prints."""
     run: Callable[[Console], int]
-    """Runs it and returns the exit code."""
+    """Runs it, prints to a console, and returns the exit code."""
 
 
-def run_tasks(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board) -> dict[str, int | None]:
-    """Run all, at most `jobs` at a time; the exit code of each by its name, None of one that never began.
+def run_threads(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board, abort: Callable[[], None]) -> Codes:
+    """Run all as `run_processes` does, in threads of this process: for runs whose stages are carried out elsewhere.
+
+    abort: lets all that run end at once.
+    """
+    codes: Codes = {task.name: None for task in tasks}
+    with ThreadPoolExecutor(jobs) as threads:
+        futures = {threads.submit(_begin, task, stop, board): task for task in tasks}
+        try:
+            while futures:
+                over, _ = futures_wait(futures, POLL, FIRST_COMPLETED)
+                for future in over:
+                    task = futures.pop(future)
+                    codes[task.name] = future.result()
+                    if codes[task.name] is not None:
+                        board.ended(task.name, *_outcome(task, codes[task.name]))
+                board.refresh()
+        except KeyboardInterrupt:
+            abort()
+            raise
+    return codes
+
+
+def _begin(task: Task, stop: StopRequest, board: Board) -> int | None:
+    """Run a task in this thread, unless a stop was asked for before."""
+    if stop():
+        return None
+    board.began(task.name)
+    task.log.parent.mkdir(parents=True, exist_ok=True)
+    with task.log.open("a", encoding="utf-8") as log:
+        try:
+            return task.run(Console(file=log, width=LOG_WIDTH))
+        except Exception:
+            log.write(traceback.format_exc())
+            return STAGE_FAILED
+
+
+def run_processes(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board) -> Codes:
+    """Run all, each in a process, at most `jobs` at a time.
 
     One that fails does not stop the others. Once `stop` is asked for, all that run are asked to stop after a
     checkpoint, and none begins. Raises `KeyboardInterrupt` when asked twice, after all have ended.
     """
-    codes: dict[str, int | None] = {task.name: None for task in tasks}
+    codes: Codes = {task.name: None for task in tasks}
     waiting, running = deque(tasks), dict[Task, ForkProcess]()
     told = False
     try:

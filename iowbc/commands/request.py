@@ -24,12 +24,14 @@ class Request:
     overrides: Sequence[str]
     runs: Runs
     options: Options
+    verb: str = "run"
+    """The command: `run` or `sweep`."""
     further: Sequence[str] = ()
     """Words of the command line that only `iowbc sweep` knows."""
 
     def command(self, forced: Sequence[str]) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
-        words = ["iowbc", "sweep" if self.further else "run", self.word, *self.further]
+        words = ["iowbc", self.verb, self.word, *self.further]
         for override in self.overrides:
             words += ["--set", override]
         if self.options.until:
@@ -38,6 +40,10 @@ class Request:
             words += ["--force", stage]
         if self.options.workers:
             words += ["--workers", str(self.options.workers)]
+        if self.options.engine:
+            words += ["--engine", self.options.engine]
+        if self.options.address:
+            words += ["--address", self.options.address]
         if self.options.on_code_change != "report":
             words += ["--on-code-change", self.options.on_code_change]
         if self.runs.root != Path("runs"):

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 
 from iowbc.commands.compare import compare
+from iowbc.commands.engine import engine
 from iowbc.commands.request import Request, prepared, recipes
 from iowbc.commands.results import described, print_results
 from iowbc.commands.training import require_training
@@ -21,6 +22,9 @@ from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import LoadedRecipe
+
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.cluster import Cluster
 
 Manner = Literal["usual", "quiet", "verbose"]
 """How much a run prints."""
@@ -38,11 +42,16 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
     require_training("run")
     require_writable_runs(request.runs)
     try:
-        with StopRequest(shown=console.is_terminal and manner == "usual") as stop:
+        with (
+            engine(request.options, loaded[0].recipe.execution) as cluster,
+            StopRequest(shown=console.is_terminal and manner == "usual") as stop,
+        ):
+            if cluster is not None and manner != "quiet":
+                console.print(cluster.text, highlight=False)
             for planner, robot in ready:
                 if len(ready) > 1 and manner != "quiet":
                     console.print(f"{planner.loaded.recipe.name}:", highlight=False)
-                code = run_recipe(planner, robot, request, console, stop, manner)
+                code = run_recipe(planner, robot, request, console, stop, manner, cluster=cluster)
                 if code != DONE:
                     return code
     except KeyboardInterrupt:
@@ -61,8 +70,14 @@ def run_recipe(
     stop: StopRequest,
     manner: Manner = "usual",
     within: str | None = None,
+    cluster: "Cluster | None" = None,
+    errors: Console | None = None,
 ) -> int:
-    """Run one recipe; returns the exit code. `within`: the run of a sweep to which this one belongs in MLflow."""
+    """Run one recipe; returns the exit code.
+
+    within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
+    where it is said how a run that did not finish goes on; standard error if empty.
+    """
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
@@ -72,6 +87,8 @@ def run_recipe(
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             display = _display(loaded, console, lambda: stop.text, manner)
             runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
+            if cluster is not None:
+                runner.execute = cluster.run
             runner.run()
             status, code = "FINISHED", DONE
             if tracker is not None:
@@ -92,7 +109,8 @@ def run_recipe(
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:
-        Console(stderr=True, soft_wrap=True).print(closing, markup=False, highlight=False)
+        told = errors or Console(stderr=True)
+        told.print(closing, markup=False, highlight=False, soft_wrap=True)
     return code
 
 

@@ -1,15 +1,16 @@
 """`iowbc sweep`: a recipe with every combination of some values, several runs at a time, and what came of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.commands.engine import engine
 from iowbc.commands.named import Named, named
-from iowbc.commands.points import DONE, INTERRUPTED, STAGE_FAILED, Task, failure, run_tasks
+from iowbc.commands.points import DONE, INTERRUPTED, STAGE_FAILED, Task, failure, run_processes, run_threads
 from iowbc.commands.request import Request, prepared
 from iowbc.commands.results import shown_path
 from iowbc.commands.run import run_recipe
@@ -28,6 +29,9 @@ from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
 
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.cluster import Cluster
+
 LOGS = "logs"
 """Folder of a sweep with what each point prints."""
 STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
@@ -41,14 +45,15 @@ class SweepRequest:
     """Recipe and what holds for all points; `--set` of several values varies one."""
     file: Path | None
     """File that says what is varied besides."""
-    jobs: int
-    """Points that run at the same time."""
+    jobs: int | None
+    """Points that run at the same time; empty: one here, as many as there are cores on a cluster."""
 
     @property
     def command(self) -> str:
         """The command that goes on with this sweep."""
-        further = [*(["--from", str(self.file)] if self.file else []), "--jobs", str(self.jobs)]
-        return replace(self.recipe, further=further).command([])
+        further = ["--from", str(self.file)] if self.file else []
+        further += ["--jobs", str(self.jobs)] if self.jobs else []
+        return replace(self.recipe, verb="sweep", further=further).command([])
 
 
 @dataclass(frozen=True)
@@ -67,11 +72,9 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
     found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file)
-    workers = asked.recipe.options.workers or max(1, available_cores() // asked.jobs)
     points = []
     for point in found.points:
-        options = replace(asked.recipe.options, workers=workers)
-        request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides, options=options)
+        request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
         points.append(ReadyPoint(point, *prepared(point.loaded, request, registry), request))
     return found, points
 
@@ -101,16 +104,26 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     family: Family | None = None
     status = "KILLED"
     try:
-        with StopRequest(shown=console.is_terminal and not quiet) as stop:
+        with (
+            engine(asked.recipe.options, execution) as cluster,
+            StopRequest(shown=console.is_terminal and not quiet) as stop,
+        ):
+            if cluster is not None and not quiet:
+                console.print(cluster.text, highlight=False)
+            jobs = _shared_out(points, asked, cluster)
             if execution.track and not _all_cached(before):
                 settings = {point.name: point.settings for point in found.points}
                 family = Family(runs, found.name, execution.experiment, settings, execution.tracking_patience)
                 family.send()
             origin = None if family is None else family.origin
-            tasks = [_task(one, stop, folder, origin) for one in points]
+            tasks = [_task(one, stop, folder, origin, cluster) for one in points]
             views = {task.name: RunView(task.name, task.log) for task in tasks}
-            with Board(console, execution.line_interval, quiet, lambda: stop.text, views) as board:
-                codes = run_tasks(tasks, asked.jobs, stop, board)
+            load = (lambda: "") if cluster is None else lambda: cluster.load
+            with Board(console, execution.line_interval, quiet, lambda: stop.text, views, load) as board:
+                if cluster is None:
+                    codes = run_processes(tasks, jobs, stop, board)
+                else:
+                    codes = run_threads(tasks, jobs, stop, board, cluster.abort)
     except KeyboardInterrupt:
         codes = dict.fromkeys(before, INTERRUPTED)
     code = _code(codes)
@@ -125,8 +138,24 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     return code
 
 
-def _task(one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None) -> Task:
-    run = partial(run_recipe, one.planner, one.robot, one.request, stop=stop, within=origin)
+def _shared_out(points: Sequence[ReadyPoint], asked: SweepRequest, cluster: "Cluster | None") -> int:
+    """Points that run at the same time; each is given its part of the cores, unless it says how many it wants."""
+    cores = available_cores() if cluster is None else cluster.cores
+    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores, len(points))))
+    most = cores if cluster is None else cluster.largest
+    for one in points:
+        wanted = asked.recipe.options.workers or one.planner.loaded.recipe.execution.workers
+        one.planner.options = replace(one.planner.options, workers=wanted or max(1, min(most, cores // jobs)))
+    return jobs
+
+
+def _task(one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None, cluster: "Cluster | None") -> Task:
+    def run(console: Console) -> int:
+        errors = console if cluster is not None else None
+        return run_recipe(
+            one.planner, one.robot, one.request, console, stop, within=origin, cluster=cluster, errors=errors
+        )
+
     return Task(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
 
 

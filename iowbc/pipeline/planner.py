@@ -27,6 +27,8 @@ class Options:
     force: frozenset[str] = frozenset()
     on_code_change: OnCodeChange = "report"
     workers: int | None = None
+    engine: Literal["local", "ray"] | None = None
+    address: str | None = None
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,9 @@ from iowbc.pipeline.tracking.tracker import Tracker
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.writing import as_yaml
 
+Execute = Callable[[Stage, Job], None]
+"""Carries a stage out."""
+
 
 class Runner:
     """One run of a recipe."""
@@ -34,8 +37,12 @@ class Runner:
         tracker: Tracker | None,
         interrupted: Callable[[], bool],
         command: Callable[[list[str]], str] = lambda made: "",
+        execute: Execute = lambda stage, job: stage.run(job),
     ) -> None:
-        """`command`: what goes on with this run once the stages named were made; kept with a stage while it is made."""
+        """`command`: what goes on with this run once the stages named were made; kept with a stage while it is made.
+
+        `execute`: carries a stage out, here unless it says otherwise; the result is the same.
+        """
         self.planner = planner
         self.loaded = planner.loaded
         self.store = planner.store
@@ -45,6 +52,7 @@ class Runner:
         self.tracker = tracker
         self.interrupted = interrupted
         self.command = command
+        self.execute = execute
         self.views = {stage.name: StageView(stage.name) for stage in planner.stages}
         self.artifacts: dict[str, Artifact] = {}
         self.made: list[str] = []
@@ -171,7 +179,7 @@ class Runner:
             predecessor=None if step.predecessor is None else step.predecessor.folder,
         )
         try:
-            stage.run(job)
+            self.execute(stage, job)
             artifact = self._published(step, workspace, workers)
         except (Interrupted, KeyboardInterrupt) as error:
             self._ended(workspace, view, "stopped", "KILLED", str(error))

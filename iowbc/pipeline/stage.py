@@ -1,13 +1,14 @@
 """What a stage declares and what it receives."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from iowbc.recipe.recipe import Recipe
 
+Result = TypeVar("Result")
 SUMMARY = "summary.json"
 """File of an artifact with its metrics."""
 
@@ -26,6 +27,23 @@ class Report(Protocol):
 
     def files(self, path: Path) -> None:
         """Let tracking have a file or folder of the stage while it runs; it may be told again."""
+
+
+class Spread(Protocol):
+    """Other machines that work for a stage."""
+
+    @property
+    def width(self) -> int:
+        """Calls that can run at the same time."""
+
+    def __call__(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+    ) -> Iterator[tuple[int, Result]]:
+        """Call a function of a module with each of these arguments, on any machine; place and result of each call, in
+        the order in which they end. `folders`: what the job reads, given to the function by name, wherever it lies.
+
+        Raises `Interrupted` once the job is asked to stop.
+        """
 
 
 @dataclass(frozen=True)
@@ -50,6 +68,8 @@ class Job:
     """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
     predecessor: Path | None = None
     """Artifact folder of the same stage that this one goes on from; see `Stage.extends`."""
+    spread: Spread | None = None
+    """Other machines that may work for the stage; never changes a result."""
 
     def summarize(self, metrics: Mapping[str, float], **details: Any) -> None:
         """Leave `summary.json`: the figures that tell how it went, shown wherever the artifact is, and details."""
@@ -87,3 +107,5 @@ class Stage:
     """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
+    spreads: bool = False
+    """Whether it leaves its heavy work to `Job.spread` where there is one."""

@@ -1,5 +1,7 @@
 """How a machine runs a recipe; not part of any key."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from iowbc.recipe.section import Section
@@ -10,6 +12,15 @@ class Execution(Section):
 
     workers: int | None = Field(default=None, ge=1, le=1024)
     """Worker processes of the parallel stages; all available cores when empty. `--workers` goes before it."""
+    engine: Literal["local", "ray"] = "local"
+    """Where stages run: in processes here, or on the nodes of a Ray cluster, with the same results. `--engine` goes
+    before it."""
+    address: str = Field(default="local", min_length=1, max_length=200)
+    """The Ray cluster: `local` (one of this machine alone, which ends with the run), `auto` (the one that `ray start`
+    began here), `HOST:PORT`, or `ray://HOST:PORT`. `--address` goes before it."""
+    copy_files: bool = False
+    """Whether nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
+    that are slow. Where they do not see it they copy in any case."""
     track: bool = True
     """Whether runs are recorded in MLflow."""
     experiment: str = Field(default="iowbc", min_length=1, max_length=200)

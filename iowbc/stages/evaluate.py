@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
+from iowbc.stages.spreading import play_everywhere
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +49,7 @@ def run(job: Job) -> None:
         workers=job.workers,
         interrupted=job.interrupted,
         progress=job.report.progress,
+        elsewhere=None if job.spread is None else partial(play_everywhere, job, acting_stage(recipe)),
     )
     try:
         trials = protocol.run()
@@ -103,4 +106,5 @@ STAGE = Stage(
     results=("trials.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
     counts=("eval.trials",),
+    spreads=True,
 )

@@ -1,9 +1,12 @@
 """Stage rg-dataset: labels arm postures and base commands with support postures, and checks them in two ways."""
 
 import time
+from collections.abc import Callable
+from functools import partial
 
 from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import Job, Stage
+from iowbc.stages.spreading import label_everywhere
 
 LABELLED = "labelled.npz"
 """The map of commands that have labels; `feasible.npz` of rg-fit is the part of it where the network moves gently."""
@@ -19,6 +22,7 @@ def run(job: Job) -> None:
     from iowbc.reference.labels.labelling import LabelTask
     from iowbc.reference.labels.plan import SamplePlan
     from iowbc.reference.labels.pool import label_all
+    from iowbc.reference.labels.shards import Shard
     from iowbc.reference.pictures.figures import dataset_figures
     from iowbc.reference.pictures.postures import draw_strip
     from iowbc.reference.ranges import wrong_ranges
@@ -35,13 +39,15 @@ def run(job: Job) -> None:
     def progress(done: int, total: int) -> None:
         job.report.progress(done, total, f"{recipe.method} labels")
 
-    result = label_all(
+    label: Callable[..., Shard] = partial(label_all, workers=job.workers)
+    if job.spread is not None:
+        label = partial(label_everywhere, spread=job.spread)
+    result = label(
         LabelTask(job.robot, recipe, seed, recipe.method),
         range(plan.count),
         folder=job.work / "shards",
         key=job.key,
         chunk_size=CHUNK[recipe.method],
-        workers=job.workers,
         interrupted=job.interrupted,
         progress=progress,
     )
@@ -55,13 +61,12 @@ def run(job: Job) -> None:
     check = None
     if chosen:
         job.report.say(f"checks {len(chosen)} labels against the optimal control problem")
-        again = label_all(
+        again = label(
             LabelTask(job.robot, recipe, seed, "ocp"),
             chosen,
             folder=job.work / "crosscheck",
             key=job.key,
             chunk_size=CHUNK["ocp"],
-            workers=job.workers,
             interrupted=job.interrupted,
             progress=lambda done, total: job.report.progress(done, total, "optimal control"),
         )
@@ -124,4 +129,5 @@ STAGE = Stage(
     results=("dataset.npz", LABELLED),
     packages=("reference", "control", "robot"),
     counts=("rg.sampling.samples",),
+    spreads=True,
 )

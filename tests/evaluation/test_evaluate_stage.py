@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from stage_jobs import make_job
+from stage_jobs import Backwards, make_job
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.report.aggregate import COSTS
@@ -27,6 +28,7 @@ from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import evaluate
+from iowbc.stages.spreading import play_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 
@@ -150,10 +152,15 @@ def test_a_row_is_played_again_bit_for_bit(done: Job, recipe: Recipe, student: P
     assert float(np.sum(again.trace.power) * again.trace.dt) == row["energy"]
 
 
-def test_the_number_of_workers_changes_nothing(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:
-    policy = load_policy(student)
-    protocol = Protocol(Specification(recipe, done.robot), policy, work=tmp_path, workers=0)
+def test_neither_the_number_of_workers_nor_other_machines_change_anything(
+    done: Job, recipe: Recipe, student: Path, tmp_path: Path
+) -> None:
+    spread = Backwards()
+    elsewhere = partial(play_everywhere, replace(done, spread=spread), "distill")
+    world, policy = Specification(recipe, done.robot), load_policy(student)
+    protocol = Protocol(world, policy, work=tmp_path, workers=0, elsewhere=elsewhere)
     pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))
+    assert spread.calls == len(list(done.work.glob("*.batch")))
 
 
 def test_a_damaged_batch_is_played_again(done: Job, recipe: Recipe, student: Path, tmp_path: Path) -> None:

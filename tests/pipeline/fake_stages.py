@@ -1,6 +1,7 @@
 """A pipeline of small stages that count instead of learn, and `main`: the command line on top of it.
 
-`FAKE_BEHAVIOUR` (JSON by stage name) makes stages slow or faulty: `steps`, `pause` [s], `fail` (StageFailed), `raise`;
+`FAKE_BEHAVIOUR` (JSON by stage name) makes stages slow or faulty: `steps`, `pause` [s], `gate` (a file without which
+none goes on after its first step), `fail` (StageFailed), `raise`;
 with `seed` those of recipes with that seed alone.
 With `FAKE_SENDER=off` nothing is sent to MLflow yet.
 """
@@ -37,6 +38,10 @@ def counting(name: str) -> Callable[[Job], None]:
         steps = behaviour.get("steps", 3)
         while done < steps:
             time.sleep(behaviour.get("pause", 0.0))
+            if done and not os.path.exists(behaviour.get("gate", "/")):
+                if job.interrupted():
+                    raise Interrupted(f"{name}: stopped at {done} of {steps}, checkpoint written")
+                continue
             done += 1
             write_checked(job.work / CHECKPOINT, job.key, json.dumps(done).encode(), keep_previous=True)
             job.report.metrics({"count": float(done), "half": done / 2}, done)

@@ -127,7 +127,7 @@ class Command:
     errors_path: Path
 
     def finish(self) -> int:
-        return self.process.wait(timeout=120)
+        return self.process.wait(timeout=240)
 
     def signal(self, number: signal.Signals) -> None:
         self.process.send_signal(number)

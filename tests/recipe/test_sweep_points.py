@@ -86,6 +86,8 @@ def test_the_variants_of_a_recipe_of_recipes_are_an_axis(recipe: str, tmp_path: 
     sweep = load_sweep(str(tmp_path / "both.yaml"), ["seed=0,1"])
     assert sweep.axes == ("recipe", "seed")
     assert [point.name for point in sweep.points] == ["small-seed-0", "other-seed-0", "small-seed-1", "other-seed-1"]
+    alone = load_sweep(str(tmp_path / "both.yaml"), [])
+    assert [(point.name, point.loaded.overrides) for point in alone.points] == [("small", ()), ("other", ())]
 
 
 @pytest.mark.parametrize(

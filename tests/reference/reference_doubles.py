@@ -82,6 +82,7 @@ class DoubleTask:
     """Samples on which a worker is killed: once each where `marks` names a folder, else every time."""
     marks: str = ""
     pause: float = 0.0
+    robot: Path = Path()
     start: bool = True
 
     def first_time(self, index: int) -> bool:

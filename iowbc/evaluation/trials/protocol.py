@@ -1,7 +1,7 @@
 """The whole evaluation: trials of many masses and suites at once over all workers, resumable batch by batch."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 
@@ -27,6 +27,10 @@ def evaluated_world(specification: Specification) -> Specification:
     return Specification(pinned, specification.robot, specification.rg)
 
 
+Batches = Mapping[str, Sequence[Trial]]
+"""Trials that are played together, by the name of their batch."""
+
+
 class Protocol:
     """Plays the trials of a recipe's `eval` section; finished batches are kept in `work` and not played again.
 
@@ -42,11 +46,14 @@ class Protocol:
         workers: int,
         interrupted: Callable[[], bool] = lambda: False,
         progress: Callable[[float, float, str], None] = lambda done, total, note: None,
+        elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None,
     ) -> None:
-        """`progress` is told trials done, trials known of, and what is played."""
+        """`progress` is told trials done, trials known of, and what is played. `elsewhere` plays batches on other
+        machines and yields the file of each, as `play` returns it."""
         self.world, self.policy = world, policy
         self.work, self.workers = work, workers
         self.interrupted, self.progress = interrupted, progress
+        self.elsewhere = elsewhere
         self.measure = measure_of(world.recipe, load_robot(world.robot).joints)
         self.done, self.total = 0, 0
 
@@ -72,12 +79,35 @@ class Protocol:
     def _round(self, number: int, trials: Sequence[Trial]) -> pd.DataFrame:
         """The table of some trials, played batch by batch."""
         self.total += len(trials)
-        batches = list(batched_by_duration(trials, self.world.recipe.eval.batch))
-        tables = [self._batch(f"trials-{number}-{place}", batch) for place, batch in enumerate(batches)]
+        found = batched_by_duration(trials, self.world.recipe.eval.batch)
+        batches = {f"trials-{number}-{place}": batch for place, batch in enumerate(found)}
+        if self.elsewhere is not None:
+            self._play_elsewhere(self.elsewhere, batches)
+        tables = [self._batch(name, batch) for name, batch in batches.items()]
         return pd.concat(tables, ignore_index=True)
 
+    def _play_elsewhere(self, elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]], batches: Batches) -> None:
+        """Have the batches played that are missing."""
+        missing = {name: batch for name, batch in batches.items() if newest_checked(self._file(name), name)[0] is None}
+        played = sum(len(batch) for name, batch in batches.items() if name not in missing)
+        for name, content in elsewhere(missing):
+            self._file(name).write_bytes(content)
+            played += len(missing[name])
+            self.progress(
+                self.done + played, self.total, ", ".join(dict.fromkeys(trial.suite for trial in missing[name]))
+            )
+
+    def play(self, name: str, trials: Sequence[Trial]) -> bytes:
+        """Play one batch; its file."""
+        self._batch(name, trials)
+        return self._file(name).read_bytes()
+
+    def _file(self, name: str) -> Path:
+        """Where a finished batch is kept."""
+        return self.work / f"{name}.batch"
+
     def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
-        path = self.work / f"{name}.batch"
+        path = self._file(name)
         suites = ", ".join(dict.fromkeys(trial.suite for trial in trials))
         content, _ = newest_checked(path, name)
         if content is None:

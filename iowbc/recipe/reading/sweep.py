@@ -71,7 +71,8 @@ def load_sweep(word: str, settings: Sequence[str], file: Path | None = None) -> 
     drawn = described.draws.points() if described.draws is not None else [{}]
     drawn = [{path: value for path, value in point.items() if path not in grid} for point in drawn]
     axes = tuple(dict.fromkeys((*grid, *drawn[0])))
-    _require_axes(axes, file)
+    if axes or load_study(word) is None:
+        _require_axes(axes, file)
     count = len(drawn)
     for values in grid.values():
         count *= len(values)
@@ -103,6 +104,8 @@ def _named(loaded: LoadedRecipe, word: str, settings: Mapping[str, JsonValue]) -
     own = {path: value for path, value in settings.items() if path != RECIPE_AXIS}
     digest = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
     readable = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in own.items())])
+    if not own:
+        return Point(loaded, word, settings)
     name = readable if own.keys() <= {"seed"} else f"{readable[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{digest}"
     recipe = loaded.recipe.model_copy(update={"name": name})
     overrides = (*loaded.overrides, f"name={name}")

@@ -9,10 +9,12 @@ import numpy as np
 import psutil
 import pytest
 from reference_doubles import DoubleTask
+from stage_jobs import Backwards
 
 from iowbc.errors import Interrupted
 from iowbc.reference.labels.pool import CRASHED, label_all
 from iowbc.reference.labels.shards import Shard, read_shard
+from iowbc.stages.spreading import label_everywhere
 
 COUNT, CHUNK = 40, 8
 
@@ -56,6 +58,17 @@ def test_each_sample_is_labelled_or_has_a_reason(expected: Shard) -> None:
     assert sorted([*expected.kept, *expected.rejected]) == list(range(COUNT))
     np.testing.assert_array_equal(expected.labels["support"][:, 0], expected.kept)
     assert set(expected.reasons) == {"a third"}
+
+
+def test_shards_of_other_machines_are_the_same_and_only_missing_ones_are_made(shards: Path, expected: Shard) -> None:
+    for number in (1, 2, 4):
+        (shards / f"{number:05d}.shard").unlink()
+    spread = Backwards()
+    settings: dict[str, Any] = {"interrupted": lambda: False, "progress": lambda done, total: None}
+    task: Any = DoubleTask()
+    made = label_everywhere(task, range(COUNT), spread=spread, folder=shards, key="key", chunk_size=CHUNK, **settings)
+    assert same(made, expected)
+    assert spread.calls == 3
 
 
 @pytest.mark.parametrize("workers", [2, 5])

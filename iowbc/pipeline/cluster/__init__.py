@@ -1,0 +1,1 @@
+"""Stages on Ray: the nodes compute, the driver alone stores and records."""

@@ -1,0 +1,73 @@
+"""Folders on their way between machines, as the bytes of their files under a digest."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from iowbc.errors import Damaged
+from iowbc.pipeline.store.digests import folder_digest, folder_files
+
+Files = Mapping[str, bytes]
+"""Content by relative name."""
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder that a stage reads."""
+
+    path: str
+    """Where it lies on the driver."""
+    digest: str
+    """Of its files, names and contents."""
+    content: tuple[Any, ...]
+    """Ray's reference to its files; inside a tuple, so that a node fetches it only when it asks."""
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    """The files below a folder."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder_files(folder)}
+
+
+def write_files(folder: Path, files: Files) -> None:
+    """Write files below a folder, each in place of what was there."""
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = path.with_name(f".{path.name}.{os.getpid()}")
+        fresh.write_bytes(content)
+        os.replace(fresh, path)
+
+
+def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path:
+    """Where a folder lies on this machine: where the driver has it, if this machine sees it; else a copy of its own.
+
+    The copy stays for later stages. copy: take a copy in any case. Raises `Damaged` where what arrives differs.
+    """
+    there = Path(folder.path)
+    if not copy and there.is_dir() and folder_digest(there) == folder.digest:
+        return there
+    own = _cache() / folder.digest
+    if own.is_dir() and folder_digest(own) == folder.digest:
+        return own
+    shutil.rmtree(own, ignore_errors=True)
+    fresh = Path(tempfile.mkdtemp(dir=_cache()))
+    write_files(fresh, fetch(folder.content[0]))
+    if folder_digest(fresh) != folder.digest:
+        shutil.rmtree(fresh)
+        raise Damaged(f"{folder.path} differs from its digest after its way through Ray's object store")
+    try:
+        os.rename(fresh, own)
+    except OSError:  # another task of this machine was faster
+        shutil.rmtree(fresh)
+    return own
+
+
+def _cache() -> Path:
+    """Where this user's nodes keep what they have fetched."""
+    folder = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}", "inputs")
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    return folder

@@ -1,0 +1,220 @@
+"""What runs on a node: one stage, told to the driver while it goes on."""
+
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.pipeline.cluster.desk import Event
+from iowbc.pipeline.cluster.folders import Files, Folder, files_of, placed, write_files
+from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.cluster.spread import NodeSpread
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.recipe import Recipe
+
+WORD_INTERVAL = 0.5
+"""Seconds between two words to the driver; each asks whether to stop, too."""
+FILES_INTERVAL = 10.0
+"""Seconds between two looks for new checkpoints, which go to the driver where the node does not see its folder."""
+TOKEN = "driver"
+"""File in a stage's scratch by which a node sees that it shares the driver's folder."""
+SCRATCH, OUT = "scratch", "out"
+
+
+@dataclass(frozen=True)
+class Order:
+    """One execution of a stage on a node."""
+
+    task: str
+    """Identifier at the desk."""
+    identity: Identity
+    """The driver's."""
+    run: Callable[[Job], None]
+    recipe: Recipe
+    key: str
+    robot: Folder
+    inputs: Mapping[str, Folder]
+    predecessor: Folder | None
+    out: str
+    """Where the driver has its output."""
+    work: str
+    """Where the driver has its scratch."""
+    token: str
+    workers: int
+    copy: bool
+    """Whether the node works on its own disk although it may see the driver's folders."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an execution has ended."""
+
+    state: Literal["done", "stopped", "failed", "error", "mismatch"]
+    text: str = ""
+    out: Files | None = None
+    """What the stage left; None where the driver sees it."""
+
+
+def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
+    """Run a stage. `scratch`: Ray's reference to what earlier attempts have left; `desk`: Ray's handle of the desk."""
+    import ray
+
+    own = identity()
+    if different := order.identity.mismatch(own):
+        return Outcome("mismatch", different)
+    shared = not order.copy and _read(Path(order.work, TOKEN)) == order.token
+    with tempfile.TemporaryDirectory(prefix="iowbc-stage-") as folder:
+        out, work = (Path(order.out), Path(order.work)) if shared else (Path(folder, OUT), Path(folder, SCRATCH))
+        out.mkdir(exist_ok=True)
+        if not shared:
+            work.mkdir()
+            write_files(work, ray.get(scratch[0]))
+        report = NodeReport(DeskLine(desk, order.task), None if shared else work)
+        report.say(f"runs on {own.host}")
+        report.flush()
+        here = partial(placed, fetch=ray.get, copy=order.copy)
+        try:
+            robot, inputs = here(order.robot), {name: here(read) for name, read in order.inputs.items()}
+            known = {robot: order.robot, **{inputs[name]: read for name, read in order.inputs.items()}}
+            job = Job(
+                recipe=order.recipe,
+                key=order.key,
+                robot=robot,
+                inputs=inputs,
+                out=out,
+                work=work,
+                workers=order.workers,
+                report=report,
+                interrupted=report.stopping,
+                predecessor=None if order.predecessor is None else here(order.predecessor),
+                spread=NodeSpread(order.identity, known, report.stopping, copy=order.copy),
+            )
+            order.run(job)
+        except Interrupted as stopped:
+            report.end(files=True)
+            return Outcome("stopped", str(stopped))
+        except StageFailed as failed:
+            report.end(files=True)
+            return Outcome("failed", str(failed))
+        except Exception:
+            report.end(files=True)
+            return Outcome("error", traceback.format_exc())
+        report.end()
+        return Outcome("done", "", None if shared else files_of(out))
+
+
+class Line(Protocol):
+    """The way to the desk."""
+
+    def tell(self, events: list[Event]) -> bool:
+        """Tell what happened; whether the stage is to stop, as far as was heard."""
+
+    def wait(self) -> None:
+        """Return once all has arrived that was told."""
+
+
+class DeskLine:
+    """Tells without waiting: a task that waits for Ray gives its cores away to another one meanwhile."""
+
+    def __init__(self, desk: Any, task: str) -> None:
+        self._desk, self._task = desk, task
+        self._answer: Any = None
+        self._stop = False
+
+    def tell(self, events: list[Event]) -> bool:
+        """Tell what happened; whether the stage is to stop, as far as was heard."""
+        import ray
+
+        if self._answer is not None and ray.wait([self._answer], timeout=0)[0]:
+            self._stop = bool(ray.get(self._answer))
+        self._answer = self._desk.tell.remote(self._task, events)
+        return self._stop
+
+    def wait(self) -> None:
+        """Return once all has arrived that was told; it arrives in order."""
+        import ray
+
+        if self._answer is not None:
+            ray.get(self._answer)
+
+
+class NodeReport:
+    """A stage's report on a node: gathered, and told to the driver a few times a second."""
+
+    def __init__(self, line: Line, work: Path | None) -> None:
+        """work: scratch whose files the driver does not see."""
+        self._line = line
+        self._work = work
+        self._events: list[Event] = []
+        self._sent: dict[str, tuple[int, int]] = {}
+        self._told = self._looked = time.monotonic()
+        self._stop = False
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        """Record named values at a step."""
+        self._add("metrics", dict(values), step)
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        """Say how far the stage is; of several words that were not told yet the last one counts."""
+        if self._events and self._events[-1][0] == "progress":
+            self._events.pop()
+        self._add("progress", done, total, note)
+
+    def say(self, text: str) -> None:
+        """Print one line."""
+        self._add("say", text)
+
+    def stopping(self) -> bool:
+        """Whether the driver wants the stage to stop after a checkpoint."""
+        self._turn()
+        return self._stop
+
+    def flush(self, *, files: bool = False) -> None:
+        """Tell all that was gathered, and, where asked for, what is new in scratch."""
+        if files and self._work is not None:
+            changed = self._changed(self._work)
+            if changed:
+                self._events.append(("files", changed))
+        self._told = time.monotonic()
+        events, self._events = self._events, []
+        self._stop = self._line.tell(events)
+
+    def end(self, *, files: bool = False) -> None:
+        """Tell the rest, and return once it has arrived."""
+        self.flush(files=files)
+        self._line.wait()
+
+    def _add(self, *event: Any) -> None:
+        self._events.append(event)
+        self._turn()
+
+    def _turn(self) -> None:
+        now = time.monotonic()
+        if now - self._told > WORD_INTERVAL:
+            look = now - self._looked > FILES_INTERVAL
+            if look:
+                self._looked = now
+            self.flush(files=look)
+
+    def _changed(self, work: Path) -> dict[str, bytes]:
+        """Files of scratch that the driver does not have yet."""
+        found = {}
+        for path in work.rglob("*"):
+            if path.is_file() and not path.name.startswith("."):
+                name, state = path.relative_to(work).as_posix(), path.stat()
+                if self._sent.get(name) != (state.st_mtime_ns, state.st_size):
+                    self._sent[name] = state.st_mtime_ns, state.st_size
+                    found[name] = path.read_bytes()
+        return found
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return ""

@@ -1,0 +1,106 @@
+"""Pieces of stages that other machines carry out, with the same results as here."""
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from iowbc.pipeline.stage import Job, Spread
+from iowbc.recipe.recipe import Recipe
+
+if TYPE_CHECKING:
+    from iowbc.evaluation.trials.plan import Trial
+    from iowbc.evaluation.trials.protocol import Batches
+    from iowbc.reference.labels.labelling import LabelTask
+    from iowbc.reference.labels.shards import Shard
+
+SHARES = 4
+"""Pieces for each core: the last ones to end keep the others waiting for a quarter of the time at most."""
+
+
+def label_everywhere(
+    task: "LabelTask",
+    indices: Sequence[int],
+    *,
+    spread: Spread,
+    folder: Path,
+    key: str,
+    chunk_size: int,
+    interrupted: Callable[[], bool],
+    progress: Callable[[int, int], None],
+) -> "Shard":
+    """As `label_all`, the shards that are missing made by other machines, several in a piece."""
+    from iowbc.reference.labels.pool import label_all
+    from iowbc.reference.labels.shards import read_shard
+
+    folder.mkdir(parents=True, exist_ok=True)
+    chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
+    paths = [folder / f"{number:05d}.shard" for number in range(len(chunks))]
+    missing = [number for number, path in enumerate(paths) if read_shard(path, key, chunks[number]) is None]
+    size = max(1, len(missing) // (SHARES * spread.width))
+    shares = [missing[start : start + size] for start in range(0, len(missing), size)]
+    ready = len(indices) - sum(len(chunks[number]) for number in missing)
+    progress(ready, len(indices))
+    calls = [(task, [chunks[number] for number in share], key, chunk_size) for share in shares]
+    for place, shards in spread(label_share, calls, {"robot": task.robot}):
+        for number, content in zip(shares[place], shards, strict=True):
+            paths[number].write_bytes(content)
+            ready += len(chunks[number])
+        progress(ready, len(indices))
+    return label_all(
+        task,
+        indices,
+        folder=folder,
+        key=key,
+        chunk_size=chunk_size,
+        workers=1,
+        interrupted=interrupted,
+        progress=progress,
+    )
+
+
+def label_share(
+    task: "LabelTask", chunks: Sequence[Sequence[int]], key: str, chunk_size: int, *, robot: Path
+) -> list[bytes]:
+    """The shards of some chunks, as they stand on disk; in a process of their own, for a solver may bring it down."""
+    from iowbc.reference.labels.pool import label_all
+
+    with tempfile.TemporaryDirectory(prefix="iowbc-labels-") as folder:
+        label_all(
+            replace(task, robot=robot),
+            [index for chunk in chunks for index in chunk],  # all but the last are full: cut anew, they are the same
+            folder=Path(folder),
+            key=key,
+            chunk_size=chunk_size,
+            workers=1,
+            interrupted=lambda: False,
+            progress=lambda done, total: None,
+        )
+        return [path.read_bytes() for path in sorted(Path(folder).glob("*.shard"))]
+
+
+def play_everywhere(job: Job, acting: str, batches: "Batches") -> "Iterator[tuple[str, bytes]]":
+    """Play batches of trials on other machines; name and file of each. `acting`: the stage whose policy is played."""
+    assert job.spread is not None
+    names = list(batches)
+    folders = {"robot": job.robot, "policy": job.inputs[acting]}
+    folders |= {"generator": job.inputs["rg-fit"]} if "rg-fit" in job.inputs else {}
+    for place, content in job.spread(play_batch, [(job.recipe, name, batches[name]) for name in names], folders):
+        yield names[place], content
+
+
+def play_batch(
+    recipe: Recipe, name: str, trials: "Sequence[Trial]", *, robot: Path, policy: Path, generator: Path | None = None
+) -> bytes:
+    """The file of one batch."""
+    import torch
+
+    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.learning.acting import load_policy
+    from iowbc.task.specification import Specification
+
+    torch.set_num_threads(1)  # as in the stage
+    world = evaluated_world(Specification(recipe, robot, generator))
+    with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
+        return Protocol(world, load_policy(policy), work=Path(folder), workers=0).play(name, trials)

@@ -1,0 +1,93 @@
+"""What nodes and driver exchange: folders by their digest, who they are, and how a stage goes."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iowbc.errors import Damaged
+from iowbc.pipeline.cluster import folders, remote
+from iowbc.pipeline.cluster.folders import Folder, files_of, placed, write_files
+from iowbc.pipeline.cluster.identity import identity
+from iowbc.pipeline.cluster.remote import NodeReport
+from iowbc.pipeline.store.digests import folder_digest
+
+
+@pytest.fixture
+def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Folder:
+    """A folder of the driver's, and a node with an empty cache."""
+    monkeypatch.setattr(folders.tempfile, "gettempdir", lambda: str(tmp_path / "node"))
+    folder = tmp_path / "driver"
+    (folder / "tables").mkdir(parents=True)
+    (folder / "tables" / "a.csv").write_text("1,2")
+    (folder / "net.bin").write_bytes(bytes(range(256)))
+    return Folder(str(folder), folder_digest(folder), (files_of(folder),))
+
+
+def test_a_node_that_sees_the_drivers_folder_reads_it_there(source: Folder) -> None:
+    assert placed(source, pytest.fail, copy=False) == Path(source.path)
+
+
+def test_a_node_fetches_a_folder_once_and_mends_a_damaged_copy(source: Folder) -> None:
+    fetched: list[Any] = []
+
+    def fetch(content: Any) -> Any:
+        fetched.append(content)
+        return content
+
+    first = placed(source, fetch, copy=True)
+    assert first != Path(source.path)
+    assert folder_digest(first) == source.digest
+    assert placed(replace(source, path="/elsewhere"), fetch, copy=False) == first
+    assert len(fetched) == 1
+    (first / "net.bin").write_bytes(b"no longer what it was")
+    assert folder_digest(placed(source, fetch, copy=True)) == source.digest
+    assert len(fetched) == 2
+
+
+def test_what_arrives_otherwise_is_refused(source: Folder) -> None:
+    with pytest.raises(Damaged, match="differs from its digest"):
+        placed(source, lambda content: {**content, "net.bin": b""}, copy=True)
+
+
+def test_a_machine_with_another_package_or_other_code_is_named_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = identity()
+    assert own.mismatch(identity()) == ""
+    other = replace(own, host="node7", versions={**own.versions, "mujoco": "3.0"}, code="f" * 64)
+    told = own.mismatch(other)
+    assert f"mujoco {own.versions['mujoco']} here, 3.0 on node7" in told
+    assert f"code {own.code[:12]} here, ffffffffffff on node7" in told
+
+
+class Heard:
+    """A desk that keeps what it is told, and wants the second who tells to stop."""
+
+    def __init__(self) -> None:
+        self.told: list[list[Any]] = []
+
+    def tell(self, events: list[Any]) -> bool:
+        self.told.append(events)
+        return len(self.told) > 1
+
+    def wait(self) -> None: ...
+
+
+def test_a_report_sends_the_last_progress_and_only_new_checkpoints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(remote, "WORD_INTERVAL", 3600.0)
+    line = Heard()
+    report = NodeReport(line, tmp_path)
+    report.progress(1, 9)
+    report.progress(2, 9, "at 2")
+    report.metrics({"reward": 1.0}, 2)
+    write_files(tmp_path, {"a.checkpoint": b"one"})
+    assert not report.stopping()
+    report.flush(files=True)
+    report.end(files=True)
+    assert line.told == [
+        [("progress", 2, 9, "at 2"), ("metrics", {"reward": 1.0}, 2), ("files", {"a.checkpoint": b"one"})],
+        [],
+    ]
+    assert report.stopping()
