@@ -16,8 +16,9 @@ class Execution(Section):
     """Where stages run: in processes here, or on the nodes of a Ray cluster, with the same results. `--engine` goes
     before it."""
     address: str = Field(default="local", min_length=1, max_length=200)
-    """The Ray cluster: `local` (one of this machine alone, which ends with the run), `auto` (the one that `ray start`
-    began here), `HOST:PORT`, or `ray://HOST:PORT`. `--address` goes before it."""
+    """The Ray cluster: `local` (one of this machine alone, which ends with the run), `local:NODES` (the same of several
+    nodes, which share the cores), `auto` (the one that `ray start` began here), `HOST:PORT`, or `ray://HOST:PORT`.
+    `--address` goes before it."""
     copy_files: bool = False
     """Whether nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
     that are slow. Where they do not see it they copy in any case."""

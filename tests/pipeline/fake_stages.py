@@ -1,7 +1,7 @@
 """A pipeline of small stages that count instead of learn, and `main`: the command line on top of it.
 
 `FAKE_BEHAVIOUR` (JSON by stage name) makes stages slow or faulty: `steps`, `pause` [s], `gate` (a file without which
-none goes on after its first step), `fail` (StageFailed), `raise`;
+none goes on after its first step), `fail` (StageFailed), `raise`, `pieces` (to let other machines count, too);
 with `seed` those of recipes with that seed alone.
 With `FAKE_SENDER=off` nothing is sent to MLflow yet.
 """
@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.files import newest_checked, write_checked
@@ -19,10 +20,17 @@ from iowbc.pipeline import stage as contract
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.tracking import tracker as tracking
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import DESCRIPTION
 
 CHECKPOINT = "checkpoint.one"
 STARTED = "started_at.json"
 """Record of how far the checkpoint was from which a stage went on."""
+
+
+def doubled(number: int, *, robot: Path) -> int:
+    """A piece of a stage, for any machine that has the robot."""
+    assert (robot / DESCRIPTION).is_file()
+    return 2 * number
 
 
 def counting(name: str) -> Callable[[Job], None]:
@@ -57,6 +65,9 @@ def counting(name: str) -> Callable[[Job], None]:
         (job.out / "tables" / "counts.md").write_text(f"| {name} |\n|---|\n| {done} |\n")
         (job.out / "figures" / "curve.png").write_bytes(b"not really a picture")
         (job.out / "result.json").write_text(json.dumps({"seed": job.recipe.seed, "count": done}))
+        if job.spread is not None:
+            calls = [(number,) for number in range(behaviour.get("pieces", 0))]
+            assert sorted(job.spread(doubled, calls, {"robot": job.robot})) == [(n, 2 * n) for n in range(len(calls))]
         (job.out / STARTED).write_text(json.dumps(started_at))
         job.summarize({"count": float(done)}, note=behaviour.get("note", ""))
 

@@ -17,10 +17,7 @@ from iowbc.pipeline.cluster.identity import identity
 from iowbc.pipeline.cluster.remote import TOKEN, Order, Outcome, execute
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
-from iowbc.processes import available_cores
 
-LOCAL = "local"
-"""Address that stands for a cluster of this machine alone, which ends with the run."""
 TRIES = 5
 """Times that a stage is begun whose node or worker is lost, before it counts as failed."""
 POLL = 0.2
@@ -186,20 +183,19 @@ class Cluster:
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
         ask = self._ray.remote(num_cpus=0, max_retries=0)(identity)
-        asked = {
-            node["NodeManagerAddress"]: ask.options(
-                scheduling_strategy=NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
-            ).remote()
-            for node in self._alive()
-        }
+        nodes = self._alive()
+        asked = [
+            ask.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)).remote()
+            for node in nodes
+        ]
         problems = []
-        for address, reference in asked.items():
+        for node, reference in zip(nodes, asked, strict=True):
             try:
                 different = identity().mismatch(self._ray.get(reference))
             except self._ray.exceptions.RayError as error:
                 different = f"cannot run iowbc: {str(error).strip().splitlines()[-1]}"
             if different:
-                problems.append(f"node {address}: {different}")
+                problems.append(f"node {node['NodeManagerAddress']}: {different}")
         if problems:
             self.close()
             raise UsageError("\n".join([*problems, "install the same version of iowbc on all nodes"]))
@@ -213,11 +209,9 @@ def connected(address: str, *, copy: bool) -> Iterator[Cluster]:
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
     with ExitStack() as held:
-        if address == LOCAL:
-            os.environ.update(loopback.SETTINGS)
-            for name, value in loopback.secured().items():
-                os.environ.setdefault(name, value)
-            address = held.enter_context(loopback.node(available_cores()))
+        if shares := loopback.shares(address):
+            os.environ.update(loopback.ALONE | loopback.secured())
+            address = held.enter_context(loopback.nodes(shares))
         cluster = Cluster(address, copy=copy)
         held.callback(cluster.close)
         yield cluster
@@ -230,8 +224,8 @@ def _initialised(address: str) -> Any:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except Exception as error:  # Ray raises this and that
         raise UsageError(
-            f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local (this machine alone), "
-            "auto (the one that `ray start` began here), HOST:PORT, or ray://HOST:PORT"
+            f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local, or local:NODES (this machine "
+            "alone), auto (the one that `ray start` began here), HOST:PORT, or ray://HOST:PORT"
         ) from error
     return ray
 

@@ -67,7 +67,11 @@ def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path
 
 
 def _cache() -> Path:
-    """Where this user's nodes keep what they have fetched."""
-    folder = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}", "inputs")
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    """Where this user's nodes keep what they have fetched. Raises `Damaged` where it belongs to somebody else."""
+    own = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}")
+    own.mkdir(exist_ok=True, mode=0o700)
+    if own.stat().st_uid != os.getuid():
+        raise Damaged(f"{own} belongs to another user, who could change what stages read; remove it, or set TMPDIR")
+    folder = own / "inputs"
+    folder.mkdir(exist_ok=True)
     return folder
