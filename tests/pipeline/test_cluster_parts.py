@@ -17,6 +17,7 @@ from iowbc.pipeline.store.digests import folder_digest
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Folder:
     """A folder of the driver's, and a node with an empty cache."""
+    (tmp_path / "node").mkdir()
     monkeypatch.setattr(folders.tempfile, "gettempdir", lambda: str(tmp_path / "node"))
     folder = tmp_path / "driver"
     (folder / "tables").mkdir(parents=True)
@@ -73,21 +74,25 @@ class Heard:
     def wait(self) -> None: ...
 
 
-def test_a_report_sends_the_last_progress_and_only_new_checkpoints(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_report_sends_the_last_progress_and_only_new_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(remote, "WORD_INTERVAL", 3600.0)
     line = Heard()
-    report = NodeReport(line, tmp_path)
+    report = NodeReport(line, tmp_path, sends=True)
     report.progress(1, 9)
     report.progress(2, 9, "at 2")
     report.metrics({"reward": 1.0}, 2)
     write_files(tmp_path, {"a.checkpoint": b"one"})
     assert not report.stopping()
+    report.files(tmp_path / "a.checkpoint")
     report.flush(files=True)
     report.end(files=True)
     assert line.told == [
-        [("progress", 2, 9, "at 2"), ("metrics", {"reward": 1.0}, 2), ("files", {"a.checkpoint": b"one"})],
+        [
+            ("progress", 2, 9, "at 2"),
+            ("metrics", {"reward": 1.0}, 2),
+            ("files", {"a.checkpoint": b"one"}),
+            ("shown", "a.checkpoint"),
+        ],
         [],
     ]
     assert report.stopping()

@@ -47,7 +47,7 @@ def test_a_point_that_fails_does_not_stop_the_others(workplace: Workplace) -> No
     assert done.code == 1
     assert "small-seed-2: done" in done.output
     assert "1 of 3 points failed:\n  small-seed-1: teacher failed: it got lost" in done.errors
-    assert done.errors.strip().splitlines()[-1] == "iowbc sweep small.yaml --jobs 1 --set seed=0..2"
+    assert done.errors.strip().splitlines()[-1] == "iowbc sweep small.yaml --set seed=0..2"
     assert counts(workplace)["export"] == 2
 
 

@@ -239,5 +239,7 @@ def _tell(job: Job, event: Event) -> None:
         job.report.progress(*rest)
     elif kind == "say":
         job.report.say(*rest)
+    elif kind == "shown":
+        job.report.files(job.work / rest[0])
     else:
         write_files(job.work, rest[0])

@@ -3,7 +3,8 @@
 from typing import Any
 
 Event = tuple[Any, ...]
-"""`("metrics", values, step)`, `("progress", done, total, note)`, `("say", text)`, or `("files", files)` of scratch."""
+"""`("metrics", values, step)`, `("progress", done, total, note)`, `("say", text)`, `("files", files)` of scratch,
+or `("shown", name)` of one of them that tracking is to have."""
 
 
 class Desk:

@@ -74,7 +74,7 @@ def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
         if not shared:
             work.mkdir()
             write_files(work, ray.get(scratch[0]))
-        report = NodeReport(DeskLine(desk, order.task), None if shared else work)
+        report = NodeReport(DeskLine(desk, order.task), work, sends=not shared)
         report.say(f"runs on {own.host}")
         report.flush()
         here = partial(placed, fetch=ray.get, copy=order.copy)
@@ -146,10 +146,11 @@ class DeskLine:
 class NodeReport:
     """A stage's report on a node: gathered, and told to the driver a few times a second."""
 
-    def __init__(self, line: Line, work: Path | None) -> None:
-        """work: scratch whose files the driver does not see."""
+    def __init__(self, line: Line, work: Path, *, sends: bool) -> None:
+        """work: the stage's scratch. sends: whether the driver does not see it, and is sent its files."""
         self._line = line
         self._work = work
+        self._sends = sends
         self._events: list[Event] = []
         self._sent: dict[str, tuple[int, int]] = {}
         self._told = self._looked = time.monotonic()
@@ -169,6 +170,11 @@ class NodeReport:
         """Print one line."""
         self._add("say", text)
 
+    def files(self, path: Path) -> None:
+        """Let tracking have a file or folder of the scratch; the driver has it before it hears of it."""
+        self._gather()
+        self._add("shown", path.relative_to(self._work).as_posix())
+
     def stopping(self) -> bool:
         """Whether the driver wants the stage to stop after a checkpoint."""
         self._turn()
@@ -176,10 +182,8 @@ class NodeReport:
 
     def flush(self, *, files: bool = False) -> None:
         """Tell all that was gathered, and, where asked for, what is new in scratch."""
-        if files and self._work is not None:
-            changed = self._changed(self._work)
-            if changed:
-                self._events.append(("files", changed))
+        if files:
+            self._gather()
         self._told = time.monotonic()
         events, self._events = self._events, []
         self._stop = self._line.tell(events)
@@ -201,16 +205,17 @@ class NodeReport:
                 self._looked = now
             self.flush(files=look)
 
-    def _changed(self, work: Path) -> dict[str, bytes]:
-        """Files of scratch that the driver does not have yet."""
+    def _gather(self) -> None:
+        """Gather the files of scratch that the driver neither sees nor has."""
         found = {}
-        for path in work.rglob("*"):
+        for path in self._work.rglob("*") if self._sends else ():
             if path.is_file() and not path.name.startswith("."):
-                name, state = path.relative_to(work).as_posix(), path.stat()
+                name, state = path.relative_to(self._work).as_posix(), path.stat()
                 if self._sent.get(name) != (state.st_mtime_ns, state.st_size):
                     self._sent[name] = state.st_mtime_ns, state.st_size
                     found[name] = path.read_bytes()
-        return found
+        if found:
+            self._events.append(("files", found))
 
 
 def _read(path: Path) -> str:
