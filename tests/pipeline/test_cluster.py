@@ -20,8 +20,8 @@ WORDS = ("sweep", "small.yaml", "--set", "seed=0..2", "--set", "execution.copy_f
 RAY = ("--jobs", "3", "--workers", "64", "--engine", "ray", "--address")
 """Each point takes a whole node for its teacher."""
 RAYS = ("raylet", "gcs_server", "ray::")
-HEALTH = {"RAY_health_check_failure_threshold": "2"}
-"""Ray believes in a node's death after two looks; after five otherwise."""
+HEALTH = {"RAY_health_check_failure_threshold": "3", "RAY_health_check_period_ms": "1000"}
+"""Ray looks three times in three seconds before it believes in a node's death, not five times in fifteen."""
 
 
 class Sweep:
@@ -108,9 +108,11 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
 def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: Sweep, tmp_path: Path) -> None:
     command = sweep.start("local:2")
     sweep.wait("teacher: runs on", 2)
-    for process in sweep.processes():
-        if process.name() == "raylet" and "--head" not in process.cmdline():
-            process.kill()
+    second = next(
+        process for process in sweep.processes() if process.name() == "raylet" and "--head" not in process.cmdline()
+    )
+    for process in (second, *second.children(recursive=True)):
+        process.kill()
     sweep.wait("was lost", 1)
     sweep.gate.touch()
     assert command.finish() == 0, command.errors
