@@ -1,19 +1,30 @@
 """`iowbc diff A B`: how two recipes or two artifacts differ in recipe, keys, versions and metrics."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.named import Named, named
+from iowbc.commands.tables import hanging
 from iowbc.errors import UsageError, shown
+from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.planner import changed_code
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
+
+ABSENT = "(absent)"
+"""In place of a value that one of the two has not."""
+INDENT = 2
+"""Characters by which differences stand to the right of their stage."""
 
 
 def diff(store: Store, console: Console, first: str, second: str, as_json: bool = False) -> None:
@@ -22,13 +33,67 @@ def diff(store: Store, console: Console, first: str, second: str, as_json: bool 
     if as_json:
         print_json(console, {"first": first, "second": second, "differences": difference_lines(a, b)})
         return
-    for line in difference_lines(a, b) or ["no difference"]:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    found = list(differences_of(a, b))
+    if not found:
+        console.print("no difference")
+    elif console.is_terminal:
+        console.print(f"{first} -> {second}", markup=False, highlight=False, soft_wrap=True)
+        for place in dict.fromkeys(difference.place for difference in found):
+            _draw(console, place, [difference for difference in found if difference.place == place])
+    else:
+        for difference in found:
+            console.print(difference.line, markup=False, highlight=False, soft_wrap=True)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One value that differs."""
+
+    place: str
+    """The stage; empty for the recipe."""
+    name: str
+    old: str = ""
+    new: str = ""
+    step: str = ""
+    """Of a number: by how much."""
+    mark: str = ": "
+    """Between name and values, where they are written in a line."""
+
+    @property
+    def has_values(self) -> bool:
+        return bool(self.old or self.new)
+
+    @property
+    def line(self) -> str:
+        values = f"{self.mark}{self.old} -> {self.new}" if self.has_values else ""
+        return f"{f'{self.place}: ' if self.place else ''}{self.name}{values}{f' ({self.step})' if self.step else ''}"
+
+
+def _draw(console: Console, place: str, found: Sequence[Difference]) -> None:
+    """The differences of one place, old and new values below one another, and what has none below them."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True)
+    for _ in range(3):
+        table.add_column(overflow="fold")
+    for one in found:
+        if one.has_values:
+            table.add_row(*map(Text, (one.name, one.old, one.new, one.step)))
+    console.print(Text(place or "recipe", style="bold"))
+    console.print(Padding(table, (0, 0, 0, INDENT)))
+    for one in found:
+        if not one.has_values:
+            console.print(hanging(one.name, console.width, INDENT), markup=False, highlight=False)
 
 
 def difference_lines(a: Named, b: Named) -> list[str]:
     """How two recipes or artifacts differ, a line each; empty where they do not."""
-    return [*_recipes(a, b), *_stages(a, b)]
+    return [difference.line for difference in differences_of(a, b)]
+
+
+def differences_of(a: Named, b: Named) -> Iterator[Difference]:
+    """How two recipes or artifacts differ."""
+    yield from _changes("", "", a.recipe or {}, b.recipe or {})
+    yield from _stages(a, b)
 
 
 def _either(store: Store, word: str) -> Named:
@@ -42,51 +107,53 @@ def _either(store: Store, word: str) -> Named:
     return named(store, word)
 
 
-def _recipes(a: Named, b: Named) -> Iterator[str]:
-    yield from _changes("", a.recipe or {}, b.recipe or {})
-
-
-def _stages(a: Named, b: Named) -> Iterator[str]:
+def _stages(a: Named, b: Named) -> Iterator[Difference]:
     for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
         old, new = a.artifacts.get(stage), b.artifacts.get(stage)
         if old is None or new is None:
-            yield f"{stage}: only in {b.word if old is None else a.word}"
+            yield Difference(stage, f"only in {b.word if old is None else a.word}")
         else:
             yield from _artifacts(stage, old, new, with_recipe=a.recipe is None or b.recipe is None)
 
 
-def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[str]:
+def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[Difference]:
     before, after = old.manifest, new.manifest
     if before.key != after.key:
-        yield f"{stage}: key {before.key[:12]} -> {after.key[:12]}"
+        yield Difference(stage, "key", before.key[:KEY_LENGTH], after.key[:KEY_LENGTH], mark=" ")
     elif before.digest == after.digest:
         return
     if with_recipe:
-        yield from _changes(f"{stage}: ", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
-    yield from _changes(f"{stage}: input ", old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {}))
-    yield from _changes(f"{stage}: stage version ", {"": before.version}, {"": after.version})
-    yield from _changes(f"{stage}: version of ", before.versions, after.versions)
+        yield from _changes(stage, "", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
+    for name, first, second in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
+        yield Difference(stage, f"input {name}", _digest(first), _digest(second))
+    if before.version != after.version:
+        yield Difference(stage, "stage version", str(before.version), str(after.version))
+    yield from _changes(stage, "version of ", before.versions, after.versions)
     changed = changed_code(before.code, after.code)
     if changed:
-        yield f"{stage}: code of {', '.join(changed)}"
+        yield Difference(stage, f"code of {', '.join(changed)}")
     for name in dict.fromkeys([*old.metrics, *new.metrics]):
-        values = old.metrics.get(name), new.metrics.get(name)
-        if values[0] != values[1]:
-            yield f"{stage}: metric {name}: {_number(values[0])} -> {_number(values[1])}{_step(*values)}"
+        first, second = old.metrics.get(name), new.metrics.get(name)
+        if first != second:
+            yield Difference(stage, f"metric {name}", _number(first), _number(second), _step(first, second))
 
 
-def _changes(prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str]:
+def _changes(place: str, prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Difference]:
     for path, old, new in differences(nested(before), nested(after)):
-        yield f"{prefix}{path}: {_value(old)} -> {_value(new)}"
+        yield Difference(place, f"{prefix}{path}", _value(old), _value(new))
+
+
+def _digest(value: Any) -> str:
+    return ABSENT if value is MISSING else str(value)[:KEY_LENGTH]
 
 
 def _value(value: Any) -> str:
-    return "(absent)" if value is MISSING else shown(value)
+    return ABSENT if value is MISSING else shown(value)
 
 
 def _number(value: float | None) -> str:
-    return "(absent)" if value is None else f"{value:.6g}"
+    return ABSENT if value is None else figure(value, 6)
 
 
 def _step(old: float | None, new: float | None) -> str:
-    return f" ({new - old:+.3g})" if old is not None and new is not None else ""
+    return figure(new - old, 3, "+") if old is not None and new is not None else ""

@@ -4,17 +4,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.request import Request, prepared, recipes
+from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Step
 from iowbc.pipeline.stage import Stage
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
+REASON_INDENT = 4
+"""Characters by which reasons stand to the right of their stage."""
 
 
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
@@ -33,13 +35,12 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_j
 
 
 def _print(steps: Sequence[Step], console: Console) -> None:
-    """A row for each stage, and the time in all."""
-    table = Table(box=None, padding=(0, 1))
-    for name in ("stage", "plan", "why", "takes about"):
-        table.add_column(name, no_wrap=name != "why")
+    """What is planned for each stage, the reasons below it, and the time in all."""
+    widest = max((len(step.stage.name) for step in steps), default=0)
     for step in steps:
-        table.add_row(*_row(step))
-    console.print(table)
+        console.print(Text.assemble((step.stage.name.ljust(widest + 2), "bold"), _planned(step)))
+        for line in _why(step):
+            console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
     known = [step.expected for step in missing if step.expected is not None]
@@ -54,14 +55,19 @@ def _print(steps: Sequence[Step], console: Console) -> None:
         console.print(f"{count}: {', and '.join(parts)}", highlight=False)
 
 
-def _row(step: Step) -> tuple[str | Text, ...]:
-    """Stage, what is planned for it, why, and the time that it takes."""
+def _planned(step: Step) -> Text:
+    """Whether it is cached, and by which key, or would run, and for how long."""
     if step.cached:
-        why = "\n".join(step.notes) or (step.key or "")[:KEY_LENGTH]
         published = step.artifact is not None and step.artifact.published
-        return step.stage.name, Text("cached (published)" if published else "cached", style="cyan"), Text(why), ""
-    why = "\n".join((short(step.reasons, REASONS_SHOWN), *step.notes))
-    return step.stage.name, Text("run", style="bold yellow"), Text(why), duration(step.expected)
+        key = f"  {(step.key or '')[:KEY_LENGTH]}"
+        return Text.assemble(("cached (published)" if published else "cached", "cyan"), (key, "dim"))
+    takes = "" if step.expected is None else f", about {duration(step.expected)}"
+    return Text.assemble(("run", "bold yellow"), takes)
+
+
+def _why(step: Step) -> Sequence[str]:
+    """A line for each reason and note."""
+    return step.notes if step.cached else (*short(step.reasons, REASONS_SHOWN).splitlines(), *step.notes)
 
 
 def _data(step: Step) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
@@ -39,7 +40,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
         for film in sorted((folder / "videos").glob("*")):
             _line(console, f"film  {shown_path(film)}")
     for stage, artifact in artifacts.items():
-        chosen = ", ".join(f"{name} {value:.4g}" for name, value in headline(stage, artifact.metrics))
+        chosen = ", ".join(f"{name} {figure(value)}" for name, value in headline(stage, artifact.metrics))
         if chosen:
             console.print(Text(f"{stage:<10}  {chosen}"), no_wrap=True, overflow="ellipsis")
     for folder in folders.values():
@@ -98,7 +99,7 @@ def _rank(path: Path) -> tuple[int, str]:
 def metrics_text(artifact: Artifact, limit: int | None = None) -> str:
     """The metrics of an artifact in one line, or the first few."""
     items = list(artifact.metrics.items())
-    text = ", ".join(f"{name} {value:.4g}" for name, value in items[:limit])
+    text = ", ".join(f"{name} {figure(value)}" for name, value in items[:limit])
     return text + (", ..." if limit is not None and len(items) > limit else "")
 
 

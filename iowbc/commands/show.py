@@ -13,7 +13,7 @@ from iowbc.commands.named import named
 from iowbc.commands.results import shown_path
 from iowbc.commands.tables import metric_columns
 from iowbc.errors import shown
-from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
+from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.links import named_folder
@@ -52,7 +52,7 @@ def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
         "made": f"{ago(manifest.made)} by recipe {manifest.recipe} on {manifest.host}",
         "took": f"{duration(manifest.seconds)} in {manifest.attempts} attempt(s) with {manifest.workers} worker(s)",
         "reads": "\n".join(f"{name} (content {digest[:KEY_LENGTH]})" for name, digest in _inputs(ingredients).items()),
-        "metrics": "\n".join(f"{name} {value:.6g}" for name, value in artifact.metrics.items()),
+        "metrics": "\n".join(f"{name} {figure(value, 6)}" for name, value in artifact.metrics.items()),
         "files": "\n".join(f"{name} ({size(record.size)})" for name, record in manifest.files.items()),
         "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
         "recipe": "\n".join(_unusual(ingredients.get("recipe", {}))),

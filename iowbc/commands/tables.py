@@ -1,11 +1,13 @@
 """Tables without lines, as every command prints them."""
 
+import textwrap
 from collections.abc import Sequence
 
 from rich.columns import Columns
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 
 FOLDED = ("metrics", "finished stages", "used by", "recipe", "why")
@@ -22,9 +24,15 @@ def plain_table(*columns: str) -> Table:
     return table
 
 
+def hanging(line: str, width: int, indent: int) -> str:
+    """A line to the right of its heading, and what of it does not fit two characters further to the right."""
+    first, others = " " * indent, " " * (indent + 2)
+    return textwrap.fill(line, width, initial_indent=first, subsequent_indent=others, break_on_hyphens=False)
+
+
 def metric_columns(artifact: Artifact) -> Columns:
     """All metrics of an artifact, in as many columns as fit."""
     cells: Sequence[Text] = [
-        Text.assemble((f"{name} ", "dim"), f"{value:.5g}") for name, value in artifact.metrics.items()
+        Text.assemble((f"{name} ", "dim"), figure(value)) for name, value in artifact.metrics.items()
     ]
     return Columns(cells, padding=(0, 2), equal=True, column_first=True)

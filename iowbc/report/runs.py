@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 
 NAMING = ("seed", "name", "description", "execution")
@@ -81,7 +82,7 @@ def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
 def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
     values = [group.values(stage, metric) for group in groups]
     first = float(values[0].mean()) if len(values[0]) else None
-    deltas = tuple("" if first is None or not len(own) else f"{own.mean() - first:+.3g}" for own in values[1:])
+    deltas = tuple("" if first is None or not len(own) else figure(own.mean() - first, 3, "+") for own in values[1:])
     differs = any(not np.array_equal(np.unique(own), np.unique(values[0])) for own in values[1:])
     return MetricRow(stage, metric, tuple(map(_cell, values)), deltas, differs or len(groups) == 1)
 
@@ -90,7 +91,7 @@ def _cell(values: NDArray[np.float64]) -> str:
     if not len(values):
         return ""
     spread = f" ± {np.ptp(values) / 2:.2g}" if len(values) > 1 else ""
-    return f"{values.mean():.4g}{spread}"
+    return f"{figure(values.mean())}{spread}"
 
 
 def _compared(run: Run) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Spans of time, sizes and lists of reasons in words for people."""
+"""Spans of time, numbers, sizes and lists of reasons in words for people."""
 
 import time
 from collections.abc import Sequence
@@ -35,6 +35,11 @@ def pace(rate: float | None) -> str:
 def ago(moment: float) -> str:
     """How long ago a moment [s since 1970] was; empty for 0."""
     return f"{duration(max(0.0, time.time() - moment))} ago" if moment else ""
+
+
+def figure(value: float, digits: int = 4, sign: str = "") -> str:
+    """A number: `2,402,304` where it is whole, else with so many digits that count; with `sign` "+", also its sign."""
+    return f"{value:{sign},.0f}" if value == round(value, 0) and abs(value) < 1e12 else f"{value:{sign}.{digits}g}"
 
 
 def size(count: float) -> str:
