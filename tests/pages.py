@@ -1,6 +1,7 @@
 """What a page of the documentation asks a reader to write and to type."""
 
 import re
+import shlex
 from pathlib import Path
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -13,10 +14,12 @@ def files(page: str) -> dict[str, str]:
 
 
 def commands(page: str) -> list[list[str]]:
-    """Words of each `iowbc ...` line that a page asks to type, without the program's name."""
+    """Words of each `iowbc ...` that a page asks to type or speaks of, without the program's name."""
     text = (DOCS / page).read_text(encoding="utf-8")
     blocks = re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
-    return [line.split()[1:] for block in blocks for line in block.splitlines() if line.startswith("iowbc ")]
+    typed = [line for block in blocks for line in block.splitlines() if line.startswith("iowbc ")]
+    spoken_of = re.findall(r"`(iowbc [^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+    return [shlex.split(line.replace("\n", " "), comments=True)[1:] for line in (*typed, *spoken_of)]
 
 
 def write(page: str, folder: Path) -> None:

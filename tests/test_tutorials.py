@@ -27,7 +27,8 @@ TINY = (
     *("teacher.rollout=16", "teacher.steps=64", "teacher.minibatches=2", "teacher.epochs=1", "teacher.hidden=[16, 8]"),
     *("teacher.check.every=1", "teacher.check.trials=1", "teacher.check.sequence=[{duration: 0.2, ramp: 0.0}]"),
 )
-PAGES = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.glob("tutorials/*.md"))
+TUTORIALS = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.glob("tutorials/*.md"))
+PAGES = ["../README.md", "../CHANGELOG.md", *TUTORIALS, *sorted(path.name for path in DOCS.glob("*.md"))]
 
 
 @pytest.fixture
@@ -40,13 +41,13 @@ def place(tmp_path: Path) -> Path:
 
 def test_there_are_four_and_the_site_lists_them() -> None:
     listed = (ROOT / "mkdocs.yml").read_text()
-    assert len(PAGES) == 4
-    assert all(page in listed for page in PAGES)
+    assert len(TUTORIALS) == 4
+    assert all(page in listed for page in TUTORIALS)
     assert all(path.name in listed for path in DOCS.glob("*.md"))
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_what_a_tutorial_types_is_understood(page: str) -> None:
+def test_every_command_that_a_page_names_is_understood(page: str) -> None:
     program = typer.main.get_command(app)
     for words in commands(page):
         command, context = program, click.Context(program, info_name="iowbc")
