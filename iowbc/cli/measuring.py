@@ -1,10 +1,13 @@
-"""`bench sim`, `bench train` and `bench rg`: the speed of this machine."""
+"""`bench sim`, `bench train`, `bench rg` and `bench scale`: the speed of this machine."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from iowbc.cli.options import BenchRecipe, BenchWorkers, RunsFolder, SceneName, runs_folder
+
+if TYPE_CHECKING:
+    from iowbc.recipe.recipe import Recipe
 
 
 def bench_simulation(
@@ -41,3 +44,19 @@ def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, ru
     from iowbc.commands.bench import reference
 
     reference(runs_folder(runs), recipe, workers=workers or ())
+
+
+def bench_scale(
+    recipe: BenchRecipe = None,
+    turns: Annotated[int, typer.Option(help="Turns of one node and two.", min=1)] = 3,
+    runs: RunsFolder = None,
+) -> None:
+    """Measure labels and trials on one node of Ray and on two, and what its engine costs; the figures go to MLflow."""
+    from iowbc.commands.bench import scale
+
+    def measure(recipe: "Recipe | None") -> dict[str, float]:
+        from iowbc.stages import scaling
+
+        return scaling.main(recipe, turns=turns)
+
+    scale(runs_folder(runs), recipe, measure)

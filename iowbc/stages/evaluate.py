@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
@@ -49,7 +50,7 @@ def run(job: Job) -> None:
         workers=job.workers,
         interrupted=job.interrupted,
         progress=job.report.progress,
-        elsewhere=None if job.spread is None else partial(play_everywhere, job, acting_stage(recipe)),
+        elsewhere=None if job.spread is None else partial(play_everywhere, job.spread, recipe, read_by_trials(job)),
     )
     try:
         trials = protocol.run()
@@ -70,6 +71,12 @@ def run(job: Job) -> None:
     for suite, rows in summary[summary["kind"] != "pushes"].groupby("suite", sort=False):
         counts = ", ".join(f"{_load(row)} {row['succeeded']}/{row['trials']}" for _, row in rows.iterrows())
         job.report.say(f"{suite}: succeeded {counts}")
+
+
+def read_by_trials(job: Job) -> dict[str, Path]:
+    """Folders from which a batch of trials can be played on another machine; see `play_batch`."""
+    generator = {"generator": job.inputs["rg-fit"]} if "rg-fit" in job.inputs else {}
+    return {"robot": job.robot, "policy": job.inputs[acting_stage(job.recipe)], **generator}
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:

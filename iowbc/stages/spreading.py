@@ -1,12 +1,12 @@
 """Pieces of stages that other machines carry out, with the same results as here."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from iowbc.pipeline.stage import Job, Spread
+from iowbc.pipeline.stage import Spread
 from iowbc.recipe.recipe import Recipe
 
 if TYPE_CHECKING:
@@ -80,13 +80,12 @@ def label_share(
         return [path.read_bytes() for path in sorted(Path(folder).glob("*.shard"))]
 
 
-def play_everywhere(job: Job, acting: str, batches: "Batches") -> "Iterator[tuple[str, bytes]]":
-    """Play batches of trials on other machines; name and file of each. `acting`: the stage whose policy is played."""
-    assert job.spread is not None
+def play_everywhere(
+    spread: Spread, recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
+) -> "Iterator[tuple[str, bytes]]":
+    """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
     names = list(batches)
-    folders = {"robot": job.robot, "policy": job.inputs[acting]}
-    folders |= {"generator": job.inputs["rg-fit"]} if "rg-fit" in job.inputs else {}
-    for place, content in job.spread(play_batch, [(job.recipe, name, batches[name]) for name in names], folders):
+    for place, content in spread(play_batch, [(recipe, name, batches[name]) for name in names], folders):
         yield names[place], content
 
 

@@ -156,7 +156,7 @@ def test_neither_the_number_of_workers_nor_other_machines_change_anything(
     done: Job, recipe: Recipe, student: Path, tmp_path: Path
 ) -> None:
     spread = Backwards()
-    elsewhere = partial(play_everywhere, replace(done, spread=spread), "distill")
+    elsewhere = partial(play_everywhere, spread, recipe, evaluate.read_by_trials(done))
     world, policy = Specification(recipe, done.robot), load_policy(student)
     protocol = Protocol(world, policy, work=tmp_path, workers=0, elsewhere=elsewhere)
     pd.testing.assert_frame_equal(protocol.run(), pd.read_parquet(done.out / "trials.parquet"))

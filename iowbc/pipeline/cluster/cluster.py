@@ -3,8 +3,8 @@
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from iowbc.pipeline.cluster.desk import Desk, Event
 from iowbc.pipeline.cluster.folders import Folder, files_of, write_files
 from iowbc.pipeline.cluster.identity import identity
 from iowbc.pipeline.cluster.remote import TOKEN, Order, Outcome, execute
+from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
 
@@ -96,6 +97,10 @@ class Cluster:
             raise StageFailed(f"lost its node or worker {TRIES} times; is there too little memory for it?")
         finally:
             (job.work / TOKEN).unlink(missing_ok=True)
+
+    def spread(self, paths: Iterable[Path], interrupted: Callable[[], bool] = lambda: False) -> NodeSpread:
+        """Shares out pieces that read these folders of this machine."""
+        return NodeSpread(identity(), {path: self._folder(path) for path in paths}, interrupted, copy=self.copy)
 
     def abort(self) -> None:
         """End all that runs, at once."""
@@ -204,17 +209,32 @@ class Cluster:
 @contextmanager
 def connected(address: str, *, copy: bool) -> Iterator[Cluster]:
     """A connection to the end of the block; so long lives a local cluster, too. Raises `UsageError`."""
+    if shares := loopback.shares(address):
+        with begun_here(shares, copy=copy) as cluster:
+            yield cluster
+        return
+    _require_ray()
+    with closing(Cluster(address, copy=copy)) as cluster:
+        yield cluster
+
+
+@contextmanager
+def begun_here(cores: Sequence[int], *, copy: bool) -> Iterator[Cluster]:
+    """A cluster of this machine alone to the end of the block, with the cores of each node. Raises `UsageError`."""
+    _require_ray()
+    os.environ.update(loopback.ALONE)
+    for name, value in loopback.secured().items():
+        os.environ.setdefault(name, value)  # Ray reads a token once in a process
+    with loopback.nodes(cores) as address, closing(Cluster(address, copy=copy)) as cluster:
+        yield cluster
+
+
+def _require_ray() -> None:
+    """Raises `UsageError` where it is not installed; else sets it up as iowbc wants it."""
     if find_spec("ray") is None:
-        raise UsageError("`--engine ray` needs Ray, which this installation leaves out: `pip install 'iowbc[cluster]'`")
+        raise UsageError("Ray is needed, which this installation leaves out: `pip install 'iowbc[cluster]'`")
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
-    with ExitStack() as held:
-        if shares := loopback.shares(address):
-            os.environ.update(loopback.ALONE | loopback.secured())
-            address = held.enter_context(loopback.nodes(shares))
-        cluster = Cluster(address, copy=copy)
-        held.callback(cluster.close)
-        yield cluster
 
 
 def _initialised(address: str) -> Any:

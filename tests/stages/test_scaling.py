@@ -1,0 +1,34 @@
+"""`iowbc bench scale` measures one node against two and names its figures."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from stage_jobs import Backwards
+
+from iowbc.stages import scaling
+
+
+def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[int] = []
+
+    @contextmanager
+    def here(cores: Sequence[int], *, copy: bool) -> Iterator[Any]:
+        begun.append(len(cores))
+        yield SimpleNamespace(spread=lambda paths: Backwards())
+
+    monkeypatch.setattr(scaling, "begun_here", here)
+    monkeypatch.setattr(scaling, "label_everywhere", lambda *words, **settings: None)
+    monkeypatch.setattr(scaling, "SHARES", 1)
+    monkeypatch.setattr(scaling, "TRIALS", 2)
+    monkeypatch.setattr(scaling, "DURATION", 0.1)
+    lines: list[str] = []
+    figures = scaling.main(turns=1, say=lines.append)
+    assert begun == [1, 2]
+    assert {"labels_1", "labels_2", "labels_efficiency", "trials_1", "trials_2", "trials_efficiency"} <= set(figures)
+    assert all(value > 0 for value in figures.values())
+    assert figures["trials_efficiency"] == pytest.approx(figures["trials_2"] / (2 * figures["trials_1"]))
+    assert figures["answer_bytes"] < figures["inputs_bytes"]
+    assert lines[2].startswith("labels/s")
