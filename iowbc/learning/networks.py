@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from iowbc.learning.encoders import ENCODERS, EncoderName, MirroredEncoder
 from iowbc.learning.estimate import Estimate
-from iowbc.learning.perceptron import DenseMlp, Perceptron
+from iowbc.learning.perceptron import DenseMlp, VectorPerceptron
 from iowbc.learning.symmetric import SymmetricMlp, paired
 from iowbc.robot.mirror import MirrorMap, side_by_side
 
@@ -19,7 +19,7 @@ Mirrors = tuple[MirrorMap, MirrorMap]
 
 def perceptron(
     inputs: int, hidden: Sequence[int], outputs: int, activation: str, mirrors: Mirrors | None
-) -> Perceptron:
+) -> VectorPerceptron:
     """A multilayer perceptron that commutes with the mirrors of its input and output, where they are given."""
     if mirrors is None:
         return DenseMlp(inputs, hidden, outputs, activation)

@@ -4,6 +4,7 @@ import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
+import torch
 from torch import Tensor, nn
 
 from iowbc.learning.activations import ACTIVATIONS
@@ -38,6 +39,33 @@ class Perceptron(nn.Module, ABC):
         return self.head(self.hidden(self.prepare(x)))
 
 
+class VectorPerceptron(Perceptron):
+    """A perceptron of a vector, some of whose inputs can be hidden from it."""
+
+    seen: Tensor | None
+    """1 for each prepared input that the first layer sees and 0 for the others; None sees all."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.register_buffer("seen", None, persistent=False)
+
+    def hide(self, inputs: Sequence[int]) -> None:
+        """From now on these inputs decide nothing: they are not seen, and what has learnt without them has no weights
+        for them. Raises ValueError where the first layer cannot see one input without another."""
+        self.seen, weights = self._without(inputs)
+        with torch.no_grad():
+            for weight, seen in weights:
+                weight *= seen
+
+    @abstractmethod
+    def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
+        """1 and 0 for prepared inputs, and for those of each weight of the first layer."""
+
+    def looked_at(self, prepared: Tensor) -> Tensor:
+        """Of what was prepared what the first layer sees."""
+        return prepared if self.seen is None else prepared * self.seen
+
+
 def mlp(sizes: Sequence[int], activation: str) -> nn.Sequential:
     """Linear layers of the given sizes with an activation between them; the last one is linear."""
     layers: list[nn.Module] = []
@@ -46,7 +74,7 @@ def mlp(sizes: Sequence[int], activation: str) -> nn.Sequential:
     return nn.Sequential(*layers[:-1])
 
 
-class DenseMlp(Perceptron):
+class DenseMlp(VectorPerceptron):
     """A perceptron that knows no symmetry."""
 
     def __init__(self, inputs: int, hidden: Sequence[int], outputs: int, activation: str) -> None:
@@ -58,7 +86,13 @@ class DenseMlp(Perceptron):
         return x
 
     def hidden(self, prepared: Tensor) -> Hidden:
-        return (self.layers(prepared),)
+        return (self.layers(self.looked_at(prepared)),)
+
+    def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
+        weight = next(self.layers.parameters())
+        seen = torch.ones(weight.shape[1])
+        seen[list(inputs)] = 0.0
+        return seen, [(weight, seen)]
 
     def head(self, hidden: Hidden) -> Tensor:
         output: Tensor = self.last(hidden[0].float())

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from iowbc.learning.gaussian import log_density, std_places
 from iowbc.learning.history_actor import HistoryActor, HistoryNormalizer, NewestCritic
 from iowbc.learning.networks import Normalizer, mirrors_from_json, perceptron
-from iowbc.learning.perceptron import Perceptron
+from iowbc.learning.perceptron import Perceptron, VectorPerceptron
 from iowbc.robot.mirror import MirrorMap
 
 INVARIANT = MirrorMap(np.zeros(1, np.int64), np.ones(1, np.float32))
@@ -40,10 +40,12 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         initial_std: float,
         std_learning_rate: float,
         mirrors: Any = None,
+        value_only: Sequence[int] = (),
         student: Mapping[str, Any] | None = None,
         use_sde: bool = False,
     ) -> None:
-        """`mirrors`: as `TeacherNetwork` takes them; `student`: arguments of `StudentNetwork`."""
+        """`mirrors`: as `TeacherNetwork` takes them; `value_only`: places of an observation that the policy does not
+        see; `student`: arguments of `StudentNetwork`, which sees none of s_priv."""
         super().__init__(observation_space, action_space, lr_schedule, net_arch=[], use_sde=use_sde)
         (inputs,), (actions,) = observation_space.shape, action_space.shape
         both = mirrors_from_json(mirrors)
@@ -62,6 +64,8 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
             self.critic = NewestCritic(perceptron(newest, hidden, 1, activation, value), normalizer)
         self.actor.initialize(HIDDEN_GAIN, POLICY_GAIN)
         self.critic.initialize(HIDDEN_GAIN, VALUE_GAIN)
+        if value_only and isinstance(self.actor, VectorPerceptron):
+            self.actor.hide(value_only)
         place = std_places(actions, None if both is None else both[1])
         self.log_stds = nn.Parameter(torch.full((place.max() + 1,), float(np.log(initial_std))))
         """One for each pair of actions that the mirror swaps, and one for each other."""

@@ -6,7 +6,7 @@ would starve the step size; no update ends early on it; the standard deviation h
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -219,8 +219,11 @@ def explained_variance(values: Tensor, targets: Tensor) -> float:
     return float(1.0 - (targets - values).var() / (targets.var() + 1e-8))
 
 
-def make_learner(teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int) -> Learner:
-    """The learner of a recipe on a vector environment with raw observations and rewards."""
+def make_learner(
+    teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int, value_only: Sequence[int] = ()
+) -> Learner:
+    """The learner of a recipe on a vector environment with raw observations and rewards; `value_only`: places of an
+    observation that the policy does not see."""
     symmetric = teacher.symmetry == "construction"
     student = None
     if teacher.history is not None:
@@ -250,6 +253,7 @@ def make_learner(teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores:
             "initial_std": teacher.initial_std,
             "std_learning_rate": teacher.std_learning_rate,
             "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
+            "value_only": list(value_only),
             "student": student,
         },
     )

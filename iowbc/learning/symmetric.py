@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from iowbc.learning.activations import PairedActivation
-from iowbc.learning.perceptron import Hidden, Perceptron
+from iowbc.learning.perceptron import Hidden, VectorPerceptron
 from iowbc.robot.mirror import MirrorMap
 
 Parts = tuple[Tensor, Tensor]
@@ -115,7 +115,7 @@ class SymmetricHead(nn.Module):
             nn.init.orthogonal_(self.odd.weight, gain / np.sqrt(2.0))
 
 
-class SymmetricMlp(Perceptron):
+class SymmetricMlp(VectorPerceptron):
     """A multilayer perceptron whose output is mirrored when its input is. It is prepared in its mirror basis."""
 
     def __init__(self, inputs: MirrorMap, hidden: Sequence[int], outputs: MirrorMap, activation: str) -> None:
@@ -129,8 +129,21 @@ class SymmetricMlp(Perceptron):
         return prepared
 
     def hidden(self, prepared: Tensor) -> Hidden:
-        parts: Hidden = self.layers(*self.basis.split(prepared))
+        parts: Hidden = self.layers(*self.basis.split(self.looked_at(prepared)))
         return parts
+
+    def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
+        hidden = torch.zeros(len(self.basis.matrix))
+        hidden[list(inputs)] = 1.0
+        share = hidden @ self.basis.matrix.square()
+        if bool(((share > 0.01) & (share < 0.99)).any()):
+            raise ValueError("an input and its mirror image are hidden together")
+        seen = (share < 0.5).float()
+        weights = []
+        for layers, part in zip((self.layers.even, self.layers.odd), self.basis.split(seen), strict=True):
+            assert isinstance(layers[0], nn.Linear)
+            weights.append((layers[0].weight, part))
+        return seen, weights
 
     def head(self, hidden: Hidden) -> Tensor:
         sums, differences = hidden

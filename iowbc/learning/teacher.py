@@ -1,7 +1,7 @@
 """The teacher's training, one PPO update at a time (paper III-C)."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,17 +39,19 @@ class TeacherTraining:
         seed: int,
         *,
         cores: int = 1,
+        value_only: Sequence[int] = (),
         score: Score | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
         """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest;
-        `score`: a fixed evaluation, by which the best policy is kept; `say`: is told when the training goes back."""
+        `value_only`: places of an observation that the policy does not see; `score`: a fixed evaluation, by which the
+        best policy is kept; `say`: is told when the training goes back."""
         torch.set_num_threads(1)
         keep_freed_memory()
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None
         self.say = say
-        self.model = make_learner(settings, environments, seed, mirrors, cores)
+        self.model = make_learner(settings, environments, seed, mirrors, cores, value_only)
         self.best = Best(settings.check, self._learnt())
         self._callback: BaseCallback | None = None
 

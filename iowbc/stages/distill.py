@@ -1,18 +1,11 @@
 """Stage `distill`: the student drives, the teacher says what it would have done, the student learns it (DAgger)."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
 from iowbc.stages.training import train
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from iowbc.task.layout import FullLayout
 
 PANELS = (
     "kl",
@@ -33,12 +26,7 @@ FACTS = ("object_mass", "base_linear_velocity")
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """A teacher that is a student already, or what s_priv does not hold."""
-    from iowbc.task.privileged import PRIVILEGED
-
-    parts = [part.name for part in PRIVILEGED]
-    for name in recipe.distill.withheld:
-        if name not in parts:
-            yield "distill.withheld", f"{name!r} is no part of s_priv: {', '.join(parts)}"
+    yield from not_privileged("distill.withheld", recipe.distill.withheld)
     if recipe.teacher.history is not None:
         text = "with teacher.history PPO trains the student's network itself, and nothing is to be distilled: leave "
         yield "stages", f"{text}`distill` out, or set teacher.history to null"
@@ -70,8 +58,8 @@ def run(job: Job) -> None:
         rows = Rows(
             observation=layout.observation,
             privileged=layout.privileged,
-            facts=_places(layout, FACTS),
-            withheld=_places(layout, settings.withheld) - layout.privileged.start,
+            facts=layout.privileged_places(FACTS),
+            withheld=layout.privileged_places(settings.withheld) - layout.privileged.start,
             observation_mirror=layout.state.mirror,
             privileged_mirror=layout.extra.mirror,
             facts_mirror=side_by_side([own[name] for name in FACTS]),
@@ -86,14 +74,6 @@ def run(job: Job) -> None:
 
     save_network(training.network, training.architecture, job.out, "student", {"layout": layout.describe()})
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
-
-
-def _places(layout: "FullLayout", names: Iterable[str]) -> "NDArray[np.int64]":
-    """Places of parts of s_priv in a row."""
-    import numpy as np
-
-    parts = [np.arange(layout.size)[layout.slices[f"privileged/{name}"]] for name in names]
-    return np.concatenate([np.zeros(0, np.int64), *parts])
 
 
 def _note(values: Mapping[str, float]) -> str:

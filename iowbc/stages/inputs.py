@@ -1,5 +1,7 @@
 """What the stages behind the reference generator share: the artifacts they read, the code of the environments."""
 
+from collections.abc import Iterable, Iterator
+
 from iowbc.recipe.recipe import Recipe
 
 ENVIRONMENTS = ("task", "sim", "control", "robot", "counter_random")
@@ -18,6 +20,16 @@ def generator_stage(recipe: Recipe) -> tuple[str, ...]:
 def leaves_student(recipe: Recipe) -> bool:
     """Whether a recipe trains a policy that needs no privileged observation."""
     return "distill" in recipe.stages or recipe.teacher.history is not None
+
+
+def not_privileged(path: str, names: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Which of the names at a dotted path of the recipe are no parts of s_priv, as a stage's problems."""
+    from iowbc.task.privileged import PRIVILEGED
+
+    parts = [part.name for part in PRIVILEGED]
+    for name in names:
+        if name not in parts:
+            yield path, f"{name!r} is no part of s_priv: {', '.join(parts)}"
 
 
 def policy_stage(recipe: Recipe) -> str:

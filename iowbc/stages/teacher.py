@@ -1,13 +1,14 @@
 """Stage `teacher`: PPO with privileged information on the vector environment, resumable at every checkpoint."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing
 from functools import partial
 from typing import TYPE_CHECKING
 
 from iowbc.learning.curves import TABLE
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, train
 
 if TYPE_CHECKING:
@@ -36,6 +37,11 @@ PANELS = (
     "steps_per_second",
 )
 """Shown in the figure of the learning curves, before the reward's terms."""
+
+
+def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    """What s_priv does not hold."""
+    return not_privileged("teacher.value_only", recipe.teacher.value_only)
 
 
 def run(job: Job) -> None:
@@ -73,6 +79,7 @@ def run(job: Job) -> None:
             (environments.layout.mirror, action_mirror(load_robot(job.robot))),
             recipe.seed,
             cores=available_cores(),
+            value_only=environments.layout.privileged_places(settings.value_only).tolist(),
             score=score,
             say=job.report.say,
         )
@@ -149,6 +156,7 @@ STAGE = Stage(
     slice=("seed", "rg.height", "simulation", "task", "teacher"),
     reads=generator_stage,
     run=run,
+    problems=problems,
     results=("teacher.safetensors", "teacher.json"),
     packages=("stages.teacher", "stages.training", "learning", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",

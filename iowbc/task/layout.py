@@ -1,8 +1,12 @@
 """The rows that the environments deliver: s_t, then s_priv."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from iowbc.control.observation import ObservationLayout, observation_layout
 from iowbc.recipe.recipe import Recipe
@@ -48,6 +52,11 @@ class FullLayout:
         shift = self.state.size
         privileged = {f"privileged/{k}": slice(s.start + shift, s.stop + shift) for k, s in self.extra.slices.items()}
         return self.state.slices | privileged
+
+    def privileged_places(self, names: Iterable[str]) -> NDArray[np.int64]:
+        """Places in the row of parts of s_priv, by name."""
+        parts = [np.arange(self.size)[self.slices[f"privileged/{name}"]] for name in names]
+        return np.concatenate([np.zeros(0, np.int64), *parts])
 
 
 def full_layout(recipe: Recipe, robot: Robot) -> FullLayout:

@@ -37,6 +37,21 @@ def test_a_symmetric_network_commutes_with_the_mirror_whatever_its_weights(activ
     assert float((mirrored - network(x)).abs().max().detach()) > 0.1, "the mirror does something"
 
 
+def test_hidden_inputs_decide_nothing_and_hide_with_their_mirror_images() -> None:
+    network = randomized(SymmetricMlp(OBSERVATION, (8, 6), ACTION, "elu"))
+    with pytest.raises(ValueError, match="hidden together"):
+        network.hide([4])
+    network.hide([3, 4, 5])
+    again = SymmetricMlp(OBSERVATION, (8, 6), ACTION, "elu")
+    again.load_state_dict(network.state_dict())
+    x, y = torch.randn(2, 20, 6)
+    y[:, :3] = x[:, :3]
+    for each in (network, again):
+        torch.testing.assert_close(each(y), network(x), rtol=0, atol=1e-6)
+    y[:, 0] += 1.0
+    assert float((network(y) - network(x)).abs().max().detach()) > 0.1
+
+
 def test_odd_and_even_parts_make_the_vector_again() -> None:
     basis = MirrorBasis(OBSERVATION)
     assert (basis.even, basis.odd) == (3, 3)

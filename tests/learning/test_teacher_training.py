@@ -41,6 +41,20 @@ def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry
         np.testing.assert_array_equal(found[name], value, err_msg=name)
 
 
+@pytest.mark.parametrize("symmetry", ["construction", "none"])
+def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
+    settings = SETTINGS.model_copy(update={"symmetry": symmetry})
+    some = finish(TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, value_only=[2]))
+    network, _ = some.network()
+    rows = torch.randn(20, 3)
+    told = rows + torch.tensor([0.0, 0.0, 0.5])
+    policy = some.model.policy
+    with torch.no_grad():
+        torch.testing.assert_close(network(told), network(rows), rtol=0, atol=0)
+        torch.testing.assert_close(policy(told, deterministic=True)[0], network(rows), rtol=0, atol=1e-5)
+        assert float((policy.predict_values(told) - policy.predict_values(rows)).abs().max()) > 1e-3
+
+
 @pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
 def test_training_learns_to_bring_masses_to_rest(symmetry: str) -> None:
     some = training(steps=16 * 8 * 60, symmetry=symmetry)

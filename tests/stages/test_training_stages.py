@@ -110,8 +110,11 @@ def test_ppo_of_the_students_network_leaves_a_policy_that_needs_nothing_privileg
     assert "nothing is to be distilled" in refused[0]
 
 
-def test_only_parts_of_s_priv_can_be_withheld_from_the_teacher() -> None:
+def test_only_parts_of_s_priv_can_be_withheld_from_policy_and_teacher() -> None:
+    recipe = small_recipe(value_only=("gyro_bias", "push"))
+    assert [path for path, _ in teacher.STAGE.problems(recipe)] == ["teacher.value_only"]
     recipe = small_recipe()
+    assert not list(teacher.STAGE.problems(recipe))
     settings = recipe.distill.model_copy(update={"withheld": ("encoder_bias", "motor_stength")})
     (path, text), *others = distill.STAGE.problems(recipe.model_copy(update={"distill": settings}))
     assert (path, others) == ("distill.withheld", [])

@@ -28,6 +28,7 @@ def small_recipe(**teacher: Any) -> Recipe:
                 "minibatches": 2,
                 "epochs": 2,
                 "hidden": [16, 8],
+                "value_only": ["imu_tilt"],
                 "check": {"every": 2, "trials": 1, "lifting": [0, 4], "sequence": [{"duration": 0.4, "ramp": 0.0}]},
                 **teacher,
             },
