@@ -16,7 +16,7 @@ observations; signals, counters and the like."""
 
 
 class Stopwatch:
-    """Adds up the time that methods take."""
+    """Adds up the processor time that methods take in this thread: what other programs do does not count."""
 
     def __init__(self) -> None:
         self.spent: dict[str, float] = {}
@@ -27,11 +27,11 @@ class Stopwatch:
         self.spent.setdefault(label, 0.0)
 
         def timed(*arguments: Any, **options: Any) -> Any:
-            begin = time.perf_counter()
+            begin = time.thread_time()
             try:
                 return method(*arguments, **options)
             finally:
-                self.spent[label] += time.perf_counter() - begin
+                self.spent[label] += time.thread_time() - begin
 
         setattr(owner, name, timed)
 
@@ -54,7 +54,7 @@ def watch_physics(batch: Any, watch: Stopwatch) -> None:
 
 
 def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
-    """Time of each part of a step of `setup.count` environments in this process [ms]: medians over rounds from a reset.
+    """Processor time of each part of a step of `setup.count` environments [ms]: medians over rounds from a reset.
 
     Also `reset`: what the end of one episode adds.
     """
@@ -83,12 +83,12 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
 
 
 def _reset_time(batch: Any) -> float:
-    """Time to begin one episode anew [ms]."""
+    """Processor time to begin one episode anew [ms]."""
     times = []
     for index in range(batch.n):
-        begin = time.perf_counter()
+        begin = time.thread_time()
         batch.begin(np.array([index]))
-        times.append(time.perf_counter() - begin)
+        times.append(time.thread_time() - begin)
     return 1e3 * float(np.median(times))
 
 

@@ -49,7 +49,7 @@ class Trajectories:
     up: NDArray[np.bool_]
     """Environments whose episode has not ended, (n,)."""
     time: float
-    """Spent in MuJoCo [s]."""
+    """Processor time spent in MuJoCo [s]."""
 
 
 def play(setup: Setup, periods: int, size: float = 1.0) -> Trajectories:
