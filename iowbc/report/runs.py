@@ -68,14 +68,16 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
 
 
 def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
-    """Every metric of every stage."""
-    names = dict.fromkeys(
+    """Every metric of every stage, those of a stage together."""
+    found = dict.fromkeys(
         (stage, metric)
         for group in groups
         for run in group.runs
         for stage, artifact in run.artifacts.items()
         for metric in artifact.metrics
     )
+    stages = [*dict.fromkeys(stage for stage, _ in found)]
+    names = sorted(found, key=lambda name: stages.index(name[0]))
     return [_row(groups, stage, metric) for stage, metric in names]
 
 

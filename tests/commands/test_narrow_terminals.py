@@ -45,6 +45,7 @@ def test_what_does_not_fit_stands_further_to_the_right() -> None:
     [
         (2402304.0, "2,402,304"),
         (0.0, "0"),
+        (1107.47, "1,107"),
         (0.123456, "0.1235"),
         (1e15, "1e+15"),
         (float("nan"), "nan"),

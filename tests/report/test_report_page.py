@@ -83,6 +83,13 @@ def test_seeds_belong_together_and_rows_that_are_alike_are_left_out(runs: list[R
     assert not rows["teacher", "same"].differs
 
 
+def test_metrics_of_a_stage_stand_together_also_those_that_only_a_later_run_has(runs: list[Run]) -> None:
+    more = runs[2].artifacts["teacher"].folder / "summary.json"
+    more.write_text(json.dumps({"metrics": {"score": 5.0, "same": 1.0, "late": 2.0}}))
+    rows = [(row.stage, row.name) for row in metric_rows(grouped(runs))]
+    assert rows == [("teacher", "score"), ("teacher", "same"), ("teacher", "late"), ("eval", "score"), ("eval", "same")]
+
+
 def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) -> None:
     main, others = learning_panels(grouped(runs), "teacher")
     assert [panel.title for panel in main] == ["reward of a step", "score of the check"]

@@ -38,8 +38,9 @@ def ago(moment: float) -> str:
 
 
 def figure(value: float, digits: int = 4, sign: str = "") -> str:
-    """A number: `2,402,304` where it is whole, else with so many digits that count; with `sign` "+", also its sign."""
-    return f"{value:{sign},.0f}" if value == round(value, 0) and abs(value) < 1e12 else f"{value:{sign}.{digits}g}"
+    """A number: `2,402,304` where it is whole or large, else with so many digits; with `sign` "+", also its sign."""
+    written_out = value == round(value, 0) or abs(value) >= 1000
+    return f"{value:{sign},.0f}" if written_out and abs(value) < 1e12 else f"{value:{sign}.{digits}g}"
 
 
 def size(count: float) -> str:
