@@ -47,6 +47,7 @@ class Cluster:
         self.copy = copy
         self.aborted = False
         self._folders: dict[Path, Folder] = {}
+        self._begun: dict[str, bool] = {}
         self._ray = _initialised(address)
         remote = self._ray.remote
         self._desk = remote(num_cpus=0, resources={HEAD: 0.001}, max_concurrency=1)(Desk).remote()
@@ -76,7 +77,11 @@ class Cluster:
         store = whole.get("object_store_memory", 0.0)
         used = store - free.get("object_store_memory", store)
         cores = whole.get("CPU", 0.0)
-        return f"{self._nodes()}, {cores - free.get('CPU', 0.0):g} of {cores:g} cores, {used / 1e6:.0f} MB"
+        stages = list(self._begun.values())
+        return (
+            f"{self._nodes()}, {cores - free.get('CPU', 0.0):g} of {cores:g} cores, {used / 1e6:.0f} MB of objects; "
+            f"stages: {sum(stages)} run, {len(stages) - sum(stages)} wait for cores"
+        )
 
     def run(self, stage: Stage, job: Job) -> None:
         """Run a stage on a node, as `stage.run(job)` would here. A lost node costs what it had not told yet.
@@ -131,19 +136,19 @@ class Cluster:
         scratch = (ray.put({name: content for name, content in files_of(job.work).items() if name != TOKEN}),)
         cores = 0 if stage.spreads else order.workers  # one that only waits for its pieces must not keep them waiting
         task = self._execute.options(num_cpus=cores, name=stage.name).remote(order, scratch, self._desk)
-        begun = told = False
+        self._begun[order.task] = told = False
         try:
             while True:
                 ready, _ = ray.wait([task], timeout=POLL)
                 for event in ray.get(self._desk.collect.remote(order.task)):
-                    begun = True
+                    self._begun[order.task] = True
                     _tell(job, event)
                 if ready:
                     outcome: Outcome = ray.get(task)
                     return outcome
                 if self.aborted:
                     raise KeyboardInterrupt
-                if job.interrupted() and not begun:
+                if job.interrupted() and not self._begun[order.task]:
                     raise Interrupted("waited for a node")
                 if job.interrupted() and not told:
                     told = True
@@ -156,6 +161,8 @@ class Cluster:
             ray.cancel(task, force=True)
             ray.wait([task], timeout=ABORT_PATIENCE)
             raise
+        finally:
+            del self._begun[order.task]
 
     def _conclude(self, stage: Stage, job: Job, outcome: Outcome) -> None:
         if outcome.state == "mismatch":
