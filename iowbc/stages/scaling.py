@@ -5,11 +5,12 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import psutil
 import torch
 
 from iowbc.benchmarks.standing_generator import generator_of
@@ -61,14 +62,26 @@ class World:
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a cluster was."""
+    """How fast a cluster made some number of things."""
 
-    labels: float
-    """Labelled samples a second."""
-    trials: float
-    """Trials a second."""
-    piece: float
-    """Time of a piece that does nothing [s]."""
+    count: int
+    seconds: float
+    used: float
+    """Processor time of everything that took part [s]."""
+
+    @property
+    def rate(self) -> float:
+        """Things a second."""
+        return self.count / self.seconds
+
+    @property
+    def a_core(self) -> float:
+        """Things a second of processor time: what a core gives that is not shared with other programs."""
+        return self.count / self.used
+
+
+Turn = dict[int, dict[str, Pace]]
+"""Paces of `labels`, `trials` and `pieces` (that do nothing) by the number of nodes."""
 
 
 def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], None] = print) -> dict[str, float]:
@@ -80,22 +93,24 @@ def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], N
     with _world(recipe or Recipe(name="bench")) as world:
         call = (world.recipe, "0-0", world.trials[:1])
         figures: dict[str, float] = {"inputs_bytes": world.reads, "piece_bytes": len(pickle.dumps(call))}
-        measured: list[dict[int, Pace]] = []
+        measured: list[Turn] = []
         for _ in range(turns):
-            turn = {}
+            turn: Turn = {}
             for nodes in NODES:
                 with begun_here([1] * nodes, copy=True) as cluster:
-                    turn[nodes], figures["answer_bytes"] = _pace(cluster, world, nodes)
+                    turn[nodes], figures["answer_bytes"] = _paces(cluster, world, nodes)
             measured.append(turn)
-    say(f"{world.recipe.name}: nodes of one core, {turns} turns")
-    say(f"{'':10}{'1 node':>12}{'2 nodes':>12}{'efficiency':>12}")
+    say(f"{world.recipe.name}: nodes of one core, {turns} turns; a second, and a second of a core's time")
+    say(f"{'':10}{'1 node':>10}{'2 nodes':>10}{'efficiency':>12}{'a core, 1':>12}{'a core, 2':>12}")
     for name in ("labels", "trials"):
-        rates = [[getattr(turn[nodes], name) for nodes in NODES] for turn in measured]
-        one, two = (max(turn[place] for turn in rates) for place in range(len(NODES)))
-        efficiency = statistics.median(turn[1] / (2 * turn[0]) for turn in rates)
-        figures |= {f"{name}_1": one, f"{name}_2": two, f"{name}_efficiency": efficiency}
-        say(f"{name + '/s':10}{one:>12.2f}{two:>12.2f}{efficiency:>12.2f}")
-    figures["piece_ms"] = 1e3 * min(turn[nodes].piece for turn in measured for nodes in NODES)
+        rates = [max(turn[nodes][name].rate for turn in measured) for nodes in NODES]
+        cores = [max(turn[nodes][name].a_core for turn in measured) for nodes in NODES]
+        efficiency = statistics.median(turn[2][name].rate / (2 * turn[1][name].rate) for turn in measured)
+        figures |= {f"{name}_{nodes}": rate for nodes, rate in zip(NODES, rates, strict=True)}
+        figures |= {f"{name}_a_core_{nodes}": rate for nodes, rate in zip(NODES, cores, strict=True)}
+        figures[f"{name}_efficiency"] = efficiency
+        say(f"{name:10}{rates[0]:>10.2f}{rates[1]:>10.2f}{efficiency:>12.2f}{cores[0]:>12.2f}{cores[1]:>12.2f}")
+    figures["piece_ms"] = 1e3 / max(turn[nodes]["pieces"].rate for turn in measured for nodes in NODES)
     figures["trial_ms"] = 1e3 / figures["trials_1"]
     say(f"engine: {figures['piece_ms']:.1f} ms a piece; a trial takes {figures['trial_ms']:.0f} ms of a core")
     inputs, piece, answer = (figures[f"{name}_bytes"] for name in ("inputs", "piece", "answer"))
@@ -125,35 +140,50 @@ def _world(recipe: Recipe) -> Iterator[World]:
         yield World(recipe, folders, sweep.trials(sweep.sweep.masses[-1:]))
 
 
-def _pace(cluster: Cluster, world: World, nodes: int) -> tuple[Pace, int]:
+def _paces(cluster: Cluster, world: World, nodes: int) -> tuple[dict[str, Pace], int]:
     """How fast a cluster is, and the bytes that come back from a batch."""
     spread = cluster.spread(world.folders.values())
-    _labelled(spread, world, nodes)  # every node starts what it needs
-    list(play_everywhere(spread, world.recipe, world.folders, {str(n): world.trials[:1] for n in range(nodes)}))
 
-    began = time.perf_counter()
-    for _ in range(ROUNDS):
-        list(spread(_nothing, [(world.recipe, world.trials[:1])], world.folders))
-    piece = (time.perf_counter() - began) / ROUNDS
+    def played(batches: Batches) -> list[tuple[str, bytes]]:
+        return list(play_everywhere(spread, world.recipe, world.folders, batches))
 
-    began = time.perf_counter()
-    batches = world.batches(nodes)
-    answers = list(play_everywhere(spread, world.recipe, world.folders, batches))
-    trials = sum(map(len, batches.values())) / (time.perf_counter() - began)
+    def nothing() -> None:
+        for _ in range(ROUNDS):
+            list(spread(_nothing, [(world.recipe, world.trials[:1])], world.folders))
 
-    began = time.perf_counter()
-    labelled = _labelled(spread, world, SHARDS * nodes)
-    return Pace(labelled / (time.perf_counter() - began), trials, piece), max(len(content) for _, content in answers)
+    _label(spread, world, nodes)  # every node starts what it needs
+    played({str(node): world.trials[:1] for node in range(nodes)})
+    batches, answers = world.batches(nodes), list[tuple[str, bytes]]()
+    paces = {
+        "pieces": _timed(ROUNDS, nothing),
+        "trials": _timed(sum(map(len, batches.values())), lambda: answers.extend(played(batches))),
+        "labels": _timed(SHARDS * nodes * CHUNK[world.recipe.rg.method], lambda: _label(spread, world, SHARDS * nodes)),
+    }
+    return paces, max(len(content) for _, content in answers)
 
 
-def _labelled(spread: Spread, world: World, shards: int) -> int:
-    """Label some shards; the count of samples."""
+def _timed(count: int, work: Callable[[], None]) -> Pace:
+    began, used = time.perf_counter(), _processor_time()
+    work()
+    return Pace(count, time.perf_counter() - began, _processor_time() - used)
+
+
+def _processor_time() -> float:
+    """Processor time so far of this process, of Ray's, and of those that they have seen end [s]."""
+    total = 0.0
+    for process in (psutil.Process(), *psutil.Process().children(recursive=True)):
+        with suppress(psutil.NoSuchProcess):
+            total += sum(process.cpu_times()[:4])  # user, system, and both of its children
+    return total
+
+
+def _label(spread: Spread, world: World, shards: int) -> None:
+    """Label some shards."""
     rg = world.recipe.rg
-    count = shards * CHUNK[rg.method]
     with tempfile.TemporaryDirectory(prefix="iowbc-bench-") as folder:
         label_everywhere(
             LabelTask(world.folders["robot"], rg, world.recipe.seed, rg.method),
-            range(count),
+            range(shards * CHUNK[rg.method]),
             spread=spread,
             folder=Path(folder),
             key="bench",
@@ -161,7 +191,6 @@ def _labelled(spread: Spread, world: World, shards: int) -> int:
             interrupted=lambda: False,
             progress=lambda done, total: None,
         )
-    return count
 
 
 def _nothing(recipe: Recipe, trials: Sequence[Trial], *, robot: Path, policy: Path, generator: Path) -> None:

@@ -81,7 +81,7 @@ def test_a_report_sends_the_last_progress_and_only_new_files(tmp_path: Path, mon
     report.progress(1, 9)
     report.progress(2, 9, "at 2")
     report.metrics({"reward": 1.0}, 2)
-    write_files(tmp_path, {"a.checkpoint": b"one"})
+    write_files(tmp_path, {"a.checkpoint": b"one", "a.previous": b"none"})
     assert not report.stopping()
     report.files(tmp_path / "a.checkpoint")
     report.flush(files=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from iowbc.errors import Damaged
+from iowbc.files import replacing
 from iowbc.pipeline.store.digests import folder_digest, folder_files
 
 Files = Mapping[str, bytes]
@@ -35,11 +36,8 @@ def files_of(folder: Path) -> dict[str, bytes]:
 def write_files(folder: Path, files: Files) -> None:
     """Write files below a folder, each in place of what was there."""
     for name, content in files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = path.with_name(f".{path.name}.{os.getpid()}")
-        fresh.write_bytes(content)
-        os.replace(fresh, path)
+        with replacing(folder / name) as fresh:
+            fresh.write_bytes(content)
 
 
 def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from iowbc.errors import Interrupted, StageFailed
+from iowbc.files import previous
 from iowbc.pipeline.cluster.desk import Event
 from iowbc.pipeline.cluster.folders import Files, Folder, files_of, placed, write_files
 from iowbc.pipeline.cluster.identity import Identity, identity
@@ -206,14 +207,17 @@ class NodeReport:
             self.flush(files=look)
 
     def _gather(self) -> None:
-        """Gather the files of scratch that the driver neither sees nor has."""
+        """Gather the files of scratch that the driver neither sees nor has; of checkpoints the last one is enough."""
+        if not self._sends:
+            return
+        files = [path for path in self._work.rglob("*") if path.is_file() and not path.name.startswith(".")]
+        older = {previous(path) for path in files}
         found = {}
-        for path in self._work.rglob("*") if self._sends else ():
-            if path.is_file() and not path.name.startswith("."):
-                name, state = path.relative_to(self._work).as_posix(), path.stat()
-                if self._sent.get(name) != (state.st_mtime_ns, state.st_size):
-                    self._sent[name] = state.st_mtime_ns, state.st_size
-                    found[name] = path.read_bytes()
+        for path in files:
+            name, state = path.relative_to(self._work).as_posix(), path.stat()
+            if path not in older and self._sent.get(name) != (state.st_mtime_ns, state.st_size):
+                self._sent[name] = state.st_mtime_ns, state.st_size
+                found[name] = path.read_bytes()
         if found:
             self._events.append(("files", found))
 
