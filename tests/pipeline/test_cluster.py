@@ -4,7 +4,7 @@ import contextlib
 import json
 import re
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -55,18 +55,37 @@ class Sweep:
 
     def processes(self) -> list[psutil.Process]:
         """Those of Ray that the sweep has started."""
-        return [
-            process
-            for process in psutil.Process(self.commands[-1].process.pid).children(recursive=True)
-            if process.name().startswith(RAYS)
-        ]
+        return [process for process in below(self.commands[-1]) if name(process).startswith(RAYS)]
 
 
-def words(process: psutil.Process) -> list[str]:
+def below(command: Command) -> list[psutil.Process]:
+    """The processes that a command has started, and theirs."""
     try:
-        return list(process.cmdline())
+        return list(psutil.Process(command.process.pid).children(recursive=True))
     except psutil.NoSuchProcess:
         return []
+
+
+def name(process: psutil.Process) -> str:
+    """Empty once it has ended."""
+    try:
+        return "" if process.status() == psutil.STATUS_ZOMBIE else str(process.name())
+    except psutil.NoSuchProcess:
+        return ""
+
+
+def listens_on(process: psutil.Process) -> set[str]:
+    """Addresses of this machine; none once it has ended."""
+    try:
+        return {entry.laddr.ip for entry in process.net_connections("tcp") if entry.status == psutil.CONN_LISTEN}
+    except psutil.NoSuchProcess:
+        return set()
+
+
+def kill(processes: Iterable[psutil.Process]) -> None:
+    for process in processes:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process.kill()
 
 
 @pytest.fixture
@@ -75,9 +94,7 @@ def sweep(workplace: Workplace) -> Iterator[Sweep]:
     made = Sweep(workplace)
     yield made
     for command in made.commands:
-        with contextlib.suppress(psutil.NoSuchProcess):
-            for process in psutil.Process(command.process.pid).children(recursive=True):
-                process.kill()
+        kill(below(command))
         command.process.kill()
         command.process.wait()
 
@@ -88,17 +105,12 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
     sweep.wait("teacher: runs on", 1)
     assert re.search(r"Ray at 127.0.0.1:\d+: 1 node, ", command.output)
     processes = sweep.processes()
-    listening = {
-        entry.laddr.ip
-        for process in processes
-        for entry in process.net_connections("tcp")
-        if entry.status == psutil.CONN_LISTEN
-    }
+    listening = set[str]().union(*map(listens_on, processes))
     assert listening <= {"127.0.0.1", "::ffff:127.0.0.1"}, "it listens on this machine alone"
     assert listening
     command.signal(signal.SIGINT)
     assert command.finish() == 130, command.errors
-    until(lambda: not any(process.is_running() and words(process) for process in processes), PATIENCE)
+    until(lambda: not any(map(name, processes)), PATIENCE)
     stopped = sum("checkpoint written" in sweep.log(seed) for seed in range(3))
     came_back = list(sweep.workplace.folder.glob("runs/work/*/scratch/checkpoint.one"))
     assert len(came_back) == stopped >= 1, "what nodes on their own disks have reached comes back"
@@ -108,11 +120,9 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
 def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: Sweep, tmp_path: Path) -> None:
     command = sweep.start("local:2")
     sweep.wait("teacher: runs on", 2)
-    second = next(
-        process for process in sweep.processes() if process.name() == "raylet" and "--head" not in process.cmdline()
-    )
-    for process in (second, *second.children(recursive=True)):
-        process.kill()
+    nodes = [process for process in sweep.processes() if name(process) == "raylet"]
+    second = next(node for node in nodes if "--head" not in node.cmdline())
+    kill([second, *second.children(recursive=True)])
     sweep.wait("was lost", 1)
     sweep.gate.touch()
     assert command.finish() == 0, command.errors
