@@ -3,7 +3,7 @@
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -103,9 +103,10 @@ class Cluster:
         finally:
             (job.work / TOKEN).unlink(missing_ok=True)
 
-    def spread(self, paths: Iterable[Path], interrupted: Callable[[], bool] = lambda: False) -> NodeSpread:
+    def spread(self, paths: Iterable[Path]) -> NodeSpread:
         """Shares out pieces that read these folders of this machine."""
-        return NodeSpread(identity(), {path: self._folder(path) for path in paths}, interrupted, copy=self.copy)
+        folders = {path: self._folder(path) for path in paths}
+        return NodeSpread(identity(), folders, lambda: False, lambda slow: None, copy=self.copy)
 
     def abort(self) -> None:
         """End all that runs, at once."""

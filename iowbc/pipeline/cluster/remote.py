@@ -93,7 +93,7 @@ def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
                 report=report,
                 interrupted=report.stopping,
                 predecessor=None if order.predecessor is None else here(order.predecessor),
-                spread=NodeSpread(order.identity, known, report.stopping, copy=order.copy),
+                spread=NodeSpread(order.identity, known, report.stopping, report.say, copy=order.copy),
             )
             order.run(job)
         except Interrupted as stopped:

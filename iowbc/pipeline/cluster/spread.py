@@ -1,5 +1,7 @@
 """A stage on a node that lets other nodes work for it."""
 
+import statistics
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,18 +15,27 @@ TRIES = 5
 """Times that a piece is begun whose node or worker is lost."""
 POLL = 0.2
 """Seconds between two looks at the pieces."""
+SLOW = 3.0
+"""Times the median of the pieces before it from which the node of a piece is named."""
 
 
 class NodeSpread:
     """Shares pieces of a stage out over the cluster, as tasks of one core each."""
 
     def __init__(
-        self, driver: Identity, folders: Mapping[Path, Folder], interrupted: Callable[[], bool], *, copy: bool
+        self,
+        driver: Identity,
+        folders: Mapping[Path, Folder],
+        interrupted: Callable[[], bool],
+        say: Callable[[str], None],
+        *,
+        copy: bool,
     ) -> None:
-        """folders: what the stage reads, by where it lies on this machine."""
+        """folders: what the stage reads, by where it lies on this machine. say: is told which node was slow."""
         self._driver = driver
         self._folders = folders
         self._interrupted = interrupted
+        self._say = say
         self._copy = copy
 
     @property
@@ -46,13 +57,20 @@ class NodeSpread:
             piece.remote(self._driver, function, arguments, own, self._copy): place
             for place, arguments in enumerate(calls)
         }
+        took: list[float] = []
         try:
             while waiting:
                 if self._interrupted():
                     raise Interrupted("finished pieces are kept")
                 over, _ = ray.wait(list(waiting), timeout=POLL)
                 for task in over:
-                    yield waiting.pop(task), ray.get(task)
+                    place = waiting.pop(task)
+                    where, seconds, result = ray.get(task)
+                    usual = statistics.median(took or [seconds])
+                    if seconds > SLOW * usual:
+                        self._say(f"a piece took {seconds:.1f} s on {where}, the others {usual:.1f} s")
+                    took.append(seconds)
+                    yield place, result
         finally:
             for task in waiting:
                 ray.cancel(task, force=True)
@@ -64,10 +82,14 @@ def _called(
     arguments: tuple[Any, ...],
     folders: Mapping[str, Folder],
     copy: bool,
-) -> Result:
-    """What runs on the node of a piece."""
+) -> tuple[str, float, Result]:
+    """What runs on the node of a piece: its name, the time that the piece took [s], and the result."""
     import ray
 
-    if different := driver.mismatch(identity()):
+    own = identity()
+    if different := driver.mismatch(own):
         raise Damaged(f"a node is not as the driver: {different}; install the same on both")
-    return function(*arguments, **{name: placed(folder, ray.get, copy=copy) for name, folder in folders.items()})
+    here = {name: placed(folder, ray.get, copy=copy) for name, folder in folders.items()}
+    began = time.monotonic()
+    result = function(*arguments, **here)
+    return own.host, time.monotonic() - began, result
