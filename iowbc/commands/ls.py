@@ -13,6 +13,9 @@ from iowbc.pipeline.store.last_used import ever_used
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.recipe import PIPELINE
 
+METRICS_SHOWN = 2
+"""Metrics of an artifact in its row; `show` has all."""
+
 
 def list_artifacts(store: Store, console: Console, stage: str | None, as_json: bool = False) -> None:
     """A row for each artifact, oldest first. Raises `UsageError` for an unknown stage."""
@@ -38,7 +41,7 @@ def list_artifacts(store: Store, console: Console, stage: str | None, as_json: b
             ago(manifest.made),
             duration(manifest.seconds),
             size(artifact.size),
-            *([Text(metrics_text(artifact, 3))] if wide else []),
+            *([Text(metrics_text(artifact, METRICS_SHOWN))] if wide else []),
         )
     if artifacts:
         console.print(table)

@@ -10,10 +10,8 @@ from rich.text import Text
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 
-FOLDED = ("finished stages", "used by", "recipe", "why")
+FOLDED = ("metrics", "finished stages", "used by", "recipe", "why")
 """Columns whose text may go on in the next line."""
-CROPPED = ("metrics",)
-"""Columns whose text ends where the line does."""
 NARROW = 100
 """Terminals of fewer characters than this leave out what `show` tells."""
 
@@ -22,7 +20,7 @@ def plain_table(*columns: str) -> Table:
     """An empty table with these columns."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     for name in columns:
-        table.add_column(name, no_wrap=name not in FOLDED, overflow="ellipsis" if name in CROPPED else "fold")
+        table.add_column(name, no_wrap=name not in FOLDED, overflow="fold")
     return table
 
 

@@ -1,6 +1,7 @@
 """Plans and differences read well on 80 characters, and numbers as people write them."""
 
 import io
+import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from iowbc.commands.diff import diff
+from iowbc.commands.ls import list_artifacts
 from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.runs import Runs
@@ -30,6 +32,23 @@ def test_a_difference_is_drawn_on_a_terminal_stage_by_stage(folder: Path, comman
     assert lines.index("recipe") < lines.index("rg-dataset") < lines.index("rg-fit")
     (reads,) = [line.split() for line in lines if "input rg-dataset" in line]
     assert [len(digest) for digest in reads[2:]] == [12, 12], "a digest is shown by its first characters"
+
+
+@pytest.mark.parametrize("width", [WIDTH, 120])
+def test_a_list_of_artifacts_keeps_every_column_whole(folder: Path, width: int) -> None:
+    written = io.StringIO()
+    store = Store(Runs(folder / "runs"))
+    for artifact in store.artifacts("teacher"):
+        metrics = {f"a_metric_with_a_name_of_its_own_{number}": 1.5 for number in range(3)}
+        (artifact.folder / "summary.json").write_text(json.dumps({"metrics": metrics}))
+    list_artifacts(store, Console(file=written, width=width), None)
+    lines = written.getvalue().splitlines()
+    assert all(len(line) <= width for line in lines)
+    assert lines[0].split()[:6] == ["stage", "key", "used", "by", "made", "took"]
+    for artifact in store.artifacts("teacher"):
+        (row,) = [line for line in lines if artifact.manifest.key[:12] in line]
+        assert row.startswith("teacher ")
+        assert row.split()[2] in ("first", "second")
 
 
 def test_what_does_not_fit_stands_further_to_the_right() -> None:
