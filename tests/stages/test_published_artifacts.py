@@ -12,7 +12,7 @@ from iowbc.deploy.controller import Controller
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("recipe", "last"), [("full", "teacher"), ("teacher", "teacher")])
+@pytest.mark.parametrize(("recipe", "last"), [("full", "eval"), ("teacher", "eval")])
 def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last: str, tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
