@@ -42,6 +42,7 @@ COSMETIC = {
     "robot",
     "execution",
     "simulation.physics.divergences_kept",
+    "teacher.check.films",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",
     "eval.label",
