@@ -54,6 +54,8 @@ Address = Annotated[
     ),
 ]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")]
 SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe, a YAML file; the defaults.", metavar="RECIPE")]
 BenchWorkers = Annotated[

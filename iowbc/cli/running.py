@@ -8,10 +8,12 @@ import typer
 from iowbc.cli.options import (
     Address,
     AsJson,
+    DryRun,
     Engine,
     Force,
     OnCodeChange,
     Overrides,
+    Quiet,
     RecipeFile,
     RunsFolder,
     SweepFile,
@@ -35,9 +37,9 @@ def run(
     workers: Workers = None,
     engine: Engine = None,
     address: Address = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
+    dry_run: DryRun = False,
     on_code_change: OnCodeChange = "report",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
+    quiet: Quiet = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Print a plain line for every step of progress.")
     ] = False,
@@ -78,9 +80,9 @@ def sweep(
     workers: Annotated[int | None, typer.Option(help="Worker processes of each point.", min=1)] = None,
     engine: Engine = None,
     address: Address = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")] = False,
+    dry_run: DryRun = False,
     on_code_change: OnCodeChange = "report",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")] = False,
+    quiet: Quiet = False,
     as_json: Annotated[bool, typer.Option("--json", help="With --dry-run: print JSON.")] = False,
     runs: RunsFolder = None,
 ) -> None:

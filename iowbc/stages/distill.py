@@ -34,7 +34,6 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 def run(job: Job) -> None:
     """Distil the teacher; leave the student's network, normalisation and curves."""
-
     from iowbc.control.action import action_mirror
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import Rows, StudentTraining

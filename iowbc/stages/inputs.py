@@ -1,6 +1,6 @@
 """What the stages behind the reference generator share: the artifacts they read, the code of the environments."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 
 from iowbc.recipe.recipe import Recipe
 
@@ -22,8 +22,10 @@ def leaves_student(recipe: Recipe) -> bool:
     return "distill" in recipe.stages or recipe.teacher.history is not None
 
 
-def not_privileged(path: str, names: Iterable[str]) -> Iterator[tuple[str, str]]:
+def not_privileged(path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Which of the names at a dotted path of the recipe are no parts of s_priv, as a stage's problems."""
+    if not names:
+        return
     from iowbc.task.privileged import PRIVILEGED
 
     parts = [part.name for part in PRIVILEGED]

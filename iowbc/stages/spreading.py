@@ -32,11 +32,10 @@ def label_everywhere(
 ) -> "Shard":
     """As `label_all`, the shards that are missing made by other machines, several in a piece."""
     from iowbc.reference.labels.pool import label_all
-    from iowbc.reference.labels.shards import read_shard
+    from iowbc.reference.labels.shards import cut, read_shard
 
     folder.mkdir(parents=True, exist_ok=True)
-    chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
-    paths = [folder / f"{number:05d}.shard" for number in range(len(chunks))]
+    chunks, paths = cut(indices, chunk_size, folder)
     missing = [number for number, path in enumerate(paths) if read_shard(path, key, chunks[number]) is None]
     size = max(1, len(missing) // (SHARES * spread.width))
     shares = [missing[start : start + size] for start in range(0, len(missing), size)]

@@ -83,7 +83,8 @@ def run(job: Job) -> None:
             score=score,
             say=job.report.say,
         )
-        curves = train(job, training, settings.checkpoint_every, _note, partial(_film, job, training, films))
+        look = None if films is None else partial(_film, job, training, films)
+        curves = train(job, training, settings.checkpoint_every, _note, look)
         leave_extendable(job, training)
         training.keep_best()
         about = {"layout": environments.layout.describe(), "curriculum": environments.curriculum()}
@@ -130,12 +131,12 @@ def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
     return TrainingFilms(check.world, check.middle, job.work / VIDEOS, parts)
 
 
-def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms | None") -> None:
+def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None:
     """Makes the film that is due after an update, if there is one, and shows it."""
     from iowbc.learning.acting import policy_of
 
-    path = None if films is None else films.due(training.steps, training.planned)
-    if films is not None and path is not None and films.make(path, policy_of(*training.network()), job.report.say):
+    path = films.due(training.steps, training.planned)
+    if path is not None and films.make(path, policy_of(*training.network()), job.report.say):
         job.report.files(path.parent)
 
 

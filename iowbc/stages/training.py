@@ -45,7 +45,7 @@ def train(
     training: Training,
     checkpoint_every: int,
     note: Callable[[Mapping[str, float]], str],
-    look: Callable[[], None] = lambda: None,
+    look: Callable[[], None] | None = None,
 ) -> "Curves":
     """Goes on from the job's checkpoint, or from its predecessor's end, to the end of the training; returns its curves.
 
@@ -80,7 +80,8 @@ def train(
             save_checkpoint(path, job.key, training.arrays())
         if stop:
             raise Interrupted(f"stopped at {training.steps:,} of {training.planned:,} steps, checkpoint written")
-        look()
+        if look is not None:
+            look()
     return curves
 
 

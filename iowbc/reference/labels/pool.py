@@ -22,7 +22,7 @@ import numpy as np
 from iowbc.errors import Interrupted, Rejected
 from iowbc.processes import die_with_parent, single_threaded
 from iowbc.reference.labels.labelling import Solver
-from iowbc.reference.labels.shards import Shard, merge, read_shard, write_shard
+from iowbc.reference.labels.shards import Shard, cut, merge, read_shard, write_shard
 
 CRASHED = "solver crashed"
 CRASHES = tuple(-number for number in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL))
@@ -79,8 +79,7 @@ def label_all(
     turns true, RuntimeError when a worker fails in Python or cannot start, or when too many are killed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    chunks = [list(indices[start : start + chunk_size]) for start in range(0, len(indices), chunk_size)]
-    paths = [folder / f"{number:05d}.shard" for number in range(len(chunks))]
+    chunks, paths = cut(indices, chunk_size, folder)
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
     book = _Book([number for number in range(len(chunks)) if number not in done])
     ready = sum(len(chunks[number]) for number in done)

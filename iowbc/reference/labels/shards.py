@@ -25,6 +25,12 @@ class Shard:
     """Why, one for each of them."""
 
 
+def cut(indices: Sequence[int], size: int, folder: Path) -> tuple[list[list[int]], list[Path]]:
+    """Samples in chunks of a size, and the file of each chunk's shard in a folder."""
+    chunks = [list(indices[start : start + size]) for start in range(0, len(indices), size)]
+    return chunks, [folder / f"{number:05d}.shard" for number in range(len(chunks))]
+
+
 def write_shard(path: Path, key: str, shard: Shard) -> None:
     """Writes a shard as a checked file."""
     content = BytesIO()
