@@ -43,7 +43,7 @@ MAY_IMPORT = {
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
-ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "mlflow", "matplotlib"}
+ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "sklearn", "mlflow", "matplotlib"}
 """Packages that a robot's computer need not have."""
 
 

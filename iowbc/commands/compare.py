@@ -10,7 +10,7 @@ from rich.console import Console
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.drawn_table import drawn, read_table
-from iowbc.commands.evaluated import TRIALS, evaluated_actor
+from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
 from iowbc.commands.swept import points_of
@@ -42,7 +42,8 @@ def compare(
     require_training("compare")
     require_writable(output, "--output")
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
-    tried = [run for run in found if _trials(run).is_file()]
+    tried = _having(found, TRIALS)
+    _report_probes(_having(found, PROBE), output)
     if len(tried) > 1:
         trials = _report(tried, output)
         if film:
@@ -108,19 +109,47 @@ def _print_curves(found: Sequence[Named], console: Console) -> None:
 
 def joined_tables(found: Sequence[Named]) -> dict[str, str]:
     """Result tables in Markdown by name: of one run its own, of several those over all their trials."""
-    tried = [run for run in found if _trials(run).is_file()]
+    evaluated = [run for run in found if "eval" in run.artifacts]
     with tempfile.TemporaryDirectory() as folder:
         tables = Path(folder, "tables")
-        if len(tried) > 1:
-            _report(tried, Path(folder))
-        elif tried:
-            tables = tried[0].artifacts["eval"].folder / "tables"
+        tried = _having(evaluated, TRIALS)
+        if len(evaluated) == 1:
+            tables = evaluated[0].artifacts["eval"].folder / "tables"
+        else:
+            _report_probes(_having(evaluated, PROBE), Path(folder))
+            if len(tried) > 1:
+                _report(tried, Path(folder))
         return {path.stem: path.read_text(encoding="utf-8") for path in sorted(tables.glob("*.md"))}
 
 
-def _trials(run: Named) -> Path:
-    """The trials of a run's evaluation; no file where it has none."""
-    return run.artifacts["eval"].folder / TRIALS if "eval" in run.artifacts else Path(TRIALS, "missing")
+def _having(runs: Sequence[Named], name: str) -> list[Named]:
+    """The runs whose evaluation left a file of this name."""
+    return [run for run in runs if "eval" in run.artifacts and (run.artifacts["eval"].folder / name).is_file()]
+
+
+def _told_apart(runs: Sequence[Named], name: str) -> "tuple[list[pd.DataFrame], dict[str, str]]":
+    """A table of each run's evaluation, its variant called by the run where two share one; their labels by run."""
+    import pandas as pd
+
+    tables = [pd.read_parquet(run.artifacts["eval"].folder / name) for run in runs]
+    counts = Counter(label for table in tables for label in table["variant"].unique())
+    labels: dict[str, str] = {}
+    for index, (table, run) in enumerate(zip(tables, runs, strict=True)):
+        own = [str(label) for label in table["variant"].unique()]
+        if any(counts[label] > 1 for label in own):
+            labels[run.word] = own[0]
+            tables[index] = table.assign(variant=run.word)
+    return tables, labels
+
+
+def _report_probes(runs: Sequence[Named], output: Path) -> None:
+    """What the histories of all runs that were probed know of the load."""
+    import pandas as pd
+
+    from iowbc.evaluation.report.probe import write_probe
+
+    if runs:
+        write_probe(pd.concat(_told_apart(runs, PROBE)[0], ignore_index=True), output)
 
 
 def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
@@ -129,14 +158,7 @@ def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
 
     from iowbc.evaluation.report.report import write_report
 
-    trials = [pd.read_parquet(_trials(run)) for run in runs]
-    counts = Counter(label for table in trials for label in table["variant"].unique())
-    labels: dict[str, str] = {}
-    for index, (table, run) in enumerate(zip(trials, runs, strict=True)):
-        own = [str(label) for label in table["variant"].unique()]
-        if any(counts[label] > 1 for label in own):
-            labels[run.word] = own[0]
-            trials[index] = table.assign(variant=run.word)
+    trials, labels = _told_apart(runs, TRIALS)
     rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}
     if len(rates) > 1:
         raise UsageError(

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from iowbc.commands.origins import input_of, policy_of, world_of
+from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
 
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
 
     from iowbc.evaluation.side_by_side import Actor
 
-TRIALS = "trials.parquet"
+TRIALS, PROBE = "trials.parquet", "probe.parquet"
 
 
 def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":
@@ -22,6 +23,8 @@ def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | No
     from iowbc.evaluation.trials.protocol import evaluated_world
     from iowbc.learning.acting import load_policy
 
+    if trials is None and not (artifact.folder / TRIALS).is_file():
+        raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
     table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
     world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
     return Actor(world, load_policy(policy_of(store, artifact).folder), table)

@@ -83,3 +83,5 @@ def _evaluated(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
             yield f"eval.{path}.{number}.scene", case.scene
     if evaluation.robustness is not None and evaluation.robustness.pushes is not None:
         yield "eval.robustness.pushes.scene", evaluation.robustness.pushes.scene
+    if evaluation.probe is not None:
+        yield "eval.probe.scene", evaluation.probe.scene

@@ -1,4 +1,4 @@
-"""Stage `eval`: mass sweeps and heavy cases with the trained policy, their tables, figures and films."""
+"""Stage `eval`: mass sweeps, heavy cases and a probe of the trained policy, their tables, figures and films."""
 
 import math
 from collections.abc import Iterator
@@ -15,6 +15,9 @@ from iowbc.stages.spreading import play_everywhere
 if TYPE_CHECKING:
     import pandas as pd
 
+    from iowbc.learning.acting import Policy
+    from iowbc.task.specification import Specification
+
 
 def acting_stage(recipe: Recipe) -> str:
     """The stage whose artifact holds the policy to evaluate."""
@@ -29,13 +32,10 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 
 def run(job: Job) -> None:
-    """Play all trials; leave `trials.parquet`, tables, figures, films and a summary."""
+    """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
     import torch
 
-    from iowbc.errors import NoRenderer
-    from iowbc.evaluation.films import Film, film_trial, filmed
-    from iowbc.evaluation.report.report import write_report
-    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.evaluation.trials.protocol import evaluated_world
     from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
@@ -43,6 +43,26 @@ def run(job: Job) -> None:
     recipe = job.recipe
     policy = load_policy(job.inputs[acting_stage(recipe)])
     world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
+    metrics: dict[str, float] = {}
+    try:
+        if recipe.eval.measured:
+            metrics |= measure(job, world, policy)
+        if recipe.eval.probe is not None:
+            metrics |= probe(job, world, policy)
+    except Interrupted as stopped:
+        raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
+    job.report.metrics(metrics, 0)
+    job.summarize(metrics)
+
+
+def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+    """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
+    from iowbc.errors import NoRenderer
+    from iowbc.evaluation.films import Film, film_trial, filmed
+    from iowbc.evaluation.report.report import write_report
+    from iowbc.evaluation.trials.protocol import Protocol
+
+    recipe = job.recipe
     protocol = Protocol(
         world,
         policy,
@@ -52,25 +72,50 @@ def run(job: Job) -> None:
         progress=job.report.progress,
         elsewhere=None if job.spread is None else partial(play_everywhere, job.spread, recipe, read_by_trials(job)),
     )
+    trials = protocol.run()
+    trials.to_parquet(job.out / "trials.parquet", index=False)
+    summary = write_report(trials, job.out, recipe.eval.success.capacity_rate)
+    (job.out / "videos").mkdir()
     try:
-        trials = protocol.run()
-        trials.to_parquet(job.out / "trials.parquet", index=False)
-        summary = write_report(trials, job.out, recipe.eval.success.capacity_rate)
-        (job.out / "videos").mkdir()
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
             film = Film(job.out / "videos" / f"{name}.mp4", recipe.eval.video.fps)
             film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
-    except Interrupted as stopped:
-        raise Interrupted(f"eval: {stopped}; finished batches are kept") from stopped
-    metrics = headline(summary)
-    job.report.metrics(metrics, 0)
-    job.summarize(metrics)
     for suite, rows in summary[summary["kind"] != "pushes"].groupby("suite", sort=False):
         counts = ", ".join(f"{_load(row)} {row['succeeded']}/{row['trials']}" for _, row in rows.iterrows())
         job.report.say(f"{suite}: succeeded {counts}")
+    return headline(summary)
+
+
+def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+    """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
+    from iowbc.evaluation.probe.readings import read
+    from iowbc.evaluation.probe.regression import inferred_masses
+    from iowbc.evaluation.report.probe import write_probe
+
+    asked = job.recipe.eval.probe
+    assert asked is not None
+    duration = sum(segment.duration for segment in asked.sequence)
+
+    def progress(seconds: float) -> None:
+        job.report.progress(min(seconds, duration), duration, f"probe, {asked.trials} trials")
+
+    readings = read(world, policy, workers=job.workers, interrupted=job.interrupted, progress=progress)
+    inferred = inferred_masses(readings).assign(
+        variant=job.recipe.eval.label, scene=asked.scene, partner_share=asked.partner_share
+    )
+    inferred.to_parquet(job.out / "probe.parquet", index=False)
+    figures = write_probe(inferred, job.out)
+    for _, row in figures.iterrows():
+        job.report.say(f"probe: mass from {row['source']}: R² {row['R2']:.3f}, {row['RMSE']:.2f} kg")
+    names = {"R2": "R2", "R2_trial": "R2_of_a_trial", "RMSE": "RMSE_kg"}
+    return {
+        f"probe/{row['source'].replace(' ', '_')}/{told}": float(row[name])
+        for _, row in figures.iterrows()
+        for name, told in names.items()
+    }
 
 
 def read_by_trials(job: Job) -> dict[str, Path]:
@@ -110,7 +155,7 @@ STAGE = Stage(
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
     problems=problems,
-    results=("trials.parquet",),
+    results=("*.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
     counts=("eval.trials",),
     spreads=True,

@@ -308,3 +308,19 @@ def test_a_sweep_goes_on_while_something_survives(recipe: Recipe, student: Path,
     trials = Protocol(world, load_policy(student), work=tmp_path, workers=0).run()
     assert trials["mass"].tolist() == [1.0, 2.0, 3.0] * 2, "nobody falls in two control steps"
     assert trials["suite"].tolist() == ["lifting"] * 3 + ["lifting with partner 0.5"] * 3
+
+
+def test_a_probe_alone_leaves_its_readings_table_and_figure(recipe: Recipe, student: Path, tmp_path: Path) -> None:
+    asked = {"lifting": None, "probe": {"trials": 20, "interval": 0.1, "sequence": [{"duration": 0.7, "ramp": 0.0}]}}
+    probed = Recipe.model_validate({**QUESTION, "eval": {"label": "w/o RG", **asked}})
+    finished = job(probed, student, tmp_path)
+    evaluate.run(finished)
+    names = {str(path.relative_to(finished.out)) for path in finished.out.rglob("*.*")}
+    written = {f"tables/probe.{kind}" for kind in ("md", "tex", "csv")}
+    assert names == written | {"probe.parquet", "figures/probe.png", "summary.json"}
+    inferred = pd.read_parquet(finished.out / "probe.parquet")
+    assert list(dict.fromkeys(inferred["source"])) == ["latent", "history H_t", "newest s_t", "s_priv"]
+    assert inferred["trial"].nunique() == 10, "the others are fitted"
+    assert not np.allclose(inferred["inferred"], inferred["mass"])
+    metrics = json.loads((finished.out / "summary.json").read_text())["metrics"]
+    assert metrics["probe/latent/R2"] <= 1

@@ -8,6 +8,8 @@ from scipy import stats
 
 CONFIDENCE = 0.95
 """Of every interval in tables and figures."""
+RESAMPLES = 2000
+"""Of a bootstrap."""
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -22,3 +24,32 @@ def mean_half_width(values: NDArray[np.float64]) -> float:
         return math.nan
     _, half = stats.t.interval(CONFIDENCE, len(values) - 1, scale=stats.sem(values))
     return float(half)
+
+
+def determination(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
+    """R²: the part of the variance that is inferred; 0 for who says the mean, NaN where nothing varies."""
+    spread = np.sum(np.square(true - true.mean()))
+    return float(1.0 - np.sum(np.square(true - inferred)) / spread) if spread > 0 else math.nan
+
+
+def determination_interval(
+    true: NDArray[np.float64], inferred: NDArray[np.float64], group: NDArray[np.int64]
+) -> tuple[float, float]:
+    """Bootstrap interval of R² where values of one group (n,) belong together: groups are drawn, not values."""
+    terms = np.stack([np.ones_like(true), true, np.square(true), np.square(true - inferred)], axis=1)
+    _, places = np.unique(group, return_inverse=True)
+    sums = np.zeros((places.max() + 1, terms.shape[1]))
+    np.add.at(sums, places, terms)
+    drawn = np.random.default_rng(0).integers(len(sums), size=(RESAMPLES, len(sums)))
+    count, total, square, error = sums[drawn].sum(axis=1).T
+    spread = square - np.square(total) / count
+    values = 1.0 - error[spread > 0] / spread[spread > 0]
+    if not len(values):
+        return math.nan, math.nan
+    low, high = np.quantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return float(low), float(high)
+
+
+def root_mean_square(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
+    """Of the errors, in the unit of the values."""
+    return float(np.sqrt(np.mean(np.square(true - inferred))))

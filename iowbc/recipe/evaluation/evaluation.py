@@ -4,11 +4,12 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from iowbc.recipe.evaluation.probe import Probe
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.success import Success
 from iowbc.recipe.evaluation.suites import HeavyCase, Robustness, Stagnation, Sweep
 from iowbc.recipe.evaluation.video import Video
-from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.section import COSMETIC, LATER, Section
 from iowbc.recipe.simulation.simulation import Simulation
 
 
@@ -44,6 +45,8 @@ class Evaluation(Section):
     """Pushes that cannot succeed; empty leaves the suite out."""
     robustness: Robustness | None = None
     """Conditions harder than the paper's; empty leaves the suite out."""
+    probe: Probe | None = Field(default=None, json_schema_extra=LATER)
+    """A linear probe of what the policy's history knows of the object's mass; empty leaves it out."""
     disturbances: bool = False
     """Keep the impulses on the object and the pushes on the base during trials."""
     success: Success = Success()
@@ -67,9 +70,14 @@ class Evaluation(Section):
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:
-        if not (self.lifting or self.pushing or self.heavy or self.stagnation or self.robustness):
+        if not (self.measured or self.probe):
             raise ValueError(
-                "nothing to evaluate: give lifting, pushing, heavy, stagnation or robustness, "
+                "nothing to evaluate: give lifting, pushing, heavy, stagnation, robustness or probe, "
                 "or leave eval out of the stages"
             )
         return self
+
+    @property
+    def measured(self) -> bool:
+        """Whether there are trials whose errors are measured: a probe has none."""
+        return bool(self.lifting or self.pushing or self.heavy or self.stagnation or self.robustness)

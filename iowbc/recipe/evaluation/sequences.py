@@ -43,3 +43,12 @@ STAGNATION = (
 
 STANDING = (Segment(duration=6.0, ramp=0.0),)
 """Stand: 6 s."""
+
+PROBED = (
+    Segment(duration=2.0, ramp=0.0),
+    Segment(duration=4.0, velocity=(0.4, 0.0, 0.0)),
+    Segment(duration=2.0, velocity=(0.3, 0.0, 0.3)),
+    Segment(duration=2.0, height=0.68, pitch=0.15, ramp=0.8),
+    Segment(duration=2.0, ramp=0.8),
+)
+"""Stand, walk, turn, crouch and lean a little, stand: 12 s."""

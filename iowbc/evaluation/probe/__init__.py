@@ -1,0 +1,1 @@
+"""What a policy's history knows of the load: a linear probe of its latent."""

@@ -1,0 +1,131 @@
+"""Trials with masses spread over a range, and what the policy sees in them every so often."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
+from iowbc.evaluation.trials.rollout import Acting, play_episodes
+from iowbc.learning.acting import StudentPolicy
+from iowbc.learning.history import History
+from iowbc.recipe.recipe import Recipe
+from iowbc.task.episodes import Episode
+from iowbc.task.specification import Specification
+
+Features = NDArray[np.float32]
+EXACT = 1e-6
+"""Times nearer than this are the same [s]."""
+
+LATENT, HISTORY, NEWEST, PRIVILEGED = "latent", "history H_t", "newest s_t", "s_priv"
+"""What the mass is read from."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What was seen in the trials, one row a reading."""
+
+    features: dict[str, Features]
+    """By what they are of, each of shape (readings, k)."""
+    trial: NDArray[np.int64]
+    """Number of the trial, (readings,)."""
+    mass: NDArray[np.float64]
+    """Of its object, (readings,) [kg]."""
+    seconds: NDArray[np.float64]
+    """Time since the trial began, with the object in the hands, (readings,) [s]."""
+    settled: NDArray[np.bool_]
+    """Whether the history holds nothing but what was observed: it begins as copies of the first, (readings,)."""
+
+
+class Listener:
+    """Lets a policy act, and keeps what it sees at every so many control steps."""
+
+    def __init__(self, policy: Acting, environments: int, every: int, length: int) -> None:
+        """`length`: of the history, where the policy has none."""
+        self.policy, self.every = policy, every
+        self.student = policy.network if isinstance(policy, StudentPolicy) else None
+        self.length = policy.length if isinstance(policy, StudentPolicy) else length
+        self.kept: list[dict[str, Features]] = []
+        self._starts = np.ones(environments, np.bool_)
+        self._history: History | None = None
+        self._steps = 0
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        self.policy.reset(which)
+        self._starts |= which
+
+    def act(self, observation: Features, privileged: Features) -> Features:
+        if self._history is None:
+            self._history = History(len(observation), self.length, observation.shape[1])
+        frames = self._history.push(observation, self._starts)
+        self._starts[:] = False
+        if self._steps % self.every == 0:
+            self.kept.append(self._seen(frames, privileged))
+        self._steps += 1
+        return self.policy.act(observation, privileged)
+
+    def _seen(self, frames: Features, privileged: Features) -> dict[str, Features]:
+        seen = {
+            HISTORY: frames.reshape(len(frames), -1).copy(),
+            NEWEST: frames[:, -1].copy(),
+            PRIVILEGED: np.array(privileged),
+        }
+        if self.student is None:
+            return seen
+        with torch.inference_mode():
+            _, latent = self.student.read(torch.from_numpy(frames))
+        return {LATENT: latent.numpy(), **seen}
+
+
+def probe_episodes(recipe: Recipe) -> list[Episode]:
+    """The trials of `eval.probe`, lightest first. Raises ValueError where the recipe has none."""
+    probe = recipe.eval.probe
+    if probe is None:
+        raise ValueError("the recipe has no eval.probe")
+    held = ({} if recipe.eval.disturbances else dict(UNDISTURBED)) | probe.fixed
+    if probe.partner_share is not None:
+        held["partner_share"] = probe.partner_share
+    condition = Condition(probe.scene, command_script(probe.sequence, recipe.task.commands), held)
+    masses = np.linspace(*probe.masses, probe.trials).tolist()
+    return [condition.episode(mass, probe.seed + number) for number, mass in enumerate(masses)]
+
+
+def read(
+    world: Specification,
+    policy: Acting,
+    *,
+    workers: int,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> Readings:
+    """Play the trials of `eval.probe` and keep what is seen while they last. Raises Interrupted when interrupted."""
+    recipe = world.recipe
+    episodes, probe = probe_episodes(recipe), recipe.eval.probe
+    assert probe is not None
+    frequency = recipe.task.control_frequency
+    listener = Listener(policy, len(episodes), math.ceil(probe.interval * frequency), recipe.distill.history)
+    outcomes = play_episodes(world, episodes, listener, workers=workers, interrupted=interrupted, progress=progress)
+    times = np.arange(len(listener.kept)) * listener.every / frequency
+    going = times[:, None] < np.array([outcome.seconds for outcome in outcomes])
+    masses = np.array([episode.fixed["object_mass"] for episode in episodes])
+    return gathered(listener.kept, going, times, masses, listener.length / frequency)
+
+
+def gathered(
+    kept: Sequence[dict[str, Features]],
+    going: NDArray[np.bool_],
+    times: NDArray[np.float64],
+    masses: NDArray[np.float64],
+    span: float,
+) -> Readings:
+    """Readings of all trials in one table, without those after a trial's end.
+
+    kept: of each time, rows by trial; going: (times, trials); times: (times,) [s]; masses: (trials,) [kg]; span: of a
+    history [s].
+    """
+    moment, trial = np.nonzero(going)
+    features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
+    return Readings(features, trial, masses[trial], times[moment], times[moment] >= span - EXACT)

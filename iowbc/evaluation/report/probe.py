@@ -1,0 +1,168 @@
+"""Table and figure of the linear probe: the object's mass as it is, and as it is read from what the policy sees."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from iowbc.evaluation.probe.readings import PRIVILEGED
+from iowbc.evaluation.report.aggregate import variants_of
+from iowbc.evaluation.report.captions import partner
+from iowbc.evaluation.report.figures import style_of, write_figure
+from iowbc.evaluation.report.statistics import determination, determination_interval, root_mean_square
+from iowbc.evaluation.report.tables import ABSENT, Table, write_table
+
+LINES = ("-", "--", ":")
+"""Of what the mass is read from, in order; s_priv, which holds it, has none."""
+LINES_OF_SEVERAL = ("-", "--")
+"""The same, where several variants are shown."""
+LOWEST = -0.25
+"""Least R² that the figure shows: less than 0 says less than the mean of all masses does."""
+LEAST_TRIALS = 10
+"""Fewer trials that are still going at a time say nothing of R² there."""
+
+
+def write_probe(inferred: pd.DataFrame, folder: Path) -> pd.DataFrame:
+    """Write the table `probe` and its figure under `folder`; returns the table's numbers.
+
+    inferred: `probe.parquet` of one variant, or of several one after another.
+    """
+    tables, figures = folder / "tables", folder / "figures"
+    for each in (tables, figures):
+        each.mkdir(parents=True, exist_ok=True)
+    table = probe_table(inferred)
+    write_table(table, tables)
+    write_figure(probe_figure(inferred), figures / "probe.png")
+    return table.numbers
+
+
+def probe_table(inferred: pd.DataFrame) -> Table:
+    """How well the mass is read: from one reading, from the mean of a second's, and of all of a trial's."""
+    settled = inferred[inferred["settled"]]
+    rows, numbers = [], []
+    for source in dict.fromkeys(settled["source"]):
+        for variant in variants_of(settled):
+            found = settled[(settled["source"] == source) & (settled["variant"] == variant)]
+            if found.empty:
+                continue
+            one = figures_of(found)
+            numbers.append({"source": source, "variant": variant, **one})
+            rows.append(
+                (
+                    f"{source} ({one['size']:.0f})",
+                    variant,
+                    f"{one['readings']:.0f}",
+                    f"{one['R2']:.3f}",
+                    f"{one['R2_low']:.2f} to {one['R2_high']:.2f}",
+                    f"{one['RMSE']:.2f}",
+                    _of(one["R2_second"]),
+                    _of(one["R2_trial"]),
+                )
+            )
+    head = ("Read from", "Algorithm", "Readings", "R²", "95 % interval", "RMSE [kg]", "R² of 1 s", "R² of a trial")
+    latex_head = tuple(text.replace("R²", "$R^2$") for text in head)
+    return Table("probe", _caption(inferred), head, latex_head, tuple(rows), pd.DataFrame(numbers))
+
+
+def figures_of(found: pd.DataFrame) -> dict[str, float]:
+    """The figures of one source and variant, by name; R² also of means over a second and over a trial."""
+    mass, read = found["mass"].to_numpy(), found["inferred"].to_numpy()
+    low, high = determination_interval(mass, read, found["trial"].to_numpy())
+    seconds = found.assign(second=np.floor(found["seconds"])).groupby(["trial", "second"])[["mass", "inferred"]].mean()
+    trials = found.groupby("trial")[["mass", "inferred"]].mean()
+    return {
+        "size": float(found["size"].iloc[0]),
+        "trials": float(len(trials)),
+        "readings": float(len(found)),
+        "R2": determination(mass, read),
+        "R2_low": low,
+        "R2_high": high,
+        "RMSE": root_mean_square(mass, read),
+        "R2_second": determination(*seconds.to_numpy().T),
+        "R2_trial": determination(*trials.to_numpy().T),
+        "RMSE_trial": root_mean_square(*trials.to_numpy().T),
+    }
+
+
+def probe_figure(inferred: pd.DataFrame) -> Figure:
+    """True against inferred mass in the trials tested, and R² against the time since the grasp."""
+    figure = Figure(figsize=(10.5, 4.9), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    source = str(inferred["source"].iloc[0])
+    _scatter(left, inferred[inferred["settled"]], source)
+    _growth(right, inferred)
+    for axes, title in ((left, f"(a) mass read from the {source}"), (right, "(b) how soon it is known")):
+        axes.set_title(title, fontsize=10)
+        axes.grid(True, color="0.9")
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.suptitle(
+        f"Linear probe of the object's mass. {_circumstances(inferred)}\n"
+        "rings: mean of a trial; dots: single readings; grey: as it is",
+        fontsize=9,
+    )
+    return figure
+
+
+def _scatter(axes: Axes, settled: pd.DataFrame, source: str) -> None:
+    variants = variants_of(settled)
+    chosen = settled[settled["source"] == source]
+    ends = (float(chosen["mass"].min()), float(chosen["mass"].max()))
+    axes.plot(ends, ends, color="0.55", linestyle="--", linewidth=1.2, zorder=0)
+    for variant in variants_of(chosen):
+        found = chosen[chosen["variant"] == variant]
+        one, means = figures_of(found), found.groupby("trial")[["mass", "inferred"]].mean()
+        colour, _ = style_of(variant, variants)
+        axes.plot(found["mass"], found["inferred"], ".", color=colour, markersize=2, alpha=0.35, zorder=1)
+        label = f"{variant}: R² {one['R2']:.2f}, RMSE {one['RMSE']:.2f} kg\n(trial's mean {one['R2_trial']:.2f}, "
+        label += f"{one['RMSE_trial']:.2f} kg)"
+        axes.plot(means["mass"], means["inferred"], "o", color=colour, markerfacecolor="white", label=label, zorder=2)
+    axes.set_xlabel("true mass [kg]")
+    axes.set_ylabel("inferred mass [kg]")
+    axes.legend(fontsize=8, loc="upper left", frameon=False)
+
+
+def _growth(axes: Axes, inferred: pd.DataFrame) -> None:
+    """R² over the trials that go on at each time."""
+    variants, sources = (
+        variants_of(inferred),
+        [each for each in dict.fromkeys(inferred["source"]) if each != PRIVILEGED],
+    )
+    lines = LINES if len(variants) == 1 else LINES_OF_SEVERAL
+    for variant in variants:
+        for source, line in zip(sources, lines, strict=False):
+            found = inferred[(inferred["source"] == source) & (inferred["variant"] == variant)]
+            points = [
+                (seconds, determination(at["mass"].to_numpy(), at["inferred"].to_numpy()))
+                for seconds, at in found.groupby("seconds")
+                if len(at) >= LEAST_TRIALS
+            ]
+            if points:
+                label = source if len(variants) == 1 else f"{variant}, {source}"
+                times, values = zip(*points, strict=True)
+                axes.plot(times, values, color=style_of(variant, variants)[0], linestyle=line, label=label)
+    axes.set_ylim(LOWEST, 1.05)
+    axes.set_xlabel("time since the grasp [s]")
+    axes.set_ylabel("R² of a single reading")
+    axes.legend(fontsize=8, loc="lower right", frameon=False)
+
+
+def _caption(inferred: pd.DataFrame) -> str:
+    return (
+        "Linear probe: a ridge regression of the object's mass, fitted to half of the trials and tested on the others. "
+        f"{_circumstances(inferred)} In brackets, how many numbers it is read from. A reading is made as soon as the "
+        "history is full; R² of 1 s, and of a trial: of the means of its readings; the interval is over trials. "
+        "s_priv holds the mass itself, among all else that was drawn: it checks the probe."
+    )
+
+
+def _circumstances(inferred: pd.DataFrame) -> str:
+    count = inferred.groupby("variant")["trial"].nunique().max()
+    low, high = inferred["mass"].min(), inferred["mass"].max()
+    scene = inferred["scene"].iloc[0]
+    return f"In simulation, {scene}, {low:.1f} to {high:.1f} kg in {count} trials, {partner(inferred)}."
+
+
+def _of(value: float) -> str:
+    return ABSENT if np.isnan(value) else f"{value:.3f}"
