@@ -58,8 +58,10 @@ class Drawing:
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=True)
         scene.add_grid("/world/ground", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=25.0)
+        # Browsers apply new places at once and new shapes when they find the time: what changes its shape goes along.
+        self._beneath = scene.add_frame("/world/beneath", show_axes=False)
         self._forces = scene.add_arrows(
-            "/world/forces",
+            "/world/beneath/forces",
             np.zeros((1, 2, 3)),
             np.zeros((1, 3), np.uint8),
             shaft_radius=ARROW_RADIUS,
@@ -68,7 +70,7 @@ class Drawing:
         )
         flat = np.zeros((3, 3)), np.array([[0, 1, 2]])
         self._support = scene.add_mesh_simple(
-            "/world/support", *flat, color=SUPPORT, opacity=0.5, side="double", cast_shadow=False
+            "/world/beneath/support", *flat, color=SUPPORT, opacity=0.5, side="double", cast_shadow=False
         )
         self._balance = scene.add_cylinder("/world/balance", radius=DOT, height=ABOVE_GROUND, color=BALANCE)
 
@@ -133,18 +135,22 @@ class Drawing:
         for handles, visible in ((self._looks, not shown.collision), (self._shapes, shown.collision)):
             for handle in handles:
                 handle.visible = visible
-        self._show_forces(moment, shown.forces)
-        self._show_support(moment, shown.support)
-        self._follow(moment.bodies[model.body(self._robot.base).id, :2], shown.follow)
+        base = moment.bodies[model.body(self._robot.base).id, :2]
+        beneath = np.array([*base, 0.0])
+        self._beneath.position = beneath
+        self._show_forces(moment, beneath, shown.forces)
+        self._show_support(moment, beneath, shown.support)
+        self._follow(base, shown.follow)
 
-    def _show_forces(self, moment: Moment, wanted: bool) -> None:
+    def _show_forces(self, moment: Moment, beneath: Array, wanted: bool) -> None:
         self._forces.visible = wanted and bool(moment.forces)
         if self._forces.visible:
-            self._forces.points = np.array([[force.start, force.end] for force in moment.forces], np.float32)
+            ends = np.array([[force.start, force.end] for force in moment.forces])
+            self._forces.points = (ends - beneath).astype(np.float32)
             colours = np.array([COLOURS[force.kind][:3] for force in moment.forces])
             self._forces.colors = (255 * colours).astype(np.uint8)
 
-    def _show_support(self, moment: Moment, wanted: bool) -> None:
+    def _show_support(self, moment: Moment, beneath: Array, wanted: bool) -> None:
         corners = len(moment.support)
         self._support.visible = wanted and corners > 2
         self._balance.visible = wanted
@@ -153,7 +159,7 @@ class Drawing:
         if self._support.visible:
             fan = np.arange(1, corners - 1)
             self._support.faces = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1).astype(np.uint32)
-            self._support.vertices = (moment.support + lifted).astype(np.float32)
+            self._support.vertices = (moment.support + lifted - beneath).astype(np.float32)
 
     def _follow(self, base: Array, wanted: bool) -> None:
         """Moves the world under the cameras, so that each may be turned freely; `base` (2,) [m]."""

@@ -14,7 +14,7 @@ const LOWEST = 0.5, STEEPEST = 0.5, LYING = 2.0;
 
 class Page {
   constructor({ contract, scenes, first, mujoco, controller, golden }) {
-    Object.assign(this, { scenes, mujoco, controller, golden, fallen: 0, running: true });
+    Object.assign(this, { scenes, mujoco, controller, golden, fallen: 0, advanced: 0, running: true });
     this.asked = [];
     const between = (act) => (value) => this.asked.push(() => act(value));
     this.panel = new Panel(contract, scenes, first, {
@@ -64,9 +64,9 @@ class Page {
       if (!this.running) behind = 0;
       this.drawing.draw(this.world);
       if (now - since >= 1000 * MEASURED) {
-        const factor = simulated / ((now - since) / 1000);
-        this.panel.tell({ factor, world: this.world, running: this.running, fallen: this.fallen > 0 });
-        [since, simulated] = [now, 0];
+        const factor = simulated / ((now - since) / 1000), forward = simulated > 0 ? this.advanced / simulated : 0;
+        this.panel.tell({ factor, forward, world: this.world, running: this.running, fallen: this.fallen > 0 });
+        [since, simulated, this.advanced] = [now, 0, 0];
       }
     }
   }
@@ -76,8 +76,9 @@ class Page {
     const { world } = this;
     const targets = await this.controller.step(world.measured(), this.panel.command);
     world.step(targets.position);
-    const { base } = world.scene;
-    const lies = world.position(base)[2] < LOWEST * this.first || world.rotation(base)[8] < STEEPEST;
+    const { base } = world.scene, rotation = world.rotation(base), { linear } = world.velocity(base);
+    this.advanced += (rotation[0] * linear[0] + rotation[3] * linear[1]) * this.controller.period;
+    const lies = world.position(base)[2] < LOWEST * this.first || rotation[8] < STEEPEST;
     this.fallen = lies ? this.fallen + this.controller.period : 0;
     if (this.fallen >= LYING) this.begin(this.name);
   }

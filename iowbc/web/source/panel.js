@@ -65,10 +65,8 @@ export class Panel {
     find("#check").hidden = !possible;
   }
 
-  /** What is measured, once a second. */
-  tell({ factor, world, running, fallen }) {
-    const { linear } = world.velocity(world.scene.base), rotation = world.rotation(world.scene.base);
-    const forward = rotation[0] * linear[0] + rotation[3] * linear[1];
+  /** What is measured, once a second; `forward`: the mean speed since the last time [m/s]. */
+  tell({ factor, forward, world, running, fallen }) {
     const height = world.position(world.scene.base)[2];
     const clock = `${world.time.toFixed(0)} s, ${factor.toFixed(2)} × real time`;
     const moved = fallen ? "fell, and is put up again" : `forward ${forward.toFixed(2)} m/s, height ${height.toFixed(2)} m`;
