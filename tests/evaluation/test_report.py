@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_up_trials import trials_of
+from matplotlib.container import ErrorbarContainer
 
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
 from iowbc.evaluation.report.aggregate import aggregate, variants_of
@@ -233,6 +234,16 @@ def test_the_comparison_has_a_panel_for_each_thing_that_was_evaluated() -> None:
     ):
         figure = comparison(aggregate(trials), 0.8)
         assert [axes.get_title() for axes in figure.axes] == titles
+
+
+def test_rates_have_their_interval_and_what_was_not_pushed_to_its_limit_says_so() -> None:
+    summary = aggregate(pd.concat([trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("WBC", "lifting", {4.0: 0})]))
+    _, capacity, success = comparison(summary, 0.8).axes
+    assert [text.get_text() for text in capacity.texts] == ["≥ 4", "< 4"]
+    assert [text.get_text() for text in success.texts] == ["100", "0"]
+    whiskers = [each.lines[2][0] for each in success.containers if isinstance(each, ErrorbarContainer)]
+    intervals = [each.get_segments()[0][:, 1] for each in whiskers]
+    np.testing.assert_allclose(intervals, [[56.6, 100.0], [0.0, 43.4]], atol=0.1)
 
 
 def test_every_point_and_bar_is_below_the_upper_edge_and_axes_begin_at_zero() -> None:

@@ -4,6 +4,7 @@ Beside them what the paper does not show: success under harder conditions, and p
 """
 
 import textwrap
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
 from iowbc.evaluation.report.aggregate import suites_of, variants_of
-from iowbc.evaluation.report.capacity import load_capacity, push_capacity
+from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.error_tables import NUMBERS, STANDS_STILL
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
@@ -43,6 +45,18 @@ HEADROOM = 0.15
 """Room above the highest point, in parts of its height."""
 FAILURE_SPACING = 0.035
 """Distance of two variants' crosses, in heights of the panel."""
+WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
+"""How intervals are drawn on bars."""
+
+
+@dataclass(frozen=True)
+class Bars:
+    """A variant's bars, one a name; NaN leaves one out."""
+
+    heights: Array
+    texts: list[str]
+    intervals: Array | None = None
+    """How far each reaches below and above its bar, (2, names)."""
 
 
 def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
@@ -144,8 +158,7 @@ def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
 def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: float) -> None:
     axes.set_title(f"load capacity at {100 * rate:.0f} % success")
     found = {v: [load_capacity(summary, suite, v, rate) for suite in suites] for v in variants_of(summary)}
-    groups = {v: [np.nan if one is None else one.value or 0.0 for one in row] for v, row in found.items()}
-    _bars(axes, groups, suites, "{:g}")
+    _capacity_bars(axes, found, suites)
     axes.set_ylabel("mass [kg]")
 
 
@@ -153,8 +166,7 @@ def _push_panel(axes: Axes, pushes: pd.DataFrame, rate: float) -> None:
     axes.set_title(f"impulse survived standing, {float(pushes['mass'].iloc[0]):g} kg")
     directions = list(dict.fromkeys(pushes["case"]))
     found = {v: [push_capacity(pushes, one, v, rate) for one in directions] for v in variants_of(pushes)}
-    groups = {v: [np.nan if one is None else one.value or 0.0 for one in row] for v, row in found.items()}
-    _bars(axes, groups, directions, "{:g}")
+    _capacity_bars(axes, found, directions)
     axes.set_ylabel("impulse [N·s]")
 
 
@@ -172,19 +184,32 @@ def _success_panel(axes: Axes, chosen: pd.DataFrame) -> None:
     names = list(dict.fromkeys(zip(chosen["case"], chosen["mass"], strict=True)))
     groups = {}
     for variant in variants_of(chosen):
-        rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"])["rate"]
-        groups[variant] = [100 * float(rows.get(name, np.nan)) for name in names]
-    _bars(axes, groups, [f"{_broken(case)}\n{mass:g} kg" for case, mass in names], "{:.0f}")
-    axes.set_ylabel("successful trials [%]")
+        rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"]).reindex(names)
+        rate, low, high = (100 * rows[name].to_numpy(float) for name in ("rate", "rate_low", "rate_high"))
+        texts = [f"{value:.0f}" for value in rate]
+        groups[variant] = Bars(rate, texts, np.clip([rate - low, high - rate], 0.0, None))
+    _bars(axes, groups, [f"{_broken(case)}\n{mass:g} kg" for case, mass in names])
+    axes.set_ylabel("successful trials [%], 95 % interval")
     axes.set_ylim(0, 110)
 
 
-def _bars(axes: Axes, groups: dict[str, list[float]], names: list[str], text: str) -> None:
+def _capacity_bars(axes: Axes, found: dict[str, list[Capacity | None]], names: list[str]) -> None:
+    groups = {}
+    for variant, row in found.items():
+        heights = np.array([np.nan if one is None else one.value or 0.0 for one in row])
+        groups[variant] = Bars(heights, ["" if one is None else one.text("").strip() for one in row])
+    _bars(axes, groups, names)
+
+
+def _bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:
     width = 0.8 / max(len(groups), 3)
-    for place, (variant, values) in enumerate(groups.items()):
+    for place, (variant, bars) in enumerate(groups.items()):
         positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
-        bars = axes.bar(positions, values, width, color=style_of(variant, list(groups))[0], label=variant)
-        axes.bar_label(bars, [text.format(value) for value in values], fontsize=8)
+        colour = style_of(variant, list(groups))[0]
+        drawn = axes.bar(
+            positions, bars.heights, width, yerr=bars.intervals, color=colour, label=variant, error_kw=WHISKERS
+        )
+        axes.bar_label(drawn, bars.texts, fontsize=8)
     axes.set_xticks(range(len(names)), names, fontsize=8)
     _from_zero(axes)
     axes.set_xlim(-0.6, len(names) - 0.4)
