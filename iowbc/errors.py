@@ -19,6 +19,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 REPRESENTATION_LENGTH = 60
+PROBLEMS_TOLD = 50
+"""Problems of a recipe that are told; the others are counted."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +48,14 @@ class UsageError(IowbcError):
 
 
 class RecipeError(UsageError):
-    """A recipe, or an override of it, is wrong. Holds every problem found."""
+    """A recipe, or an override of it, is wrong. Holds the first problems found, and how many more there are."""
 
-    def __init__(self, problems: Sequence[Problem]) -> None:
-        self.problems = list(problems)
-        super().__init__("\n".join(map(str, self.problems)))
+    def __init__(self, problems: Sequence[Problem], further: int = 0) -> None:
+        """`further`: problems that were found and are not among those given."""
+        self.problems = list(problems[:PROBLEMS_TOLD])
+        self.further = further + len(problems) - len(self.problems)
+        more = [f"and {self.further:,} more problems"] if self.further else []
+        super().__init__("\n".join([*map(str, self.problems), *more]))
 
 
 class StageFailed(IowbcError):
@@ -78,7 +83,7 @@ class ContractBroken(IowbcError):
 
 
 class WorkerFailed(IowbcError):
-    """A worker process died, hung, or raised; the text holds its traceback. All workers are ended by then."""
+    """A worker process died, hung, or raised; the text holds its traceback, if it left one. All have ended by then."""
 
 
 class NoRenderer(IowbcError):

@@ -66,17 +66,11 @@ def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
 
 def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
     """The planner of a recipe and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
-
     from iowbc.robot.description import robot_folder
 
-    if Path(loaded.recipe.robot).name != loaded.recipe.robot and not loaded.place("robot").startswith("--set"):
-        text = (
-            f"key 'robot' = '{loaded.recipe.robot}': a recipe names a folder under robots/; a path is for --set robot="
-        )
-        raise RecipeError([Problem(loaded.place("robot"), text)])
     try:
         robot = robot_folder(loaded.recipe.robot)
     except FileNotFoundError as error:
-        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
+        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
     check_against_robot(loaded, robot)
     return Planner(loaded, registry, Store(request.runs), robot, request.options), robot

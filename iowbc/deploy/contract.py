@@ -12,6 +12,7 @@ from typing import Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from iowbc.control.command import COMMAND
 from iowbc.control.feasible_map import FEASIBLE
 from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.errors import ContractBroken
@@ -156,6 +157,45 @@ class Contract(Section):
             raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
         return self
 
+    @model_validator(mode="after")
+    def _numbers_of_motors(self) -> Self:
+        for name in ("kp", "kd", "effort", "velocity_limit"):
+            values = getattr(self, name)
+            if min(values, default=0.0) < 0.0:
+                raise ValueError(f"{name}: {min(values)} is negative")
+        if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(f"lower {self.lower} does not lie below upper {self.upper}")
+        return self
+
+    @model_validator(mode="after")
+    def _what_the_loop_passes_on(self) -> Self:
+        """The control loop gives these inputs, and uses these outputs, whatever else the graph has."""
+        support, arms, size = len(self.support), len(self.interaction), sum(part.size for part in self.observation)
+        past = (self.history, size)
+        needed = {
+            "inputs": {
+                "command": (len(COMMAND),),
+                "heading_reference": (1,),
+                "arm_reference": (arms,),
+                "gait": (2,),
+                "last_action": (support,),
+                "restart": (1,),
+                "history": past,
+            },
+            "outputs": {
+                "support_target": (support,),
+                "action": (support,),
+                "support_reference": (support,),
+                "history_next": past,
+            },
+        }
+        for side, shapes in needed.items():
+            found = {port.name: port.shape for port in getattr(self, side)}
+            for name, shape in shapes.items():
+                if found.get(name) != shape:
+                    raise ValueError(f"{side}: {name} should have the shape {shape}, found {found.get(name)}")
+        return self
+
 
 def sentences(section: type[Section], path: str = "") -> dict[str, str]:
     """The sentence under each field of a section, and of the sections in it, by dotted path."""
@@ -213,6 +253,12 @@ def _recipe_name(folder: Path) -> str | None:
     return name if isinstance(name, str) else None
 
 
+def require_sealed(contract: Contract, folder: Path, *names: str) -> None:
+    """Raises ContractBroken for files that are to be read and that the contract has no digest of."""
+    if unsealed := [name for name in names if name not in contract.files]:
+        raise ContractBroken(f"{folder / CONTRACT}: says nothing of {' and '.join(unsealed)}; export again")
+
+
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
@@ -224,9 +270,7 @@ def read_contract(folder: Path | str) -> Contract:
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
     except ValidationError as error:
         raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 3: {error}; export again") from error
-    unsealed = [name for name in (GRAPH, f"{ROBOT}/{DESCRIPTION}") if name not in contract.files]
-    if unsealed:
-        raise ContractBroken(f"{folder / CONTRACT}: says nothing of {' and '.join(unsealed)}; export again")
+    require_sealed(contract, folder, GRAPH, f"{ROBOT}/{DESCRIPTION}")
     missing = [name for name in contract.files if not (folder / name).is_file()]
     if missing:
         raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that `export` made")

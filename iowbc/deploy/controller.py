@@ -19,7 +19,16 @@ from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import GENERATOR, GRAPH, ROBOT, Contract, exported_folder, read_contract, readable
+from iowbc.deploy.contract import (
+    GENERATOR,
+    GRAPH,
+    ROBOT,
+    Contract,
+    exported_folder,
+    read_contract,
+    readable,
+    require_sealed,
+)
 from iowbc.deploy.guard import TargetGuard
 from iowbc.deploy.session import Values, open_session, run
 from iowbc.errors import ContractBroken
@@ -133,6 +142,7 @@ class Controller:
         contract = read_contract(folder)
         with readable(folder / ROBOT):
             robot = load_robot(folder / ROBOT)
+        require_sealed(contract, folder, f"{ROBOT}/{robot.mjcf.name}")
         if robot.joints != contract.joints:
             raise ContractBroken(
                 f"{folder / ROBOT}: joints {robot.joints} differ from the contract's {contract.joints}; export again"
@@ -148,6 +158,9 @@ class Controller:
         with readable(folder / GRAPH):
             controller = cls(contract, robot, session, feasible, robots)
             outputs = run(session, controller._blank)
+        made = {name: value.shape[1:] for name, value in outputs.items()}
+        if made != (said := {port.name: port.shape for port in contract.outputs}):
+            raise ContractBroken(f"{folder / GRAPH}: outputs are {made}, the contract says {said}; export again")
         broken = [name for name, value in outputs.items() if not np.isfinite(value).all()]
         if broken:
             raise ContractBroken(

@@ -20,15 +20,19 @@ def exported_world(folder: Path) -> Specification:
 
     Raises ContractBroken where the folder is not what its contract says.
     """
-    Controller.load(folder)
+    said = Controller.load(folder).contract
+    contract.require_sealed(said, folder, contract.RECIPE)
     path = folder / contract.RECIPE
     try:
         recipe = Recipe.model_validate_json(path.read_bytes())
-    except (FileNotFoundError, ValidationError) as error:
-        raise ContractBroken(f"{path}: missing or not a recipe of this version: {error}; export again") from error
-    generator = folder / contract.GENERATOR
+    except ValidationError as error:
+        raise ContractBroken(f"{path}: not a recipe of this version: {error}; export again") from error
+    parts = [f"{contract.GENERATOR}/{name}" for name in contract.GENERATOR_FILES]
+    generated = not said.files.keys().isdisjoint(parts)
+    if generated:
+        contract.require_sealed(said, folder, *parts)
     with contract.readable(folder):
-        return Specification(recipe, folder / contract.ROBOT, generator if generator.is_dir() else None)
+        return Specification(recipe, folder / contract.ROBOT, folder / contract.GENERATOR if generated else None)
 
 
 class ExportedPolicy:

@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from iowbc.errors import Damaged, Interrupted, PipelineFailed, StageFailed
+from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
@@ -185,7 +185,7 @@ class Runner:
             self._ended(workspace, view, "stopped", "KILLED", str(error))
             text = str(error).removeprefix(f"{stage.name}: ")
             raise Interrupted(f"{stage.name}: {text or 'aborted'}") from error
-        except StageFailed as error:
+        except IowbcError as error:
             self._ended(workspace, view, "failed", "FAILED", str(error))
             raise PipelineFailed(f"{stage.name} failed: {error}") from error
         except Exception as error:

@@ -4,6 +4,7 @@ that they were made from, and a key changes with their content."""
 import base64
 import binascii
 import hashlib
+import stat
 import zlib
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -36,6 +37,8 @@ class FileBeside(Section):
         if file.suffix.lower() not in cls.suffixes:
             raise ValueError(f"should be a file that ends in {' or '.join(cls.suffixes)}")
         try:
+            if not stat.S_ISREG(file.stat().st_mode):
+                raise ValueError(f"{file}: is no regular file")
             with file.open("rb") as opened:
                 data = opened.read(cls.largest + 1)
         except OSError as error:

@@ -9,7 +9,8 @@ import numpy as np
 import yaml
 
 from iowbc.arrays import Array, Indices
-from iowbc.robot.mjcf import Hinge, Tree, read_tree
+from iowbc.errors import shown
+from iowbc.robot.mjcf import Hinge, Tree, read_tree, small_text
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s²], as MuJoCo and pinocchio have it by default."""
@@ -87,7 +88,7 @@ def robot_folder(name: str) -> Path:
     found = robot_folders()
     if name not in found:
         raise FileNotFoundError(
-            f"no robot {name!r}: looked for {name}/robot.yaml in {', '.join(str(root) for root in _roots())}; "
+            f"no robot {shown(name)}: looked for its robot.yaml in {', '.join(str(root) for root in _roots())}; "
             f"known robots: {', '.join(found) or 'none'}"
         )
     return found[name]
@@ -106,16 +107,28 @@ def _roots() -> list[Path]:
 
 
 def load_robot(folder: Path) -> Robot:
-    """Reads `robot.yaml` and the MJCF it names. Errors name the file, the entry, and what would be valid."""
+    """Reads `robot.yaml` and the MJCF beside it that it names.
+
+    Raises OSError for a file that is not there, ValueError with the file, the entry, and what would be valid.
+    """
     source = folder / DESCRIPTION
-    entries = yaml.safe_load(source.read_text(encoding="utf-8"))
-    if not isinstance(entries, Mapping):
-        raise ValueError(f"{source}: expected a mapping of entries, found {type(entries).__name__}")
+    try:
+        entries = yaml.safe_load(small_text(source))
+        if not isinstance(entries, Mapping):
+            raise ValueError(f"{source}: expected a mapping of entries, found {type(entries).__name__}")
+        return _described(folder, source, entries)
+    except (yaml.YAMLError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError(f"{source}: describes no robot: {type(error).__name__}: {error}") from error
+
+
+def _described(folder: Path, source: Path, entries: Mapping[str, Any]) -> Robot:
     needed = ("name", "mjcf", "base", "torso", "soles", "wrists", "support", "joints")
     missing = [key for key in needed if key not in entries]
     if missing:
         raise ValueError(f"{source}: missing {', '.join(missing)}")
     mjcf = folder / entries["mjcf"]
+    if mjcf.name != entries["mjcf"]:
+        raise ValueError(f"{source}: mjcf: {shown(entries['mjcf'])} is not the name of a file in this folder")
     tree = read_tree(mjcf)
     hinges = tree.hinges()
     joints = tuple(hinge.name for hinge in hinges)

@@ -1,5 +1,6 @@
 """Reads a robot's MJCF as a tree of bodies with NumPy alone: kinematics where there is no simulator."""
 
+import stat
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -9,6 +10,9 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.robot import rotations
+
+LARGEST_FILE = 1_000_000
+"""Bytes of the largest file of a robot that is read."""
 
 
 @dataclass(frozen=True)
@@ -132,12 +136,31 @@ class Tree:
         return position + rotation @ end.sites[site], rotation
 
 
+def small_text(path: Path) -> str:
+    """Text of one of a robot's files. Raises OSError, or ValueError for what is none of their kind or size."""
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode):
+        raise ValueError(f"{path}: is no regular file")
+    if found.st_size > LARGEST_FILE:
+        raise ValueError(f"{path}: has {found.st_size:,} bytes; a robot's file has {LARGEST_FILE:,} at most")
+    return path.read_text(encoding="utf-8")
+
+
 def read_tree(path: Path) -> Tree:
-    """Reads an MJCF whose numbers stand on the elements themselves (classes only decide contact and look)."""
+    """Reads an MJCF that stands alone, with its numbers on the elements themselves (classes decide contact and look).
+
+    Raises OSError, or ValueError with what is wrong.
+    """
     try:
-        root = ElementTree.parse(path).getroot()
+        root = ElementTree.fromstring(small_text(path))
     except ElementTree.ParseError as error:
         raise ValueError(f"{path}: not well-formed XML: {error}") from error
+    for element in root.iter():
+        if element.tag == "include" or "file" in element.attrib:
+            raise ValueError(
+                f"{path}: <{element.tag} file={element.get('file')!r}> reads another file, and no export takes it: "
+                "describe all in this one, with primitive shapes"
+            )
     world = root.find("worldbody")
     if world is None:
         raise ValueError(f"{path}: no <worldbody>")

@@ -1,18 +1,21 @@
 """Kills, stops, full disks and flipped bits, at random moments of a recipe's run: `make chaos`.
 
 python tests/chaos/chaos.py [--recipe FILE] [--events 200] [--seed 0] [--record FILE]
+python tests/chaos/chaos.py --recipe tests/chaos/workers.yaml --events 40
 
 A recipe is run once undisturbed; then again and again, disturbed, in a folder of its own, each run going on from what
 the one before has left. Lost is: an artifact that was whole before an event and is not after it, unless the event hit
 it; and a result of a run that came to its end and differs from the undisturbed one. Also counted are tracebacks and
 errors that nobody foresaw, and processes that outlive their run (MLflow's sender aside). The seed decides kinds,
-moments and places. Without `--recipe` the small stages of the test suite run, which count instead of learn.
+moments and places. Without `--recipe` the small stages of the test suite run, which count instead of learn and have no
+workers; of a recipe's events every second one kills a worker process and lets the run go on.
 
 What happened is told and kept as it goes, in `build/chaos/`. The same command goes on from there: an hour that was cut
 short is not lost, and a larger `--events` only adds. Another recipe or a changed program begins a record of its own.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import random
@@ -28,7 +31,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
-from tally import ENDED, Tally, Turn
+from tally import ENDED, Tally, Turn, Undisturbed
 
 from iowbc.errors import Damaged
 from iowbc.pipeline.store.artifact import Artifact
@@ -53,6 +56,10 @@ PATIENCE = 900.0
 """Seconds within which a run that was asked to stop, or met a full disk, has ended."""
 LEAVING = 20.0
 """Seconds within which the processes of a run that was killed are gone."""
+WORKING = 2.0
+"""Seconds after its appearance within which a worker is killed."""
+WORKERS = {"labelling worker": "multiprocessing.spawn", "training worker": "task.vector.worker"}
+"""What worker processes do, and what their command lines have in them."""
 RECORDS = Path("build", "chaos")
 """Where records stand that have no file of their own."""
 
@@ -66,12 +73,10 @@ class Chaos:
     folder: Path
     seed: int
     tally: Tally
+    workers: bool
+    """Whether stages have worker processes."""
     draws: random.Random = field(default_factory=random.Random)
     """Of the present turn."""
-    wanted: dict[str, str] = field(default_factory=dict)
-    """Digest of each stage's results in the undisturbed run."""
-    seconds: float = 0.0
-    """Time that the undisturbed run took [s]."""
 
     @property
     def store(self) -> Store:
@@ -95,14 +100,19 @@ class Chaos:
     def run(self) -> "subprocess.Popen[bytes]":
         return self.start("run", str(self.recipe))
 
-    def undisturbed(self) -> None:
+    @property
+    def undisturbed(self) -> Undisturbed:
+        assert self.tally.undisturbed is not None
+        return self.tally.undisturbed
+
+    def measure(self) -> None:
         """Run once to the end, and remember the results."""
         begun = time.monotonic()
         code = self.run().wait()
-        self.seconds = time.monotonic() - begun
+        seconds = time.monotonic() - begun
         if code:
             raise SystemExit(f"the undisturbed run ended with {code}:\n{self.said()}")
-        self.wanted = self.results()
+        self.tally.begin(Undisturbed(seconds, self.results()))
         self._forget()
 
     def results(self) -> dict[str, str]:
@@ -128,29 +138,31 @@ class Chaos:
         """One run with one disturbance of a drawn kind at a drawn moment, then a look at what is left."""
         number = len(self.tally.turns)
         self.draws.seed(f"{self.seed}/{number}")
-        kind, moment = self.draws.choice(sorted(KINDS)), self.draws.random() * self.seconds
-        process, tracebacks = self.run(), []
+        disturb = self.draws.choice(DISTURBANCES)
+        if self.workers and number % 2:
+            disturb = kill_worker
+        moment = self.draws.random() * self.undisturbed.seconds
+        process, struck, lost = self.run(), Struck(ENDED), list[str]()
         try:
             process.wait(moment)
         except subprocess.TimeoutExpired:
-            before, family = self.whole(), psutil.Process(process.pid).children(recursive=True)
-            hit = KINDS[kind](self, process)
-            tracebacks += self._unforeseen()
+            before = self.whole()
+            struck = disturb(self, process)
             kept = self.whole()
-            lost = [str(folder.relative_to(self.folder)) for folder in before if folder not in kept and folder != hit]
-            left = self._left(family)
-        else:
-            kind, left = ENDED, []
-            lost = self._ended(process.returncode)
-            tracebacks += self._unforeseen()
-            self._forget()
+            lost = [str(place.relative_to(self.folder)) for place in before if place not in {*kept, struck.artifact}]
         finally:
             process.kill()
+            process.wait()
+        tracebacks = self._unforeseen()
+        left = self._left()
+        if struck.kind == ENDED or process.returncode == 0:
+            lost += self._ended(process.returncode)
+            self._forget()
         if code := self.start("status").wait():
             tracebacks.append(f"status ended with {code} after this:\n{self.said()}")
         else:
             tracebacks += self._unforeseen()
-        self.tally.add(Turn(number, kind, round(moment, 2), tuple(lost), tuple(tracebacks), tuple(left)))
+        self.tally.add(Turn(number, struck.kind, round(moment, 2), tuple(lost), tuple(tracebacks), tuple(left)))
 
     def _unforeseen(self) -> list[str]:
         said = self.said()
@@ -161,7 +173,7 @@ class Chaos:
         found = self.results()
         other = [
             f"{stage}: {found.get(stage)} instead of {digest}"
-            for stage, digest in self.wanted.items()
+            for stage, digest in self.undisturbed.results.items()
             if found.get(stage) != digest
         ]
         return [*other, f"the run ended with {code}:\n{self.said()}"] if code or other else []
@@ -174,11 +186,21 @@ class Chaos:
                 return
             time.sleep(0.1)
 
-    def _left(self, family: Sequence[psutil.Process]) -> list[str]:
-        """Processes of a run that are still there, without MLflow's sender, which has a session of its own."""
-        own = [process for process in family if process.is_running() and not _sends(process)]
-        _, alive = psutil.wait_procs(own, timeout=LEAVING)
-        return [" ".join(process.cmdline()) for process in alive]
+    def _left(self) -> list[str]:
+        """Processes of this folder's runs that do not go when they should."""
+        limit = time.monotonic() + LEAVING
+        while (found := self.processes()) and time.monotonic() < limit:
+            time.sleep(0.1)
+        return list(found.values())
+
+    def processes(self) -> dict[int, str]:
+        """Command lines of the processes that runs in this folder have started, by number, without MLflow's sender."""
+        found = {}
+        for process in psutil.process_iter():
+            with contextlib.suppress(psutil.Error):  # of one that has just ended
+                if process.environ().get("TMPDIR") == str(self.folder) and not _sends(process):
+                    found[process.pid] = " ".join(process.cmdline())
+        return found
 
     def flip(self, files: Sequence[Path]) -> Path | None:
         """Change one bit of one of the files; returns which."""
@@ -199,80 +221,125 @@ def _sends(process: psutil.Process) -> bool:
         return False
 
 
-def kill(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+@dataclass(frozen=True)
+class Struck:
+    """What a disturbance was."""
+
+    kind: str
+    """In words; `ENDED` where the run came to its end before."""
+    artifact: Path | None = None
+    """Folder of the artifact that it damaged."""
+
+
+def kill(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     process.kill()
     process.wait()
+    return Struck("kill")
 
 
-def kill_child(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
-    """Kill a worker where there is one; the run then goes on or fails with a sentence. It is stopped either way."""
-    children = psutil.Process(process.pid).children(recursive=True)
-    if children:
-        chaos.draws.choice(sorted(children, key=lambda child: child.pid)).kill()
-        time.sleep(1.0)
+def kill_worker(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
+    """Kill a worker a moment after there is one. The run goes on, or ends with a sentence."""
+    pause = chaos.draws.random() * WORKING
+    while process.poll() is None:
+        if _workers(process):
+            time.sleep(pause)
+            workers = _workers(process)
+            if workers:
+                kind, victim = chaos.draws.choice(workers)
+                victim.kill()
+                process.wait(PATIENCE)
+                return Struck(f"kill of a {kind}")
+        time.sleep(0.02)
+    return Struck(ENDED)
+
+
+def _workers(process: "subprocess.Popen[bytes]") -> list[tuple[str, psutil.Process]]:
+    """Worker processes of a run, by what they do and in the order of their start."""
+    found = []
+    with contextlib.suppress(psutil.Error):
+        for child in sorted(psutil.Process(process.pid).children(recursive=True), key=lambda child: child.pid):
+            line = " ".join(child.cmdline())
+            found += [(kind, child) for kind, mark in WORKERS.items() if mark in line]
+    return found
+
+
+def kill_sender(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
+    """Kill MLflow's sender where there is one, and stop the run a second later."""
+    for child in psutil.Process(process.pid).children(recursive=True):
+        if _sends(child):
+            child.kill()
+    time.sleep(1.0)
     stop(chaos, process)
+    return Struck("kill of MLflow's sender, then a stop")
 
 
-def stop(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+def stop(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     process.send_signal(chaos.draws.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
     process.wait(PATIENCE)
+    return Struck("stop")
 
 
-def abort(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+def abort(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     for _ in range(2):
         process.send_signal(signal.SIGTERM)
         time.sleep(0.05)
     process.wait(PATIENCE)
+    return Struck("second stop, which aborts")
 
 
-def fill_disk(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+def fill_disk(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     """No file grows any more, as where 0 bytes are left."""
     try:
         resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (0, 0))
     except ProcessLookupError:
-        return
+        return Struck(ENDED)
     process.wait(PATIENCE)
+    return Struck("full disk")
 
 
-def damage_artifact(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Path | None:
+def damage_artifact(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     kill(chaos, process)
-    hit = chaos.flip(list((chaos.folder / "runs" / "store").rglob("*")))
-    return None if hit is None else Path(*hit.parts[: len((chaos.folder / "runs" / "store").parts) + 2])
+    store = chaos.folder / "runs" / "store"
+    hit = chaos.flip(list(store.rglob("*")))
+    return Struck("bit of an artifact", None if hit is None else Path(*hit.parts[: len(store.parts) + 2]))
 
 
-def damage_checkpoint(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+def damage_checkpoint(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     kill(chaos, process)
     chaos.flip(list((chaos.folder / "runs" / "work").rglob("*")))
+    return Struck("bit of a checkpoint")
 
 
-def damage_journal(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+def damage_journal(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     kill(chaos, process)
     tracking = chaos.folder / "runs" / "tracking"
     chaos.flip([*tracking.glob("*.jsonl"), *tracking.glob("*.sent")])
+    return Struck("bit of a journal")
 
 
-def damage_record(chaos: Chaos, process: "subprocess.Popen[bytes]") -> None:
+def damage_record(chaos: Chaos, process: "subprocess.Popen[bytes]") -> Struck:
     kill(chaos, process)
     chaos.flip([*(chaos.folder / "runs" / "locks").glob("*"), *(chaos.folder / "runs" / "work").glob("*/*.json")])
+    return Struck("bit of a record")
 
 
-KINDS: dict[str, Callable[[Chaos, "subprocess.Popen[bytes]"], Path | None]] = {
-    "kill": kill,
-    "kill of a worker": kill_child,
-    "stop": stop,
-    "second stop, which aborts": abort,
-    "full disk": fill_disk,
-    "bit of an artifact": damage_artifact,
-    "bit of a checkpoint": damage_checkpoint,
-    "bit of a journal": damage_journal,
-    "bit of a record": damage_record,
-}
-"""Each returns the artifact that it damaged, if any."""
+DISTURBANCES: tuple[Callable[[Chaos, "subprocess.Popen[bytes]"], Struck], ...] = (
+    kill,
+    kill_sender,
+    stop,
+    abort,
+    fill_disk,
+    damage_artifact,
+    damage_checkpoint,
+    damage_journal,
+    damage_record,
+)
+"""What may happen to any run."""
 
 
 def play(recipe: Path | None, events: int, seed: int, folder: Path, record: Path | None = None) -> Tally:
     """Disturb a recipe's runs until so many events are recorded, and run it once more to the end."""
-    command = [sys.executable, "-m", "iowbc"]
+    command, workers = [sys.executable, "-m", "iowbc"], recipe is not None
     if recipe is None:
         command = [sys.executable, "-c", SMALL_PROGRAM]
         recipe = folder / "small.yaml"
@@ -282,14 +349,15 @@ def play(recipe: Path | None, events: int, seed: int, folder: Path, record: Path
         print(f"{tally.file} has {tally.line}", flush=True)
     if tally.events >= events:
         return tally
-    chaos = Chaos(command, recipe.absolute(), folder, seed, tally)
-    chaos.undisturbed()
+    chaos = Chaos(command, recipe.absolute(), folder, seed, tally, workers)
+    if tally.undisturbed is None:
+        chaos.measure()
     while tally.events < events:
         chaos.turn()
         last = tally.turns[-1]
         print(f"{last.moment:.1f} s, {last.kind}; {tally.line}", *last.findings, sep="\n", flush=True)
     lost = chaos._ended(chaos.run().wait())
-    tally.add(Turn(len(tally.turns), ENDED, chaos.seconds, tuple(lost), tuple(chaos._unforeseen())))
+    tally.add(Turn(len(tally.turns), ENDED, chaos.undisturbed.seconds, tuple(lost), tuple(chaos._unforeseen())))
     return tally
 
 
@@ -306,6 +374,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--record", type=Path, help="file to go on from and to add to; one in build/chaos")
     asked = parser.parse_args()
+    for number in (signal.SIGINT, signal.SIGHUP):  # under nohup, runs would inherit that they are ignored
+        signal.signal(number, signal.default_int_handler)
     try:
         with tempfile.TemporaryDirectory(prefix="iowbc-chaos-", ignore_cleanup_errors=True) as folder:
             tally = play(asked.recipe, asked.events, asked.seed, Path(folder), asked.record)

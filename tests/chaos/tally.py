@@ -31,12 +31,23 @@ class Turn:
         return [f"{what}: {text}" for what, texts in named.items() for text in texts]
 
 
+@dataclass(frozen=True)
+class Undisturbed:
+    """The run that nothing happened to."""
+
+    seconds: float
+    """Time that it took [s]."""
+    results: dict[str, str]
+    """Digest of each stage's results."""
+
+
 @dataclass
 class Tally:
-    """The turns so far, and the file that keeps them."""
+    """The turns so far, what they are compared with, and the file that keeps both."""
 
     file: Path
     turns: list[Turn] = field(default_factory=list)
+    undisturbed: Undisturbed | None = None
 
     @classmethod
     def of(cls, file: Path) -> "Tally":
@@ -45,16 +56,22 @@ class Tally:
         whole = [line for line in lines if line.endswith("\n")]
         if whole != lines:
             file.write_text("".join(whole), encoding="utf-8")
-        kept = (json.loads(line) for line in whole)
-        return cls(
-            file, [Turn(**{k: tuple(v) if isinstance(v, list) else v for k, v in turn.items()}) for turn in kept]
-        )
+        head = [Undisturbed(**json.loads(line)) for line in whole[:1]]
+        return cls(file, [_turn(json.loads(line)) for line in whole[1:]], head[0] if head else None)
+
+    def begin(self, undisturbed: Undisturbed) -> None:
+        """The head of the record."""
+        self.undisturbed = undisturbed
+        self._write(asdict(undisturbed))
 
     def add(self, turn: Turn) -> None:
+        self._write(asdict(turn))
+        self.turns.append(turn)
+
+    def _write(self, told: dict[str, Any]) -> None:
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with self.file.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(turn)) + "\n")
-        self.turns.append(turn)
+            file.write(json.dumps(told) + "\n")
 
     @property
     def events(self) -> int:
@@ -84,7 +101,8 @@ COUNTED = ("lost", "tracebacks", "left")
 
 
 def _turn(kept: dict[str, Any]) -> Turn:
-    return Turn(**{name: tuple(value) if isinstance(value, list) else value for name, value in kept.items()})
+    given: dict[str, Any] = {name: tuple(item) if isinstance(item, list) else item for name, item in kept.items()}
+    return Turn(**given)
 
 
 def _row(name: str, turns: list[Turn]) -> str:

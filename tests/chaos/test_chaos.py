@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from chaos import play
-from tally import ENDED, Tally, Turn
+from tally import ENDED, Tally, Turn, Undisturbed
 
 
 def test_a_few_disturbances_lose_nothing_and_a_later_series_goes_on(
@@ -22,6 +22,7 @@ def test_a_few_disturbances_lose_nothing_and_a_later_series_goes_on(
 
 def test_what_was_found_is_kept_in_words_and_a_line_that_was_cut_off_does_not_count(tmp_path: Path) -> None:
     tally = Tally(tmp_path / "record.jsonl")
+    tally.begin(Undisturbed(3.0, {"teacher": "0123"}))
     tally.add(Turn(0, "kill", 0.5, lost=("runs/store/teacher/0123",), tracebacks=("Traceback: a bad day",)))
     tally.add(Turn(1, "kill", 1.5, left=("python worker",)))
     tally.add(Turn(2, ENDED, 2.0))
@@ -29,6 +30,7 @@ def test_what_was_found_is_kept_in_words_and_a_line_that_was_cut_off_does_not_co
         file.write('{"number": 3, "kind": "st')
     again = Tally.of(tally.file)
     assert again.turns == tally.turns == Tally.of(tally.file).turns
+    assert again.undisturbed == tally.undisturbed
     assert again.turns[0].findings == ["lost: runs/store/teacher/0123", "printed: Traceback: a bad day"]
     assert again.line == "2 events: lost 1, tracebacks 1, processes left 1"
     assert again.table().splitlines()[2:] == [

@@ -7,11 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
+import yaml
 
 from iowbc.deploy.contract import CONTRACT, Contract, read_contract, seal
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
+from iowbc.evaluation.exported import exported_world
+from iowbc.robot.description import DESCRIPTION, robot_folder
 
 
 class Bomb:
@@ -19,6 +23,11 @@ class Bomb:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return exec, ("raise SystemExit('it was executed')",)
+
+
+def robot_yaml(**entries: Any) -> bytes:
+    """The robot's description with other entries."""
+    return yaml.safe_dump(yaml.safe_load((robot_folder("g1") / DESCRIPTION).read_text()) | entries).encode()
 
 
 def pickled() -> bytes:
@@ -44,6 +53,15 @@ def sealed(exported: Path, place: Path, name: str, content: bytes) -> Path:
         ("robot/robot.yaml", b"[]"),
         ("robot/robot.yaml", b"!!python/object/apply:os.system [exit 1]"),
         ("robot/robot.yaml", b"mjcf: ../../../etc/passwd"),
+        ("robot/robot.yaml", robot_yaml(mjcf="/dev/zero")),
+        ("robot/robot.yaml", robot_yaml(mjcf="../contract.json")),
+        ("robot/robot.yaml", robot_yaml(mjcf=3)),
+        ("robot/robot.yaml", robot_yaml(joints=[3])),
+        ("robot/g1.xml", b'<mujoco><include file="/dev/zero"/><worldbody/></mujoco>'),
+        (
+            "robot/g1.xml",
+            b"<mujoco><worldbody>" + b"<body name='a'>" * 5000 + b"</body>" * 5000 + b"</worldbody></mujoco>",
+        ),
         ("rg/feasible.npz", b""),
         ("rg/feasible.npz", pickled()),
     ],
@@ -67,7 +85,10 @@ def test_a_part_that_is_not_what_its_name_says_is_named(
         {"physics_frequency": 0},
         {"history": 0},
         {"kp": [1e999] * 29},
+        {"kp": [-1.0] * 29},
+        {"upper": [-9.0] * 29},
         {"inputs": []},
+        {"outputs": []},
         {"inputs": [{"name": "command", "shape": [10**9], "unit": "", "frame": "", "meaning": ""}]},
         {"description": "x" * 2_000_000},
     ],
@@ -77,6 +98,24 @@ def test_a_contract_that_no_export_writes_is_refused(exported: Path, tmp_path: P
     told = json.loads((folder / CONTRACT).read_text()) | entries
     (folder / CONTRACT).write_text(json.dumps(told))
     with pytest.raises(ContractBroken, match="export again"):
+        Controller.load(folder)
+
+
+@pytest.mark.parametrize("name", ["robot/g1.xml", "recipe.json", "rg/rg.json"])
+def test_nothing_is_read_that_the_contract_has_no_digest_of(exported: Path, tmp_path: Path, name: str) -> None:
+    folder = Path(shutil.copytree(exported, tmp_path / "folder"))
+    told = json.loads((folder / CONTRACT).read_text())
+    told["files"].pop(name)
+    (folder / CONTRACT).write_text(json.dumps(told))
+    with pytest.raises(ContractBroken, match=f"says nothing of {name}"):
+        exported_world(folder)
+
+
+def test_a_graph_with_other_outputs_is_refused(exported: Path, tmp_path: Path) -> None:
+    model = onnx.load(exported / "policy.onnx")
+    model.graph.output.pop()
+    folder = sealed(exported, tmp_path / "folder", "policy.onnx", model.SerializeToString())
+    with pytest.raises(ContractBroken, match="outputs are"):
         Controller.load(folder)
 
 

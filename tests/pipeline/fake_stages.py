@@ -1,8 +1,8 @@
 """A pipeline of small stages that count instead of learn, and `main`: the command line on top of it.
 
 `FAKE_BEHAVIOUR` (JSON by stage name) makes stages slow or faulty: `steps`, `pause` [s], `gate` (a file without which
-none goes on after its first step), `fail` (StageFailed), `raise`, `pieces` (to let other machines count, too);
-with `seed` those of recipes with that seed alone.
+none goes on after its first step), `fail` (StageFailed), `lose` (WorkerFailed), `raise`, `pieces` (for
+others to count, too); with `seed` those of recipes with that seed alone.
 With `FAKE_SENDER=off` nothing is sent to MLflow yet.
 """
 
@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import Interrupted, StageFailed, WorkerFailed
 from iowbc.files import newest_checked, write_checked
 from iowbc.pipeline import stage as contract
 from iowbc.pipeline.stage import Job, Stage
@@ -59,6 +59,8 @@ def counting(name: str) -> Callable[[Job], None]:
                 raise Interrupted(f"{name}: stopped at {done} of {steps}, checkpoint written")
         if behaviour.get("fail"):
             raise StageFailed(behaviour["fail"])
+        if behaviour.get("lose"):
+            raise WorkerFailed(behaviour["lose"])
         if behaviour.get("raise"):
             raise RuntimeError(behaviour["raise"])
         for folder in ("tables", "figures"):

@@ -1,10 +1,12 @@
 """A failing stage says why and what to do, and takes nothing else with it."""
 
+import pytest
 from workplace import Workplace
 
 
-def test_a_missed_gate_is_told_without_a_traceback(workplace: Workplace) -> None:
-    command = workplace.command("run", "small.yaml", behaviour={"teacher": {"fail": "height error 0.2 m, limit 0.1 m"}})
+@pytest.mark.parametrize("how", ["fail", "lose"])
+def test_a_missed_gate_and_a_lost_worker_are_told_without_a_traceback(workplace: Workplace, how: str) -> None:
+    command = workplace.command("run", "small.yaml", behaviour={"teacher": {how: "height error 0.2 m, limit 0.1 m"}})
     assert command.code == 1
     assert "teacher failed: height error 0.2 m, limit 0.1 m" in command.errors
     assert command.errors.strip().splitlines()[-1] == "iowbc run small.yaml"

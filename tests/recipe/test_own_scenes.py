@@ -2,6 +2,7 @@
 
 import copy
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,12 @@ def test_what_is_wrong_with_a_scene_of_ones_own_is_told(tmp_path: Path, changes:
     with pytest.raises(RecipeError, match=text) as caught:
         load_recipe(written(tmp_path, values))
     assert all(problem.place.startswith(f"{tmp_path / 'mine.yaml'}:") for problem in caught.value.problems)
+
+
+def test_a_file_that_is_none_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.obj")
+    with pytest.raises(RecipeError, match=r"pipe\.obj: is no regular file"):
+        load_recipe(written(tmp_path, {**BARREL, "simulation.scenes.barrel.object.mesh": "pipe.obj"}))
 
 
 def test_a_mesh_is_taken_into_the_recipe_and_its_content_is_in_the_key(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import Interrupted, IowbcError
 from iowbc.files import previous
 from iowbc.pipeline.cluster.desk import Event
 from iowbc.pipeline.cluster.folders import Files, Folder, files_of, placed, write_files
@@ -99,7 +99,7 @@ def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
         except Interrupted as stopped:
             report.end(files=True)
             return Outcome("stopped", str(stopped))
-        except StageFailed as failed:
+        except IowbcError as failed:
             report.end(files=True)
             return Outcome("failed", str(failed))
         except Exception:

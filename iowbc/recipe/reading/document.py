@@ -19,6 +19,8 @@ MAXIMUM_DEPTH = 40
 """Deeper nesting is an alias that contains itself."""
 MAXIMUM_NODES = 100_000
 """More values are aliases that multiply each other."""
+LONGEST_NUMBER = 100
+"""Characters of the longest number that is read: what computing with it costs grows with their square."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,9 @@ class _Builder:
 
     def _scalar(self, node: yaml.Node) -> Scalar:
         text = str(node.value)
+        if node.tag in (_INT, _FLOAT) and len(text) > LONGEST_NUMBER:
+            self._complain(node, f"{shown(text)} has {len(text):,} characters; no number of a recipe has so many")
+            return None
         try:
             if node.tag == _NULL:
                 return None

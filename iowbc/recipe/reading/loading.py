@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from iowbc.errors import Problem, RecipeError, nearest
+from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.beside import with_files
 from iowbc.recipe.reading.document import Located, leaves, merged, read_document
 from iowbc.recipe.reading.finding import SUFFIXES, known_files, recipe_file
@@ -16,6 +16,10 @@ from iowbc.recipe.recipe import Recipe
 
 LARGEST_FILE = 1_000_000
 """Bytes of the largest recipe that is read."""
+LONGEST_PATH = 300
+"""Characters of a path that cannot be read which are told, the last ones."""
+LONGEST_CHAIN = 20
+"""Recipes that extend one another, at most."""
 OWN_KEYS = ("name", "description")
 """Keys that a recipe never inherits: they say which experiment this is."""
 
@@ -53,13 +57,26 @@ def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe
     tree = with_files(overridden(tree, overrides), Path(file).parent)
     recipe = validate(tree)
     places = {".".join(path): leaf.place for path, leaf in leaves(tree)}
-    return LoadedRecipe(recipe, Path(file), tuple(overrides), places)
+    loaded = LoadedRecipe(recipe, Path(file), tuple(overrides), places)
+    _require_known_place(loaded)
+    return loaded
+
+
+def _require_known_place(loaded: LoadedRecipe) -> None:
+    """Raises `RecipeError` where a file leads to a robot outside of the folders in which robots are looked for."""
+    robot, place = loaded.recipe.robot, loaded.place("robot")
+    if Path(robot).name != robot and not place.startswith("--set "):
+        text = f"key 'robot' = {shown(robot)}: a recipe names a folder under robots/; a path is for --set"
+        raise RecipeError([Problem(place, text)])
 
 
 def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
     """The tree of a file laid upon that of the recipe it extends."""
     if os.path.realpath(file) in map(os.path.realpath, above):
         raise RecipeError([Problem(place, f"recipes extend each other in a circle: {' -> '.join((*above, file))}")])
+    if len(above) > LONGEST_CHAIN:
+        text = f"extends {above[1]}, which extends another, and so on more than {LONGEST_CHAIN} times"
+        raise RecipeError([Problem(f"{above[0]}:1:1", text)])
     tree = read_document(read_text(file, place), file)
     if tree.value is None:
         text = "is empty; write at least one line, for example `description: what this tries` or `extends: full.yaml`"
@@ -104,5 +121,5 @@ def read_text(file: str, place: str) -> str:
             known = list(dict.fromkeys(found.stem for found in known_files()))
             listing = f"; recipes by name: {', '.join(known)}" if known else ""
         reason = "no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")
-        text = f"recipe {file}: {reason}{listing}{nearest(Path(file).name, known)}"
+        text = f"recipe {file[-LONGEST_PATH:]}: {reason}{listing}{nearest(Path(file).name, known)}"
         raise RecipeError([Problem(place, text)]) from None

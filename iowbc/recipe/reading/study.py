@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from iowbc.errors import Problem, RecipeError
-from iowbc.recipe.reading.document import Located, read_document
+from iowbc.errors import Problem, RecipeError, shown
+from iowbc.recipe.reading.document import Located, plain, read_document
 from iowbc.recipe.reading.finding import recipe_file
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.recipe import NAME
 
+MOST_VARIANTS = 100
+"""Recipes that one names, at most."""
 KEYS = ("name", "description", "variants")
 """All that such a file holds; everything else belongs to the variants."""
 
@@ -57,12 +59,14 @@ def load_study(word: str | Path, overrides: Sequence[str] = ()) -> Study | None:
 def _files(variants: Located, file: Path, problems: list[Problem]) -> list[Path]:
     """The file of each variant."""
     items = variants.value if isinstance(variants.value, list) else []
-    if len(items) < 2:
-        problems.append(Problem(variants.place, "key 'variants': should be a list of two or more recipes"))
+    if not 2 <= len(items) <= MOST_VARIANTS:
+        text = f"key 'variants': should be a list of 2 to {MOST_VARIANTS} recipes, not of {len(items):,}"
+        problems.append(Problem(variants.place, text))
+        return []
     found = []
     for item in items:
-        if not isinstance(item.value, str) or not item.value:
-            problems.append(Problem(item.place, f"key 'variants': {item.value!r} is no recipe's name or file"))
+        if not isinstance(item.value, str) or not item.value or "\0" in item.value:
+            problems.append(Problem(item.place, f"key 'variants': {shown(plain(item))} is no recipe's name or file"))
             continue
         word = item.value if Path(item.value).suffix else f"{item.value}.yaml"
         beside = file.parent / word

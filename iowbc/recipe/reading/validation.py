@@ -9,13 +9,11 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from iowbc.errors import Problem, RecipeError, nearest, shown
+from iowbc.errors import PROBLEMS_TOLD, Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import Named, Unfitting
 
-PROBLEMS_TOLD = 50
-"""Problems of a recipe that are told; the others are counted."""
 LARGEST_NUMBER = 1e12
 """No quantity, size or count of a recipe is larger."""
 
@@ -29,7 +27,8 @@ def validate(tree: Located) -> Recipe:
     try:
         recipe = Recipe.model_validate(plain(whole))
     except ValidationError as error:
-        raise RecipeError(_problems(whole, error.errors(include_url=False))) from None
+        errors = error.errors(include_url=False)
+        raise RecipeError(_problems(whole, errors), max(0, len(errors) - PROBLEMS_TOLD)) from None
     booleans = [
         Problem(found.place, f"key '{'.'.join(path)}' = {found.value}: should be a number, not true or false")
         for path, found in leaves(tree)
@@ -59,9 +58,7 @@ def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
         if text not in texts[place, head]:
             texts[place, head].append(text)
     problems = [Problem(place, f"{head}: {', or '.join(parts)}") for (place, head), parts in texts.items()]
-    problems.sort(key=lambda problem: _position(problem.place))
-    rest = len(errors) - PROBLEMS_TOLD
-    return [*problems, Problem(tree.place, f"and {rest} more problems")] if rest > 0 else problems
+    return sorted(problems, key=lambda problem: _position(problem.place))
 
 
 def _position(place: str) -> tuple[str, int, int]:

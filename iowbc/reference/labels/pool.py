@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from iowbc.errors import Interrupted, Rejected
+from iowbc.errors import Interrupted, Rejected, WorkerFailed
 from iowbc.processes import die_with_parent, single_threaded
 from iowbc.reference.labels.labelling import Solver
 from iowbc.reference.labels.shards import Shard, cut, merge, read_shard, write_shard
@@ -76,7 +76,7 @@ def label_all(
     """Labels the samples with these numbers. The result does not depend on the number of workers.
 
     Shards in `folder` that belong to `key` are reused, others made anew. Raises `Interrupted` when `interrupted()`
-    turns true, RuntimeError when a worker fails in Python or cannot start, or when too many are killed.
+    turns true, WorkerFailed when a worker fails in Python or cannot start, or when too many are killed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     chunks, paths = cut(indices, chunk_size, folder)
@@ -146,7 +146,7 @@ def _receive(worker: _Worker) -> int | None:
     except (EOFError, ConnectionResetError):
         return None
     if failure:
-        raise RuntimeError(f"a labelling worker failed:\n{failure}")
+        raise WorkerFailed(f"a labelling worker failed:\n{failure}")
     return int(number)
 
 
@@ -158,7 +158,7 @@ def _bury(worker: _Worker, book: _Book) -> None:
     if worker.chunk is None or sample == IDLE:
         book.barren += 1
         if book.barren >= STARTS_WITHOUT_WORK:
-            raise RuntimeError(
+            raise WorkerFailed(
                 f"labelling workers end before their first sample (exit code {worker.process.exitcode}); "
                 "try `iowbc doctor`, which checks that crocoddyl and pinocchio fit together"
             )
@@ -167,7 +167,7 @@ def _bury(worker: _Worker, book: _Book) -> None:
     else:
         book.killed += 1
         if book.killed >= TRIES:
-            raise RuntimeError(
+            raise WorkerFailed(
                 f"{book.killed} labelling workers were ended from outside (the last with exit code "
                 f"{worker.process.exitcode}, on sample {sample}); finished shards are kept. Is there too little "
                 "memory? Try fewer workers (`--workers`)"

@@ -23,7 +23,7 @@ from iowbc.task.vector import worker
 from iowbc.task.vector.setup import Setup, shares
 from iowbc.task.vector.shared import Buffers, create_shared, private_buffers
 
-STARTING = 60.0
+STARTING = 300.0
 """How long workers may take to build their environments [s]."""
 LEAVING = 2.0
 """How long workers may take to leave by themselves [s]."""
@@ -172,13 +172,10 @@ class WorkerProcesses:
         elif text:
             what = "failed"
         else:
-            try:
-                what = f"died with exit status {process.popen.wait(LEAVING)}"
-            except subprocess.TimeoutExpired:
-                what = "closed its pipe"
-        text = text or _read(process.log)
+            what = _end_of(process.popen)
+        text = (text or _read(process.log)).rstrip()
         self.close()
-        raise WorkerFailed(f"{who} {what}\n{text.rstrip() or 'it left no traceback; see its output above'}")
+        raise WorkerFailed(f"{who} {what}\n{text or 'it left no traceback; see its output above'}")
 
 
 def _start(memory: int) -> WorkerProcess:
@@ -201,6 +198,16 @@ def _start(memory: int) -> WorkerProcess:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         theirs.close()
     return WorkerProcess(popen, Connection(ours.detach()), log)
+
+
+def _end_of(popen: subprocess.Popen[bytes]) -> str:
+    """How a worker ended that does not answer any more."""
+    try:
+        status = popen.wait(LEAVING)
+    except subprocess.TimeoutExpired:
+        return "closed its pipe"
+    killed = ": it was ended from outside. Is there too little memory? Try fewer workers (`--workers`)"
+    return f"died with exit status {status}{killed if status == -signal.SIGKILL else ''}"
 
 
 def _end(processes: list[WorkerProcess], owner: int) -> None:

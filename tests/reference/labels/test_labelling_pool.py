@@ -11,7 +11,7 @@ import pytest
 from reference_doubles import DoubleTask
 from stage_jobs import Backwards
 
-from iowbc.errors import Interrupted
+from iowbc.errors import Interrupted, WorkerFailed
 from iowbc.reference.labels.pool import CRASHED, label_all
 from iowbc.reference.labels.shards import Shard, read_shard
 from iowbc.stages.spreading import label_everywhere
@@ -92,17 +92,17 @@ def test_a_killed_worker_costs_no_sample(tmp_path: Path, expected: Shard) -> Non
 
 
 def test_workers_that_are_killed_again_and_again_end_the_stage(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match=r"5 labelling workers were ended from outside .*exit code -9, on sample 13"):
+    with pytest.raises(WorkerFailed, match=r"5 labelling workers were ended from outside .*exit code -9, on sample 13"):
         run(tmp_path, DoubleTask(killed=(13,)))
 
 
 def test_workers_that_cannot_start_end_the_stage_with_advice(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match=r"end before their first sample \(exit code -11\).*iowbc doctor"):
+    with pytest.raises(WorkerFailed, match=r"end before their first sample \(exit code -11\).*iowbc doctor"):
         run(tmp_path, DoubleTask(start=False))
 
 
 def test_an_error_in_python_is_shown(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match=r"(?s)a labelling worker failed.*KeyError: 'a mistake at 20'"):
+    with pytest.raises(WorkerFailed, match=r"(?s)a labelling worker failed.*KeyError: 'a mistake at 20'"):
         run(tmp_path, DoubleTask(mistakes=(20,)))
 
 
