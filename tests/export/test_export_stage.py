@@ -71,6 +71,8 @@ def test_the_folder_holds_all_that_a_robot_needs(done: Job, rg: Path) -> None:
     assert {GRAPH, CONTRACT, GOLDEN, "recipe.json", "robot", "rg", "summary.json"} <= names
     contract = read_contract(done.out)
     assert contract.sources == {"rg-fit": rg.name, "distill": "d" * 8, "export": done.key}
+    assert {GRAPH, GOLDEN, "recipe.json", "robot/robot.yaml", "rg/feasible.npz"} <= contract.files.keys()
+    assert "summary.json" not in contract.files, "a result says nothing of what takes another time each time"
 
 
 def test_the_folder_depends_on_nothing_outside_of_the_stages_key(done: Job) -> None:

@@ -1,8 +1,10 @@
 """Labelling in processes: the same result for any number of them, after crashes, damage and interruption."""
 
 import shutil
+import signal
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from reference_doubles import DoubleTask
 from stage_jobs import Backwards
 
 from iowbc.errors import Interrupted, WorkerFailed
-from iowbc.reference.labels.pool import CRASHED, label_all
+from iowbc.reference.labels.pool import CRASHED, _Book, _bury, _Worker, label_all
 from iowbc.reference.labels.shards import Shard, read_shard
 from iowbc.stages.spreading import label_everywhere
 
@@ -81,6 +83,16 @@ def test_a_native_crash_ends_one_sample(tmp_path: Path, expected: Shard) -> None
     lost = dict(zip(result.rejected.tolist(), result.reasons, strict=True))
     assert [index for index, reason in lost.items() if reason == CRASHED] == [10, 13, 31]
     assert set(result.kept) == set(expected.kept) - {10, 13, 31}
+
+
+@pytest.mark.parametrize("code", [*range(-64, 0), 1, 77])
+def test_only_what_a_solver_does_to_itself_rejects_a_sample(code: int) -> None:
+    book = _Book([])
+    process: Any = SimpleNamespace(exitcode=code, join=lambda: None)
+    _bury(_Worker(process, SimpleNamespace(close=lambda: None), SimpleNamespace(value=13), chunk=2), book)  # type: ignore[arg-type]
+    own = -code in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL)
+    assert (book.crashed, book.killed) == (({2: [13]}, 0) if own else ({}, 1))
+    assert book.waiting == [2], "its chunk is made again"
 
 
 def test_a_killed_worker_costs_no_sample(tmp_path: Path, expected: Shard) -> None:
