@@ -1,7 +1,7 @@
 # make test   sets everything up, then lint, types and tests
 # make run    sets everything up, then the quickstart recipe
 # make measure   makes the tables of the README anew
-# make chaos   disturbs runs 200 times and counts what is lost (docs/reliability.md)
+# make chaos   disturbs runs 240 times and counts what is lost (docs/reliability.md)
 # make docs   builds the documentation's site into build/site, to be opened without a network
 # make leaks   watches memory and descriptors of a training for an hour
 PYTHON ?= python3.11
@@ -47,6 +47,7 @@ docs: setup
 
 chaos: setup
 	$(BIN)/python tests/chaos/chaos.py --events 200
+	$(BIN)/python tests/chaos/chaos.py --recipe tests/chaos/workers.yaml --events 40
 
 leaks: setup
 	$(BIN)/python tests/chaos/leaks.py

@@ -3,10 +3,13 @@
 Holds the graph against the golden rollout of its export, as a port to another language or computer would be held.
 """
 
+import os
 import sys
 from pathlib import Path
 
 import numpy as np
+
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
 import onnxruntime
 
 

@@ -1,11 +1,14 @@
 """An exported controller in plain MuJoCo, without iowbc: `python examples/plain_mujoco.py runs/quickstart/export`."""
 
 import json
+import os
 import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
+
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
 import onnxruntime
 
 HEIGHT = 0.72  # of the pelvis, the fourth entry of the command [m]

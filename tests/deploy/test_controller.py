@@ -24,6 +24,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 
 README = Path(__file__).parents[2] / "README.md"
+EXAMPLE = README.parent / "examples" / "onnx_only.py"
 NOMINAL = np.array([0, 0, 0, 0.72, 0, 0, 0, 0, 0, 0, 0.0])
 
 
@@ -281,8 +282,16 @@ def test_a_contract_that_names_files_outside_of_its_folder_is_refused(
         read_contract(changed(exported, tmp_path / "outside", files={name: "0"}))
 
 
-def test_loading_a_controller_tells_nobody(exported: Path, tmp_path: Path) -> None:
-    program = f"import iowbc, time\niowbc.Controller.load({str(exported)!r})\ntime.sleep(1.0)\n"
+@pytest.mark.parametrize(
+    "program",
+    [
+        "import iowbc\niowbc.Controller.load({folder!r})",
+        "import runpy\nrunpy.run_path({example!r})['onnxruntime'].InferenceSession({folder!r} + '/policy.onnx')",
+    ],
+    ids=["iowbc", "an example"],
+)
+def test_loading_a_controller_tells_nobody(exported: Path, tmp_path: Path, program: str) -> None:
+    program = program.format(folder=str(exported), example=str(EXAMPLE)) + "\nimport time\ntime.sleep(1.0)\n"
     asked: list[str] = []
     with socket.create_server(("127.0.0.1", 0)) as proxy:
         proxy.settimeout(0.1)

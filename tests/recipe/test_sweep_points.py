@@ -117,6 +117,7 @@ def test_what_is_wrong_is_told_before_anything_runs(recipe: str, sets: list[str]
         ("draws: {count: 2, values: {seed: {low: 0, high: 5, scale: log}}}", "a logarithmic scale begins above 0"),
         ("grid: {seed: !!python/object:os.system x}", "is not allowed"),
         ("[1, 2]", "a sweep is a mapping"),
+        ("grid: {robot: [g1, /etc]}", "a sweep names a folder under robots/"),
     ],
 )
 def test_a_wrong_file_is_told_with_its_line(recipe: str, tmp_path: Path, text: str, told: str) -> None:

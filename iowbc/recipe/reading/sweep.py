@@ -60,6 +60,9 @@ def load_sweep(word: str, settings: Sequence[str], file: Path | None = None) -> 
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
+    if far := [value for value in grid.get("robot", ()) if Path(str(value)).name != value]:
+        text = f"key 'grid.robot' = {shown(far[0])}: a sweep names a folder under robots/; a path is for --set"
+        raise RecipeError([Problem(f"{file}:1:1", text)])
     fixed: list[str] = []
     for setting in settings:
         path, equals, text = setting.partition("=")

@@ -1,0 +1,28 @@
+"""What an export takes along."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from exported_policies import untrained
+
+from iowbc.export import folder as module
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import Robot
+
+
+def test_an_export_takes_along_a_list_of_files_and_no_folder(
+    recipe: Recipe, robot: Robot, rg: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sources = {"robot": tmp_path / "g1", "rg": tmp_path / "fitted"}
+    for name, source in (("robot", robot.folder), ("rg", rg)):
+        shutil.copytree(source, sources[name])
+        (sources[name] / "password.txt").write_text("nobody is to read this")
+    own = replace(robot, folder=sources["robot"], mjcf=sources["robot"] / robot.mjcf.name)
+    monkeypatch.setattr(module, "write_onnx", lambda graph, path, *rest: path.write_bytes(b"a graph"))
+    (tmp_path / "out").mkdir()
+    contract = module.write_folder(tmp_path / "out", untrained(recipe, own, sources["rg"]), recipe, sources["rg"], {})
+    generator = {"rg/rg.json", "rg/rg.safetensors", "rg/feasible.npz"}
+    assert set(contract.files) == {"policy.onnx", "recipe.json", "robot/robot.yaml", "robot/g1.xml"} | generator
+    assert not list((tmp_path / "out").rglob("password.txt"))
