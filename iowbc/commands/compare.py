@@ -17,6 +17,7 @@ from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
+from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 
@@ -41,6 +42,8 @@ def compare(
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
     require_training("compare")
     require_writable(output, "--output")
+    for evaluation in (run.artifacts["eval"] for run in found if "eval" in run.artifacts):
+        require_whole(store.runs, evaluation)
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = _having(found, TRIALS)
     _report_probes(_having(found, PROBE), output)

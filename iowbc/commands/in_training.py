@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from iowbc.pipeline.console.wording import ago
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE
 from iowbc.pipeline.store.locks import holder
-from iowbc.pipeline.store.runs import read_json
+from iowbc.pipeline.store.runs import read_json, read_yaml
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
 
@@ -50,12 +48,12 @@ def in_training(store: Store, word: str, stage: str | None) -> InTraining | None
 
 def _described(store: Store, folder: Path, record: Mapping[str, Any]) -> InTraining:
     checkpoint, ingredients = folder / CHECKPOINT, read_json(folder / INGREDIENTS)
-    path = folder / RECIPE
-    recipe = yaml.safe_load(path.read_bytes()) if path.is_file() else None
+    recipe = read_yaml(folder / RECIPE)
     total = float(record.get("total", 0.0))
     state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
     share = f", {100 * float(record.get('done', 0.0)) / total:.0f} % done" if total else ""
-    playable = record["stage"] == PLAYED and checkpoint.is_file() and bool(recipe) and isinstance(ingredients, dict)
+    known = isinstance(recipe, dict) and isinstance(ingredients, dict)
+    playable = record["stage"] == PLAYED and checkpoint.is_file() and known
     then = f"this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else "this is a finished one"
     return InTraining(
         stage=str(record["stage"]),

@@ -11,10 +11,10 @@ from iowbc.commands.in_training import InTraining, in_training
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
 from iowbc.commands.training import require_training
-from iowbc.errors import Damaged, Interrupted, UsageError, require_known
+from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import remaking
+from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def artifact_source(store: Store, artifact: Artifact) -> "Source":
 
     generator = generator_of(store, artifact)
     for read in filter(None, (artifact, generator)):
-        _check_whole(store, read)
+        require_whole(store.runs, read)
     return exported_source(artifact.folder) if artifact.manifest.stage == "export" else _source(artifact, generator)
 
 
@@ -87,16 +87,6 @@ def playable(store: Store, word: str, stage: str | None) -> Artifact:
             f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found) or 'none'}"
         )
     return found[stage or ready[0]]
-
-
-def _check_whole(store: Store, artifact: Artifact) -> None:
-    """Raises `UsageError` where a file of an artifact is not what was published."""
-    try:
-        artifact.verify()
-    except Damaged as error:
-        raise UsageError(
-            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(store.runs, artifact)}"
-        ) from None
 
 
 def _source(artifact: Artifact, generator: Artifact | None) -> "Source":

@@ -13,6 +13,7 @@ from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
+from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 
@@ -29,6 +30,8 @@ def report(store: Store, console: Console, words: Sequence[str], output: Path) -
         raise UsageError(f"--output {output}: a report is an HTML file; give a name that ends in .html")
     require_training("report")
     require_writable(output.parent, "--output")
+    for artifact in (artifact for run in found for artifact in run.artifacts.values()):
+        require_whole(store.runs, artifact)
 
     from iowbc.report.page import write_page
     from iowbc.report.runs import Run, grouped

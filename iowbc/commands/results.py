@@ -68,7 +68,7 @@ def described(artifacts: Mapping[str, Artifact]) -> str:
     """The main tables of a run in Markdown."""
     found = [path for artifact in artifacts.values() for path in (artifact.folder / "tables").glob("*.md")]
     chosen = sorted((path for path in found if path.stem in TABLES), key=_rank)
-    return "\n".join(path.read_text(encoding="utf-8") for path in chosen)
+    return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in chosen)
 
 
 def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
@@ -84,7 +84,7 @@ def _print_tables(folder: Path, console: Console) -> None:
     for path in sorted(folder.glob("*.md"), key=_rank):
         if path.stem in TABLES:
             console.print()
-            console.print(drawn(read_table(path.read_text(encoding="utf-8")), console.width))
+            console.print(drawn(read_table(path.read_text(encoding="utf-8", errors="replace")), console.width))
         else:
             others.append(path.name)
     if others:

@@ -10,8 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
+from iowbc.commands.compare import compare
 from iowbc.commands.named import open_artifact
+from iowbc.commands.report import report
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs
@@ -241,6 +244,15 @@ def test_a_damaged_record_of_a_recipe_is_named_and_keeps_gc_from_removing(folder
         assert done.stderr == "runs/recipes/first.json is damaged; run the recipe again to remake it\n"
     assert command("run", "first.yaml").stdout.count(": cached") == 6
     assert command("gc", "--unused").stdout == "0 B in all\n"
+
+
+def test_what_is_damaged_is_neither_compared_nor_reported(folder: Path, key: Key) -> None:
+    (folder / "runs" / "store" / "eval" / key("second", "eval") / "tables" / "counts.md").write_bytes(bytes(range(256)))
+    store, console = Store(Runs(folder / "runs")), Console()
+    with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
+        compare(store, console, ["first", "second"], folder / "compared")
+    with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
+        report(store, console, ["second"], folder / "second.html")
 
 
 @pytest.mark.parametrize("stage", ["teacher", "rg-fit"])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -92,6 +93,17 @@ def test_a_changed_number_in_what_stands_beside_the_results_is_damage(workplace:
     (folder / name).write_text(text.replace("4096", "4097").replace('"attempts": 1', '"attempts": 2'))
     (reason,) = workplace.plan()["teacher"].reasons
     assert reason.startswith(f"damaged: {name} ")
+
+
+def test_what_stands_beside_the_results_makes_no_reader_crash_or_wait(workplace: Workplace) -> None:
+    artifact = workplace.run(until="rg-dataset")["rg-dataset"]
+    assert artifact.recipe["seed"] == 3
+    (artifact.folder / "recipe.yaml").write_text("[" * 100_000)
+    (artifact.folder / "key.json").unlink()
+    os.mkfifo(artifact.folder / "key.json")
+    assert (artifact.recipe, artifact.ingredients) == ({}, {})
+    with pytest.raises(Damaged):
+        artifact.verify()
 
 
 def test_nothing_is_left_of_a_finished_stages_workspace(workplace: Workplace) -> None:

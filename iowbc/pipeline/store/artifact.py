@@ -8,14 +8,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from iowbc.errors import Damaged
 from iowbc.files import synchronise, write_whole
 from iowbc.pipeline.stage import SUMMARY
 from iowbc.pipeline.store.digests import content_digest, data_digest, file_digest
-from iowbc.pipeline.store.runs import read_json
+from iowbc.pipeline.store.runs import read_json, read_yaml
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +24,6 @@ INGREDIENTS = "key.json"
 RECIPE = "recipe.yaml"
 BESIDE = (INGREDIENTS, RECIPE)
 """What is written beside a stage's own files."""
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class FileRecord(BaseModel):
@@ -101,10 +99,7 @@ class Artifact:
     @property
     def recipe(self) -> dict[str, Any]:
         """The resolved recipe that it was made with; empty where that is not readable."""
-        try:
-            found = yaml.load((self.folder / RECIPE).read_bytes(), Loader=_LOADER)
-        except (OSError, yaml.YAMLError):
-            return {}
+        found = read_yaml(self.folder / RECIPE)
         return found if isinstance(found, dict) else {}
 
     @property

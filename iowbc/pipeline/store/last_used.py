@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from iowbc.errors import UsageError
+from iowbc.errors import Damaged, UsageError
 from iowbc.files import write_whole
 from iowbc.pipeline.store.artifact import RECIPE, Artifact
 from iowbc.pipeline.store.links import link
@@ -67,12 +67,24 @@ def remaking(runs: Runs, artifact: Artifact) -> str:
     return shlex.join(words)
 
 
+def require_whole(runs: Runs, artifact: Artifact) -> None:
+    """Raises `UsageError` with the command that makes an artifact anew, where a file of it is not what was written."""
+    try:
+        artifact.verify()
+    except Damaged as error:
+        raise UsageError(
+            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(runs, artifact)}"
+        ) from None
+
+
 def _record(path: Path) -> dict[str, Any] | None:
     """A record that is whole, or None."""
     record = read_json(path)
     if not isinstance(record, dict) or not isinstance(record.get("recipe"), dict):
         return None
     stages, ever = record.get("stages"), record.get("ever", {})
+    if not isinstance(record.get("overrides", []), list):
+        return None
     if not isinstance(ever, dict) or not all(isinstance(moment, (int, float)) for moment in ever.values()):
         return None
     if not isinstance(stages, dict) or not all(

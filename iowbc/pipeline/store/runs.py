@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from iowbc.errors import RecipeError
+from iowbc.recipe.reading.document import plain, read_document
+
 
 @dataclass(frozen=True)
 class Runs:
@@ -92,8 +95,16 @@ class Runs:
 
 
 def read_json(path: Path) -> Any:
-    """The content of a JSON file, or None where it is missing or not JSON."""
+    """The content of a JSON file, or None where it is missing, no regular file, or not JSON."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     except (OSError, ValueError, RecursionError):
+        return None
+
+
+def read_yaml(path: Path) -> Any:
+    """The content of a YAML file as `read_json` has it, None also where it is nested too deep for YAML's parser."""
+    try:
+        return plain(read_document(path.read_text(encoding="utf-8"), path.name)) if path.is_file() else None
+    except (OSError, ValueError, RecipeError):
         return None
