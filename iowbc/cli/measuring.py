@@ -1,4 +1,4 @@
-"""`bench sim`, `bench train`, `bench rg` and `bench scale`: the speed of this machine."""
+"""`bench sim`, `bench train`, `bench rg`, `bench scale` and `bench control`: the speed of this machine."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -60,3 +60,13 @@ def bench_scale(
         return scaling.main(recipe, turns=turns)
 
     scale(runs_folder(runs), recipe, measure)
+
+
+def bench_control(
+    what: Annotated[str, typer.Argument(help="Folder of an export, or the recipe that made it.", metavar="WHAT")],
+    steps: Annotated[int, typer.Option(help="Control steps to measure.", min=1)] = 5000,
+) -> None:
+    """Measure how long a control step of an exported controller takes on one thread, without torch or a simulator."""
+    from iowbc.commands.bench_control import control
+
+    control(what, steps)

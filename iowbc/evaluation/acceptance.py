@@ -1,17 +1,20 @@
 """The trials that accept an exported controller: it, not the torch student, carries the load in the simulation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from iowbc.arrays import Array
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import ExportedPolicy
+from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
-from iowbc.evaluation.trials.rollout import play_in
+from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import held_weight, measure_of
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
@@ -21,6 +24,9 @@ from iowbc.robot.description import load_robot
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
+
+TINY = 1e-9
+"""No error is smaller, in its unit, where errors are compared in parts of each other."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,8 @@ class Accepted:
     """Mean part of the weight that rested in the hands; NaN where nothing is held."""
     transport: float
     """Mean part of the commanded way that the robot covered; NaN where none was commanded."""
+    errors: Array
+    """Means over the trials of the paper's four errors, (4,)."""
 
     @property
     def enough(self) -> bool:
@@ -52,6 +60,10 @@ class Accepted:
             f"the exported controller kept a {asked.mass:g} kg object ({asked.scene}) for {last:g} s "
             f"in {self.survived} of {asked.trials} trials{held}{way}; {self.passed} passed"
         )
+
+    def differs_from(self, other: "Accepted") -> float:
+        """The largest difference of an error from that of other trials, in parts of theirs."""
+        return float(np.max(np.abs(self.errors - other.errors) / np.maximum(other.errors, TINY)))
 
 
 def acceptance_episodes(recipe: Recipe) -> list[Episode]:
@@ -77,23 +89,42 @@ def try_out(
 
     Returns the driver, which holds the difference of targets, and how the trials went.
     """
+    with acceptance_environment(world) as environment:
+        policy = ExportedPolicy(Controller.load(exported, robots=environment.num_envs), environment)
+        return policy, played(world, environment, policy, interrupted)
+
+
+def try_out_network(world: Specification, policy: Acting, interrupted: Callable[[], bool]) -> list[Accepted]:
+    """Let the policy that was exported play the same trials, as it was trained. Raises Interrupted when interrupted."""
+    with acceptance_environment(world) as environment:
+        return played(world, environment, policy, interrupted)
+
+
+@contextmanager
+def acceptance_environment(world: Specification) -> Iterator[VectorEnv]:
+    """An environment in this process that plays the trials."""
     episodes = acceptance_episodes(world.recipe)
-    controller = Controller.load(exported, robots=len(episodes))
     environment = VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)
     try:
-        policy = ExportedPolicy(controller, environment)
-        outcomes = play_in(environment, policy, interrupted)
+        yield environment
     finally:
         environment.close()
-    played = iter(zip(episodes, outcomes, strict=True))
+
+
+def played(
+    world: Specification, environment: VectorEnv, policy: Acting, interrupted: Callable[[], bool]
+) -> list[Accepted]:
+    """How the trials went, for each `export.acceptance`."""
+    outcomes = play_in(environment, policy, interrupted)
+    trials = iter(zip(acceptance_episodes(world.recipe), outcomes, strict=True))
     asked = world.recipe.export.acceptance
     measure = measure_of(world.recipe, load_robot(world.robot).joints)
-    return policy, [judged(world.recipe, measure, one, [next(played) for _ in range(one.trials)]) for one in asked]
+    return [judged(world.recipe, measure, one, [next(trials) for _ in range(one.trials)]) for one in asked]
 
 
 def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
     """Which of the trials that were asked for pass: survived, the weight in the hands, the way covered."""
-    hands, ways, passed = [], [], 0
+    hands, ways, errors, passed = [], [], [], 0
     for episode, outcome in trials:
         assert episode.script is not None
         weight = held_weight(recipe, episode, outcome)
@@ -101,6 +132,7 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
         moved = [metrics["transport_robot"], metrics["transport_object"]]
         hands.append(metrics["weight_in_hands"])
         ways.append(moved[0])
+        errors.append([metrics[name] for name in ERRORS])
         carried = np.isnan(hands[-1]) or hands[-1] >= asked.weight_in_hands
         transported = all(np.isnan(way) or way >= asked.transport for way in moved)
         passed += bool(outcome.survived and carried and transported)
@@ -110,4 +142,5 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
         passed=passed,
         weight_in_hands=float(np.mean(hands)),
         transport=float(np.mean(ways)),
+        errors=np.mean(errors, axis=0),
     )

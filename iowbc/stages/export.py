@@ -26,12 +26,14 @@ def run(job: Job) -> None:
     from iowbc.deploy import contract
     from iowbc.deploy.session import open_session
     from iowbc.deploy.session import run as run_graph
-    from iowbc.evaluation.acceptance import try_out
+    from iowbc.deploy.timing import step_seconds
+    from iowbc.evaluation.acceptance import try_out, try_out_network
     from iowbc.evaluation.golden_rollout import golden_inputs
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.export.graph import ControllerGraph
     from iowbc.export.onnx_graph import run_torch
+    from iowbc.learning.acting import policy_of
     from iowbc.learning.networks import StudentNetwork
     from iowbc.learning.storage import load_network
     from iowbc.robot.description import load_robot
@@ -62,6 +64,7 @@ def run(job: Job) -> None:
     try:
         world = Specification(recipe, job.robot, rg)
         policy, played = try_out(world, job.out, job.interrupted)
+        by_torch = try_out_network(world, policy_of(student, about["architecture"]), job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
@@ -72,23 +75,30 @@ def run(job: Job) -> None:
     differences = golden.largest_difference(expected, run_graph(session, inputs))
     golden.write_golden(inputs, expected, job.out / contract.GOLDEN)
     seconds = golden.inference_seconds(session, inputs, settings.timing_steps)
+    step = step_seconds(job.out, settings.timing_steps)[:, 0]
 
     metrics = {
         "parity": max(differences.values()),
         "target_difference": policy.largest_difference,
         "inference_ms": float(1e3 * np.median(seconds)),
         "inference_p99_ms": float(1e3 * np.quantile(seconds, 0.99)),
+        "step_ms": float(1e3 * np.median(step)),
+        "step_p99_ms": float(1e3 * np.quantile(step, 0.99)),
         "graph_kB": (job.out / contract.GRAPH).stat().st_size / 1e3,
         "acceptance_trials": float(sum(each.asked.trials for each in played)),
         "acceptance_survived": float(sum(each.survived for each in played)),
         "acceptance_passed": float(sum(each.passed for each in played)),
+        **{
+            f"errors_differ/{place}": each.differs_from(other)
+            for place, (each, other) in enumerate(zip(played, by_torch, strict=True))
+        },
     }
     job.report.metrics(metrics, 0)
     contract.seal(statement, job.out)  # before the summary, whose times differ each time
     job.summarize(metrics, parity_by_output=differences, acceptance=[each.sentence for each in played])
     job.report.say(
         f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(steps)} steps; "
-        f"an inference takes {metrics['inference_ms']:.3f} ms"
+        f"an inference takes {metrics['inference_ms']:.3f} ms, a control step {metrics['step_ms']:.3f} ms"
     )
     worst = max(differences, key=lambda name: differences[name])
     if not differences[worst] <= settings.parity_tolerance:
@@ -102,8 +112,9 @@ def run(job: Job) -> None:
             f"export.target_tolerance is {settings.target_tolerance:.0e}: its arm kinematics, reference generator, "
             "gait clock or action scale are not those of the task: the code of one of the two has changed"
         )
-    for each in played:
-        job.report.say(each.sentence)
+    for place, each in enumerate(played):
+        differ = metrics[f"errors_differ/{place}"]
+        job.report.say(f"{each.sentence}; its errors differ from the torch student's by {differ:.2%} at most")
     for place, each in enumerate(played):
         if not each.enough:
             raise StageFailed(

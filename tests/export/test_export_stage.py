@@ -16,6 +16,7 @@ from stage_jobs import make_job
 from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, Contract, read_contract, seal
 from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
+from iowbc.evaluation.acceptance import try_out_network
 from iowbc.evaluation.play import exported_source, play
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.viewer import require_display
@@ -32,6 +33,23 @@ from iowbc.stages import export
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STAND = [{"duration": 0.3, "ramp": 0.0}]
+
+
+class Still:
+    """A policy that leaves the joints at their references."""
+
+    def reset(self, which: Any) -> None:
+        del which
+
+    def act(self, observation: Any, privileged: Any) -> Any:
+        return np.zeros((len(observation), 15), np.float32)
+
+
+class Leaning(Still):
+    """One that does not."""
+
+    def act(self, observation: Any, privileged: Any) -> Any:
+        return super().act(observation, privileged) + np.float32(0.5)
 
 
 @pytest.fixture(scope="session")
@@ -88,10 +106,39 @@ def test_parity_size_and_time_are_in_the_summary(done: Job) -> None:
     assert metrics["target_difference"] < 1e-5
     assert metrics["graph_kB"] > 10
     assert 0 < metrics["inference_ms"] < 20
+    assert metrics["inference_ms"] < metrics["step_ms"] <= metrics["step_p99_ms"]
     assert metrics["acceptance_trials"] == 2
     said = " ".join(done.report.lines)  # type: ignore[attr-defined]
     assert f"in {metrics['acceptance_survived']:.0f} of 2 trials" in said
     assert "kept a 4 kg object (lift) for 0.3 s" in said
+
+
+def test_the_controller_errs_as_the_torch_student_does_on_the_same_trials(done: Job) -> None:
+    metrics = json.loads((done.out / "summary.json").read_text())["metrics"]
+    assert metrics["errors_differ/0"] < 0.01
+    assert "differ from the torch student's by 0.0" in " ".join(done.report.lines)  # type: ignore[attr-defined]
+
+
+def test_another_policy_errs_otherwise_on_the_same_trials(done: Job) -> None:
+    source = exported_source(done.out)
+    (own,) = try_out_network(source.world, Still(), lambda: False)
+    (other,) = try_out_network(source.world, Leaning(), lambda: False)
+    assert own.differs_from(own) == 0.0
+    assert other.differs_from(own) > 0.01
+
+
+def test_a_control_step_is_timed_with_nothing_that_a_robot_need_not_have(done: Job) -> None:
+    program = (
+        "import sys; from iowbc.cli import main\n"
+        f"try: main(['bench', 'control', {str(done.out)!r}, '--steps', '30'])\n"
+        "finally: print(*{'torch', 'mujoco', 'pandas', 'scipy'} & sys.modules.keys(), file=sys.stderr)"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert found.returncode == 0
+    assert found.stderr.strip() == ""
+    head, _, time, processor = found.stdout.splitlines()
+    assert head.endswith("30 control steps of one robot on one thread")
+    assert all("ms" in line for line in (time, processor))
 
 
 def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
