@@ -42,12 +42,15 @@ def test_fails_is_printed_only_where_none_survived() -> None:
 
 def test_the_papers_numbers_stand_beside_ours() -> None:
     summary = aggregate(trials_of("IO-WBC", "pushing", {30.0: 5}))
-    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(error_table(summary, "pushing"))
+    table = error_table(summary, "pushing")
+    assert "| 0.131 (2.29) | 0.016 (18.75) | 0.225 (1.33) | 0.143 (2.10) |" in markdown(table)
+    assert table.numbers["ratio_E_alpha"].iloc[0] == pytest.approx(0.3 / 0.131)
+    assert table.numbers["paper_E_v"].iloc[0] == 0.225
 
 
 def test_the_papers_numbers_are_found_by_label_and_left_out_where_it_knows_none() -> None:
     summary = aggregate(trials_of("full", "pushing", {30.0: 5}))
-    assert "| 0.131 | 0.016 | 0.225 | 0.143 |" in markdown(error_table(summary, "pushing", {"full": "IO-WBC"}))
+    assert "| 0.131 (2.29) |" in markdown(error_table(summary, "pushing", {"full": "IO-WBC"}))
     without = error_table(summary, "pushing", {"full": "mine"})
     assert "paper E_" not in markdown(without)
     assert {len(row) for row in without.rows} == {len(without.head)} == {len(without.latex_head)}
@@ -177,7 +180,7 @@ def test_captions_say_partner_friction_height_averaging_and_that_it_is_simulatio
         assert "the pelvis above the ground" in table.caption
         assert "one gait period of 0.80 s" in table.caption
     assert "Table II" in carried.caption
-    assert "| 0.132 | 0.016 | 0.048 | 0.139 |" in markdown(carried), "cooperative lifting, too, has the paper's numbers"
+    assert "| 0.132 (2.27) |" in markdown(carried), "cooperative lifting, too, has the paper's numbers"
 
 
 def test_transport_and_weight_in_the_hands_stand_in_the_table() -> None:

@@ -71,7 +71,7 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
         "differences",
         f"Differences to {reference} in pairs of trials that met the same world and commands, over all masses of a "
         "suite: errors where both survived, with their 95 % interval and Student's p; success with McNemar's exact p. "
-        "Negative errors are better.",
+        "Negative errors are better. No p is corrected for how many there are.",
         ("Suite", "Algorithm", "Pairs", *(f"Δ{head}" for head in HEADS.values()), "Δ success"),
         (
             "Suite",

@@ -37,7 +37,7 @@ def error_table(
     for first, group in _groups(chosen, swept):
         for _, row in group.iterrows():
             variant = str(row["variant"])
-            theirs = _theirs(kind, float(row["mass"]), labels.get(variant, variant)) if with_paper else []
+            theirs = _theirs(kind, row, labels.get(variant, variant)) if with_paper else []
             rows.append((first, variant, *_errors(row), *_outcome(row), *theirs))
         if not swept:
             rows.append((first, STANDS_STILL, *_still(group), *_still_outcome(group)))
@@ -54,7 +54,7 @@ def error_table(
         head=(*columns, *HEADS.values(), *outcome, *paper),
         latex_head=(*columns, *LATEX_HEADS.values(), *outcome, *latex_paper),
         rows=tuple(rows),
-        numbers=chosen,
+        numbers=_with_papers(chosen, kind, labels) if with_paper else chosen,
     )
 
 
@@ -117,22 +117,43 @@ def _still_outcome(rows: pd.DataFrame) -> list[str]:
     return [ABSENT, "none" if walks else ABSENT, "0.00" if walks else ABSENT, ABSENT]
 
 
-def _theirs(kind: str, mass: float, variant: str) -> list[str]:
-    paper = reported(kind, mass, variant)
+def _theirs(kind: str, row: pd.Series, variant: str) -> list[str]:
+    """The paper's errors, and in brackets ours in parts of them."""
+    paper = reported(kind, float(row["mass"]), variant)
     if paper == "absent":
         return [ABSENT] * len(ERRORS)
-    return [FAILS] * len(ERRORS) if paper is None else [f"{value:.3f}" for value in paper]
+    if paper is None:
+        return [FAILS] * len(ERRORS)
+    ratios = [float(row[name]) / value for name, value in zip(ERRORS, paper, strict=True)]
+    return [
+        f"{value:.3f}" if np.isnan(ratio) else f"{value:.3f} ({ratio:.2f})"
+        for value, ratio in zip(paper, ratios, strict=True)
+    ]
+
+
+def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> pd.DataFrame:
+    """The numbers with the paper's, `paper_<error>`, and ours in parts of them, `ratio_<error>`; NaN without any."""
+    found = [
+        reported(kind, float(row["mass"]), labels.get(row["variant"], row["variant"])) for _, row in chosen.iterrows()
+    ]
+    paper = np.array([[np.nan] * len(ERRORS) if one is None or one == "absent" else one for one in found], np.float64)
+    columns = {f"paper_{name}": paper[:, place] for place, name in enumerate(ERRORS)}
+    ratios = {f"ratio_{name}": chosen[name].to_numpy(np.float64) / columns[f"paper_{name}"] for name in ERRORS}
+    return chosen.assign(**columns, **ratios)
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     title = f"cooperative {kind} (paper's Table {NUMBERS[kind]})" if kind in NUMBERS else f"the suite {kind}"
+    failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
     aim = " Success here is survival in posture, for the push is infeasible." if kind == "stagnation" else ""
-    beside = " Right, what the paper reports for its own commands." if with_paper else ""
+    beside = (
+        " Right, what the paper reports for its own commands, in brackets ours divided by it." if with_paper else ""
+    )
     return (
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
         f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
         f"in hands: part of the weight that the robot carries which rests in its hands; {STANDS_STILL}: what doing "
-        f"nothing scores, from the script.{aim}{beside}"
+        f"nothing scores, from the script.{failed}{aim}{beside}"
     )
 
 

@@ -37,7 +37,8 @@ def markdown(table: Table) -> str:
 
 
 def latex(table: Table) -> str:
-    """A booktabs table with the paper's row groups; needs the packages booktabs and multirow."""
+    """A booktabs table with the paper's row groups, no wider than the text; needs the packages booktabs, multirow and
+    adjustbox."""
     grouped = table.head[1] == "Algorithm"
     frame = pd.DataFrame(table.rows, columns=list(table.latex_head))
     if grouped:
@@ -58,7 +59,8 @@ def latex(table: Table) -> str:
             column_format="ll" + "c" * (len(table.head) - 2),
         )
     )
-    return str(text).translate(LATEX_SIGNS)
+    fitted = str(text).replace(r"\begin{tabular}", "\\begin{adjustbox}{max width=\\textwidth}\n\\begin{tabular}")
+    return fitted.replace(r"\end{tabular}", "\\end{tabular}\n\\end{adjustbox}").translate(LATEX_SIGNS)
 
 
 def write_table(table: Table, folder: Path) -> None:
