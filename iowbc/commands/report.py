@@ -8,7 +8,7 @@ from rich.console import Console
 from iowbc.commands.compare import joined_tables
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.named import Named, named
-from iowbc.commands.results import shown_path
+from iowbc.commands.results import shown_path, split_tables
 from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
@@ -38,7 +38,8 @@ def report(store: Store, console: Console, words: Sequence[str], output: Path) -
 
     runs = [Run(run.word, run.artifacts, run.recipe or {}) for run in found]
     differences = [line for other in found[1:] for line in _differences(found[0], other)]
-    write_page(output, runs, grouped(runs), joined_tables(found), differences)
+    main, others = split_tables(joined_tables(found))
+    write_page(output, runs, grouped(runs), main, others, differences)
     text = f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed"
     console.print(text, markup=False, highlight=False, soft_wrap=True)
 

@@ -91,6 +91,11 @@ def _print_tables(folder: Path, console: Console) -> None:
         _line(console, f"more tables  {shown_path(folder)}: {', '.join(others)}")
 
 
+def split_tables(tables: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Tables by name, as the main ones in their order and the others."""
+    return [tables[name] for name in TABLES if name in tables], [tables[name] for name in tables if name not in TABLES]
+
+
 def _rank(path: Path) -> tuple[int, str]:
     """The order in which tables are drawn."""
     return TABLES.index(path.stem) if path.stem in TABLES else len(TABLES), path.name

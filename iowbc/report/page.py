@@ -4,7 +4,7 @@ import base64
 import html
 import json
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -25,12 +25,14 @@ def write_page(
     path: Path,
     runs: Sequence[Run],
     groups: Sequence[Group],
-    tables: Mapping[str, str],
+    tables: Sequence[str],
+    more_tables: Sequence[str],
     differences: Sequence[str],
 ) -> None:
     """Write the page about some runs.
 
-    tables: result tables in Markdown, by name. differences: lines that say how the runs differ.
+    tables: result tables in Markdown; more_tables: those that can be unfolded. differences: lines that say how the
+    runs differ.
     """
     from jinja2 import Environment, select_autoescape
     from plotly.offline import get_plotlyjs
@@ -51,7 +53,8 @@ def write_page(
         runs=runs,
         groups=groups,
         rows=[row for row in metric_rows(groups) if row.differs],
-        tables={name: _table(markdown) for name, markdown in tables.items()},
+        tables=[_table(markdown) for markdown in tables],
+        more_tables=[_table(markdown) for markdown in more_tables],
         learning=[entry for entry in learning if entry[1] or entry[2]],
         evaluation=evaluation,
         films=list(_media(runs, "videos")),

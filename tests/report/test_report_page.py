@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iowbc.commands.results import split_tables
 from iowbc.pipeline.store.artifact import Manifest, write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -123,10 +124,18 @@ def test_a_page_asks_no_network_and_no_content_ends_its_scripts(runs: list[Run],
     json.loads(re.search(r'id="curves">(.*?)</script>', text, re.DOTALL).group(1))  # type: ignore[union-attr]
 
 
+def test_the_main_tables_are_shown_at_once_and_the_others_folded(runs: list[Run], tmp_path: Path) -> None:
+    text = written(runs, tmp_path).read_text()
+    shown, _, folded = text.partition("<summary>1 more table</summary>")
+    assert "<td>main</td>" in shown
+    assert "<td>folded</td>" in folded.partition("</details>")[0]
+    assert split_tables({"joints": "a", "heavy": "b", "lifting": "c", "pushes": "d"}) == (["c", "b"], ["a", "d"])
+
+
 def written(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
-    tables = {"lifting": "*A caption.*\n\n| a | b |\n|---|---|\n| 1 | <2> |\n"}
-    write_page(path, runs, grouped(runs), tables, ["teacher.gamma: 0.99 -> 0.9"])
+    table, other = (f"*A caption.*\n\n| a | b |\n|---|---|\n| {cell} | <2> |\n" for cell in ("main", "folded"))
+    write_page(path, runs, grouped(runs), [table], [other], ["teacher.gamma: 0.99 -> 0.9"])
     return path
 
 
