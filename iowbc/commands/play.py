@@ -58,6 +58,7 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         if training.recipe is not None:
             return _training_source(store, training, training.recipe)
     artifact = playable(store, word, stage)
+    require_whole(store.runs, artifact)
     if artifact.published:
         text = f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository"
         console.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -27,6 +27,7 @@ def points_of(store: Store, words: Sequence[str]) -> list[str]:
     found: list[str] = []
     for word in words:
         record = read_json(store.runs.sweeps / word / RECORD) if word not in recipes else None
-        points = record.get("points", {}) if isinstance(record, dict) else {}
-        found += [name for name in points if name in recipes] or [word]
+        points = record.get("points") if isinstance(record, dict) else None
+        names = list(points) if isinstance(points, dict) else []
+        found += [name for name in names if name in recipes] or [word]
     return found

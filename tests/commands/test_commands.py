@@ -14,7 +14,9 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare
 from iowbc.commands.named import open_artifact
+from iowbc.commands.play import named_source
 from iowbc.commands.report import report
+from iowbc.commands.swept import points_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs
@@ -246,9 +248,20 @@ def test_a_damaged_record_of_a_recipe_is_named_and_keeps_gc_from_removing(folder
     assert command("gc", "--unused").stdout == "0 B in all\n"
 
 
-def test_what_is_damaged_is_neither_compared_nor_reported(folder: Path, key: Key) -> None:
+@pytest.mark.parametrize("text", ["[]", '{"points": 3}', '{"points": [{}]}', "[" * 100_000])
+def test_a_record_of_a_sweep_of_other_types_is_none(tmp_path: Path, text: str) -> None:
+    runs = Runs(tmp_path)
+    (runs.sweeps / "wide").mkdir(parents=True)
+    (runs.sweeps / "wide" / "sweep.json").write_text(text)
+    assert points_of(Store(runs), ["wide"]) == ["wide"]
+
+
+def test_what_is_damaged_is_neither_played_nor_compared_nor_reported(folder: Path, key: Key) -> None:
     (folder / "runs" / "store" / "eval" / key("second", "eval") / "tables" / "counts.md").write_bytes(bytes(range(256)))
+    (folder / "runs" / "store" / "teacher" / key("second", "teacher") / "recipe.yaml").write_text("simulation: 3\n")
     store, console = Store(Runs(folder / "runs")), Console()
+    with pytest.raises(UsageError, match=r"recipe\.yaml has 14 bytes.*to make it anew: iowbc run"):
+        named_source(store, console, "second/teacher", None, "lift")
     with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
         compare(store, console, ["first", "second"], folder / "compared")
     with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
