@@ -77,6 +77,8 @@ class Chaos:
     """Whether stages have worker processes."""
     draws: random.Random = field(default_factory=random.Random)
     """Of the present turn."""
+    pace: float = 0.0
+    """About the time that a run takes now [s]: within it each turn's moment is drawn."""
 
     @property
     def store(self) -> Store:
@@ -141,10 +143,13 @@ class Chaos:
         disturb = self.draws.choice(DISTURBANCES)
         if self.workers and number % 2:
             disturb = kill_worker
-        moment = self.draws.random() * self.undisturbed.seconds
+        self.pace = self.pace or self.undisturbed.seconds
+        moment = self.draws.random() * self.pace
+        begun = time.monotonic()
         process, struck, lost = self.run(), Struck(ENDED), list[str]()
         try:
             process.wait(moment)
+            self.pace = max(time.monotonic() - begun, self.pace / 2)  # the machine may have less to do by now
         except subprocess.TimeoutExpired:
             before = self.whole()
             struck = disturb(self, process)

@@ -258,14 +258,14 @@ def test_a_record_of_a_sweep_of_other_types_is_none(tmp_path: Path, text: str) -
 
 def test_what_is_damaged_is_neither_played_nor_compared_nor_reported(folder: Path, key: Key) -> None:
     (folder / "runs" / "store" / "eval" / key("second", "eval") / "tables" / "counts.md").write_bytes(bytes(range(256)))
-    (folder / "runs" / "store" / "teacher" / key("second", "teacher") / "recipe.yaml").write_text("simulation: 3\n")
     store, console = Store(Runs(folder / "runs")), Console()
-    with pytest.raises(UsageError, match=r"recipe\.yaml has 14 bytes.*to make it anew: iowbc run"):
-        named_source(store, console, "second/teacher", None, "lift")
     with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
         compare(store, console, ["first", "second"], folder / "compared")
     with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
         report(store, console, ["second"], folder / "second.html")
+    (folder / "runs" / "store" / "teacher" / key("second", "teacher") / "recipe.yaml").write_text("simulation: 3\n")
+    with pytest.raises(UsageError, match=r"recipe\.yaml has 14 bytes.*to make it anew: iowbc run"):
+        named_source(store, console, "second/teacher", None, "lift")
 
 
 @pytest.mark.parametrize("stage", ["teacher", "rg-fit"])
