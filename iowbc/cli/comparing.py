@@ -30,7 +30,7 @@ def compare(
     from iowbc.commands.compare import compare as write_comparison
 
     store = store_in(runs)
-    write_comparison(store, console(), recipes, output or store.runs.root / "compare", film, as_json)
+    write_comparison(store, console(), recipes, output or store.runs.compared, film, as_json)
 
 
 def report(

@@ -3,12 +3,14 @@
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from iowbc.commands.as_json import print_json
+from iowbc.commands.compared import FILM, film_of, record
 from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
 from iowbc.commands.named import Named, named
@@ -44,13 +46,14 @@ def compare(
     require_writable(output, "--output")
     for evaluation in (run.artifacts["eval"] for run in found if "eval" in run.artifacts):
         require_whole(store.runs, evaluation)
+    record([run.word for run in found], output)
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = _having(found, TRIALS)
     _report_probes(_having(found, PROBE), output)
     if len(tried) > 1:
         trials = _report(tried, output)
         if film:
-            _film(store, tried, trials, output / "side_by_side.mp4")
+            _film(store, tried, trials, output / FILM)
     elif film:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     if as_json:
@@ -110,19 +113,49 @@ def _print_curves(found: Sequence[Named], console: Console) -> None:
                     console.print(text, markup=False, highlight=False, no_wrap=True, overflow="ellipsis")
 
 
-def joined_tables(found: Sequence[Named]) -> dict[str, str]:
-    """Result tables in Markdown by name: of one run its own, of several those over all their trials."""
+@dataclass(frozen=True)
+class Joined:
+    """What an evaluation, or several together, show."""
+
+    tables: dict[str, str]
+    """In Markdown, by name."""
+    media: dict[str, bytes]
+    """Pictures of several together, and a film of them side by side where there is one, by file name."""
+
+
+def joined(store: Store, found: Sequence[Named]) -> Joined:
+    """The result tables of one run; of several those over all their trials, with their pictures and film."""
     evaluated = [run for run in found if "eval" in run.artifacts]
     with tempfile.TemporaryDirectory() as folder:
-        tables = Path(folder, "tables")
-        tried = _having(evaluated, TRIALS)
+        output, tried = Path(folder), _having(evaluated, TRIALS)
         if len(evaluated) == 1:
-            tables = evaluated[0].artifacts["eval"].folder / "tables"
+            output = evaluated[0].artifacts["eval"].folder
         else:
-            _report_probes(_having(evaluated, PROBE), Path(folder))
+            _report_probes(_having(evaluated, PROBE), output)
             if len(tried) > 1:
-                _report(tried, Path(folder))
-        return {path.stem: path.read_text(encoding="utf-8") for path in sorted(tables.glob("*.md"))}
+                _report(tried, output)
+        tables = {path.stem: path.read_text(encoding="utf-8") for path in sorted((output / "tables").glob("*.md"))}
+        if len(evaluated) < 2:
+            return Joined(tables, {})
+        film = film_of(store.runs, [run.word for run in found])
+        media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
+        return Joined(tables, {path.name: path.read_bytes() for path in media})
+
+
+def film_together(store: Store, words: Sequence[str], output: Path) -> Path | None:
+    """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
+
+    None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
+    can be drawn.
+    """
+    tried = _having([named(store, word) for word in words], TRIALS)
+    film = output / FILM
+    if len(tried) < 2:
+        return None
+    newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)
+    if not (film.is_file() and film.stat().st_mtime > newest):
+        _film(store, tried, _told_apart(tried, TRIALS)[0], film)
+    return film
 
 
 def _having(runs: Sequence[Named], name: str) -> list[Named]:

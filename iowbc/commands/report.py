@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.compare import joined_tables
+from iowbc.commands.compare import joined
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path, split_tables
@@ -38,8 +38,9 @@ def report(store: Store, console: Console, words: Sequence[str], output: Path) -
 
     runs = [Run(run.word, run.artifacts, run.recipe or {}) for run in found]
     differences = [line for other in found[1:] for line in _differences(found[0], other)]
-    main, others = split_tables(joined_tables(found))
-    write_page(output, runs, grouped(runs), main, others, differences)
+    together = joined(store, found)
+    main, others = split_tables(together.tables)
+    write_page(output, runs, grouped(runs), main, others, differences, together.media)
     text = f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed"
     console.print(text, markup=False, highlight=False, soft_wrap=True)
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 
-from iowbc.commands.compare import compare
+from iowbc.commands.compare import compare, film_together
 from iowbc.commands.engine import engine
 from iowbc.commands.request import Request, prepared, recipes
-from iowbc.commands.results import described, print_results
+from iowbc.commands.results import TABLES, described, print_results, shown_path
 from iowbc.commands.training import require_training
-from iowbc.errors import Interrupted, PipelineFailed
+from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay, SilentDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
@@ -19,7 +19,7 @@ from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.tracking.tracker import Tracker, backlog
+from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import LoadedRecipe
 
@@ -57,9 +57,35 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
     except KeyboardInterrupt:
         return INTERRUPTED
     if len(ready) > 1 and request.options.until is None and manner != "quiet":
-        output = request.runs.root / "compare" / Path(request.word).stem
-        compare(Store(request.runs), console, [one.recipe.name for one in loaded], output)
+        compare_variants(request, loaded, console)
     return DONE
+
+
+def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: Console) -> None:
+    """Compare the recipes of a recipe of recipes, film them side by side, and tell MLflow where that is new."""
+    store, name = Store(request.runs), Path(request.word).stem
+    words, output = [one.recipe.name for one in loaded], request.runs.compared / name
+    before = joined_text(output)
+    compare(store, console, words, output)
+    try:
+        film = film_together(store, words, output)
+    except (NoRenderer, UsageError) as reason:
+        film = None
+        console.print(f"no film: {reason}", markup=False, highlight=False, soft_wrap=True)
+    if film is not None:
+        console.print(shown_path(film), markup=False, highlight=False, soft_wrap=True)
+    told = joined_text(output)
+    if told != before and loaded[0].recipe.execution.track:
+        files = [path for path in sorted(output.rglob("*")) if path.is_file()]
+        record_figures(request.runs, f"compare-{name}", {}, told, files)
+    console.print(f"next:\n  iowbc report {name}", markup=False, highlight=False, soft_wrap=True)
+
+
+def joined_text(folder: Path) -> str:
+    """The main tables of a comparison in Markdown, and the metrics that differ."""
+    paths = [folder / "tables" / f"{name}.md" for name in (*TABLES, "differences")]
+    found = [path.read_text(encoding="utf-8") for path in (*paths, folder / "metrics.md") if path.is_file()]
+    return "\n".join(found)
 
 
 def run_recipe(

@@ -1,9 +1,10 @@
-"""What a sweep consists of, kept so that other commands know it by its name."""
+"""What a sweep or a recipe of recipes consists of, so that other commands know them by their names."""
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from iowbc.commands.compared import recorded
 from iowbc.commands.named import known_recipes
 from iowbc.files import write_whole
 from iowbc.pipeline.store.runs import read_json
@@ -22,12 +23,14 @@ def record(found: Sweep, folder: Path) -> None:
 
 
 def points_of(store: Store, words: Sequence[str]) -> list[str]:
-    """Names of recipes, with the finished points of a sweep in place of its name."""
+    """Names of recipes, with the finished points of a sweep, or what was compared, in place of its name."""
     recipes = known_recipes(store)
     found: list[str] = []
     for word in words:
         record = read_json(store.runs.sweeps / word / RECORD) if word not in recipes else None
         points = record.get("points") if isinstance(record, dict) else None
         names = list(points) if isinstance(points, dict) else []
+        if not names and word not in recipes:
+            names = recorded(store.runs.compared / word)
         found += [name for name in names if name in recipes] or [word]
     return found

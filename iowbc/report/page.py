@@ -4,10 +4,11 @@ import base64
 import html
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
@@ -28,11 +29,12 @@ def write_page(
     tables: Sequence[str],
     more_tables: Sequence[str],
     differences: Sequence[str],
+    together: Mapping[str, bytes] = MappingProxyType({}),
 ) -> None:
     """Write the page about some runs.
 
     tables: result tables in Markdown; more_tables: those that can be unfolded. differences: lines that say how the
-    runs differ.
+    runs differ. together: pictures and films of all of them, by file name.
     """
     from jinja2 import Environment, select_autoescape
     from plotly.offline import get_plotlyjs
@@ -57,8 +59,8 @@ def write_page(
         more_tables=[_table(markdown) for markdown in more_tables],
         learning=[entry for entry in learning if entry[1] or entry[2]],
         evaluation=evaluation,
-        films=list(_media(runs, "videos")),
-        pictures=list(_media(runs, "figures")),
+        films=[*_together(together, ".mp4"), *_media(runs, "videos")],
+        pictures=[*_together(together, ".png"), *_media(runs, "figures")],
         first_pictures=FIRST_PICTURES,
         differences=differences,
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
@@ -77,6 +79,18 @@ def _numbered(curves: dict[str, Panel], panels: Sequence[Panel]) -> list[str]:
     return names
 
 
+def _together(files: Mapping[str, bytes], kind: str) -> Iterator[tuple[str, str, str]]:
+    """The same as `_media`, of what shows all runs."""
+    for name, content in files.items():
+        if name.endswith(kind):
+            yield "all runs", name, _address(content, kind)
+
+
+def _address(content: bytes, kind: str) -> str:
+    """A file of a kind as an address that holds it."""
+    return f"data:{KINDS[kind]};base64,{base64.b64encode(content).decode()}"
+
+
 def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
     """Whose it is, name, and content as a data address of every film or picture, each artifact once."""
     seen = set()
@@ -87,8 +101,7 @@ def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
             seen.add(artifact.manifest.key)
             for path in sorted((artifact.folder / folder).glob("*")):
                 if path.suffix in KINDS:
-                    content = base64.b64encode(path.read_bytes()).decode()
-                    yield f"{run.label}, {stage}", path.name, f"data:{KINDS[path.suffix]};base64,{content}"
+                    yield f"{run.label}, {stage}", path.name, _address(path.read_bytes(), path.suffix)
 
 
 def _beside(artifact: Artifact) -> list[tuple[str, str]]:

@@ -4,6 +4,11 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from iowbc.commands.compared import film_of, record
+from iowbc.commands.swept import points_of
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
@@ -24,6 +29,10 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert compared[0].startswith("| stage | metric | first | third |")
     assert len(compared) == 2, "the made-up stages count alike, and what is alike is left out"
     assert command("run", "both.yaml").stdout.count(": cached") == 12
+    assert "next:\n  iowbc report both" in done.stdout
+    store = Store(Runs(folder / "runs"))
+    assert points_of(store, ["both"]) == ["first", "third"], "later commands know them by the recipe's name"
+    assert points_of(store, ["first", "nobody"]) == ["first", "nobody"]
 
 
 def test_an_earlier_end_is_compared_with_nothing(folder: Path, command: Command) -> None:
@@ -45,3 +54,14 @@ def test_a_wrong_variant_is_named_before_any_runs(folder: Path, command: Command
     done = command("run", "both.yaml")
     assert done.returncode == 2
     assert "third.yaml:2:8: key 'eval.trails' = 3" in done.stderr
+
+
+def test_the_film_of_a_comparison_is_found_by_its_runs_in_any_order(tmp_path: Path) -> None:
+    runs = Runs(tmp_path)
+    folder = runs.compared / "both"
+    folder.mkdir(parents=True)
+    record(["first", "third"], folder)
+    assert film_of(runs, ["first", "third"]) is None, "none was made"
+    (folder / "side_by_side.mp4").write_bytes(b"film")
+    assert film_of(runs, ["third", "first"]) == folder / "side_by_side.mp4"
+    assert film_of(runs, ["first"]) is None

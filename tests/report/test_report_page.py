@@ -1,5 +1,6 @@
 """A report is one file that opens offline in a browser and holds the curves of all runs."""
 
+import base64
 import html
 import json
 import re
@@ -130,6 +131,17 @@ def test_the_main_tables_are_shown_at_once_and_the_others_folded(runs: list[Run]
     assert "<td>main</td>" in shown
     assert "<td>folded</td>" in folded.partition("</details>")[0]
     assert split_tables({"joints": "a", "heavy": "b", "lifting": "c", "pushes": "d"}) == (["c", "b"], ["a", "d"])
+
+
+def test_what_shows_all_runs_comes_first(runs: list[Run], tmp_path: Path) -> None:
+    media = {"comparison.png": b"picture", "side_by_side.mp4": b"film"}
+    write_page(tmp_path / "page.html", runs, grouped(runs), [], [], [], media)
+    text = (tmp_path / "page.html").read_text()
+    for name, content in media.items():
+        assert f"all runs: {name}</figcaption>" in text
+        assert base64.b64encode(content).decode() in text
+    first = text.index('id="films"')
+    assert re.findall(r"<figcaption>(.*?)</figcaption>", text[first:])[0] == "all runs: side_by_side.mp4"
 
 
 def written(runs: list[Run], folder: Path) -> Path:

@@ -163,7 +163,7 @@ def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: 
 
 
 def _push_panel(axes: Axes, pushes: pd.DataFrame, rate: float) -> None:
-    axes.set_title(f"impulse survived standing, {float(pushes['mass'].iloc[0]):g} kg")
+    axes.set_title(f"impulse survived, {float(pushes['mass'].iloc[0]):g} kg")
     directions = list(dict.fromkeys(pushes["case"]))
     found = {v: [push_capacity(pushes, one, v, rate) for one in directions] for v in variants_of(pushes)}
     _capacity_bars(axes, found, directions)
@@ -198,7 +198,7 @@ def _capacity_bars(axes: Axes, found: dict[str, list[Capacity | None]], names: l
     for variant, row in found.items():
         heights = np.array([np.nan if one is None else one.value or 0.0 for one in row])
         groups[variant] = Bars(heights, ["" if one is None else one.text("").strip() for one in row])
-    _bars(axes, groups, names)
+    _bars(axes, groups, [_broken(name) for name in names])
 
 
 def _bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:

@@ -62,7 +62,7 @@ class Runs:
             self.recipes,
             self.tracking,
             self.tracked_files,
-            self.root / "compare",
+            self.compared,
             self.reports,
             self.sweeps,
             self.npm,
@@ -72,6 +72,11 @@ class Runs:
     def sweeps(self) -> Path:
         """What each sweep consists of and came to, `<name>/`."""
         return self.root / "sweeps"
+
+    @property
+    def compared(self) -> Path:
+        """Tables, figures and films over several runs; those of a recipe of recipes in `<name>/`."""
+        return self.root / "compare"
 
     @property
     def reports(self) -> Path:

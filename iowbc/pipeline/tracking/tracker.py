@@ -9,7 +9,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -188,11 +188,19 @@ def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
     return None
 
 
-def record_figures(runs: Runs, name: str, figures: Mapping[str, float]) -> None:
-    """Record a run that has no stages, such as a benchmark: its figures by name."""
+def record_figures(
+    runs: Runs, name: str, figures: Mapping[str, float], text: str = "", files: Sequence[Path] = ()
+) -> None:
+    """Record a run that has no stages, such as a benchmark: its figures by name, Markdown that describes it, and files
+    below `runs`."""
     with new_journal(runs, name, Execution.model_fields["experiment"].default, "") as journal:
         journal.write("run", id=PARENT, parent=None, name=name, tags=process_tags(), params={})
-        journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
+        if figures:
+            journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
+        if text:
+            journal.write("tags", id=PARENT, tags={DESCRIPTION: text})
+        if files:
+            journal.write("files", id=PARENT, paths=[os.path.relpath(path, runs.root) for path in files])
         journal.write("end", id=PARENT, status="FINISHED")
     start_sender(runs)
 
