@@ -29,5 +29,6 @@ def test_a_fresh_clone_has_a_controller_to_try(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("IOWBC_RUNS", str(ROOT / "runs"))
     controller = Controller.load("quickstart")
     assert controller.robot.name == "g1"
-    (folder,) = (ROOT / "runs" / "published" / "export").iterdir()
-    assert json.loads((folder / "summary.json").read_text())["metrics"]["acceptance_survived"] >= 4
+    folders = list((ROOT / "runs" / "published" / "export").iterdir())
+    metrics = [json.loads((folder / "summary.json").read_text())["metrics"] for folder in folders]
+    assert min(one["acceptance_survived"] for one in metrics) >= 4
