@@ -65,16 +65,22 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
     scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
     if scene is not None and scenes:
         require_known(scene, "scene", scenes)
-    return artifact_source(store, artifact)
+    return _whole_source(store, artifact)
 
 
 def artifact_source(store: Store, artifact: Artifact) -> "Source":
     """A stored policy with its world. Raises `UsageError` where its files are damaged."""
+    require_whole(store.runs, artifact)
+    return _whole_source(store, artifact)
+
+
+def _whole_source(store: Store, artifact: Artifact) -> "Source":
+    """The same of a policy that is known to be whole."""
     from iowbc.evaluation.play import exported_source
 
     generator = generator_of(store, artifact)
-    for read in filter(None, (artifact, generator)):
-        require_whole(store.runs, read)
+    if generator is not None:
+        require_whole(store.runs, generator)
     return exported_source(artifact.folder) if artifact.manifest.stage == "export" else _source(artifact, generator)
 
 

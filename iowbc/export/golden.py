@@ -9,9 +9,10 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from iowbc.deploy.session import Values
+from iowbc.deploy.timing import INPUT
 
-INPUT, OUTPUT = "input/", "output/"
-"""Prefixes of the names in `golden.npz`."""
+OUTPUT = "output/"
+"""Prefix of the names of outputs in `golden.npz`, beside `INPUT`."""
 
 
 def stacked(steps: Sequence[Mapping[str, NDArray[np.float32]]]) -> Values:

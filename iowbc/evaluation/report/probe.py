@@ -125,10 +125,8 @@ def _scatter(axes: Axes, settled: pd.DataFrame, source: str) -> None:
 
 def _growth(axes: Axes, inferred: pd.DataFrame) -> None:
     """R² over the trials that go on at each time."""
-    variants, sources = (
-        variants_of(inferred),
-        [each for each in dict.fromkeys(inferred["source"]) if each != PRIVILEGED],
-    )
+    variants = variants_of(inferred)
+    sources = [each for each in dict.fromkeys(inferred["source"]) if each != PRIVILEGED]
     lines = LINES if len(variants) == 1 else LINES_OF_SEVERAL
     for variant in variants:
         for source, line in zip(sources, lines, strict=False):
