@@ -7,6 +7,7 @@ key that it belongs to and the SHA-256 of key and content.
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -35,6 +36,17 @@ def write_whole(path: Path, text: str) -> None:
     """Write a text in place of a file, or where there is none."""
     with replacing(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
+
+
+def read_limited(path: Path, largest: int) -> bytes:
+    """Content of a regular file of `largest` bytes at most. Raises OSError, or ValueError for any other file."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise ValueError(f"{path}: is no regular file")
+    with path.open("rb") as opened:
+        content = opened.read(largest + 1)
+    if len(content) > largest:
+        raise ValueError(f"{path}: has {path.stat().st_size:,} bytes; it may have {largest:,} at most")
+    return content
 
 
 def synchronise(path: Path) -> None:

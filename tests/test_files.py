@@ -1,11 +1,12 @@
 """Whole files and checked files: what a crash or a flipped bit leaves, and what a reader makes of it."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from iowbc.errors import Damaged
-from iowbc.files import newest_checked, previous, read_checked, replacing, write_checked
+from iowbc.files import newest_checked, previous, read_checked, read_limited, replacing, write_checked
 
 CONTENT = bytes(range(256))
 
@@ -23,6 +24,20 @@ def test_what_fails_while_it_is_written_leaves_the_old_file_and_nothing_else(tmp
         fill()
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_small_file_is_read_whole_and_none_that_is_larger_or_of_another_kind(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(CONTENT)
+    assert read_limited(path, len(CONTENT)) == CONTENT
+    with pytest.raises(ValueError, match=r"file: has 256 bytes; it may have 255 at most"):
+        read_limited(path, 255)
+    os.mkfifo(tmp_path / "pipe")
+    for other in (tmp_path, tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(ValueError, match="is no regular file"):
+            read_limited(other, 10)
+    with pytest.raises(FileNotFoundError):
+        read_limited(tmp_path / "none", 10)
 
 
 def test_a_checked_file_gives_back_what_was_written_for_its_key_alone(tmp_path: Path) -> None:

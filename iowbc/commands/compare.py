@@ -44,8 +44,7 @@ def compare(
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
     require_training("compare")
     require_writable(output, "--output")
-    for evaluation in (run.artifacts["eval"] for run in found if "eval" in run.artifacts):
-        require_whole(store.runs, evaluation)
+    require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
     record([run.word for run in found], output)
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = _having(found, TRIALS)

@@ -58,7 +58,7 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         if training.recipe is not None:
             return _training_source(store, training, training.recipe)
     artifact = playable(store, word, stage)
-    require_whole(store.runs, artifact)
+    require_whole(store.runs, [artifact])
     if artifact.published:
         text = f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository"
         console.print(text, markup=False, highlight=False, soft_wrap=True)
@@ -70,7 +70,7 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
 
 def artifact_source(store: Store, artifact: Artifact) -> "Source":
     """A stored policy with its world. Raises `UsageError` where its files are damaged."""
-    require_whole(store.runs, artifact)
+    require_whole(store.runs, [artifact])
     return _whole_source(store, artifact)
 
 
@@ -80,7 +80,7 @@ def _whole_source(store: Store, artifact: Artifact) -> "Source":
 
     generator = generator_of(store, artifact)
     if generator is not None:
-        require_whole(store.runs, generator)
+        require_whole(store.runs, [generator])
     return exported_source(artifact.folder) if artifact.manifest.stage == "export" else _source(artifact, generator)
 
 

@@ -30,8 +30,7 @@ def report(store: Store, console: Console, words: Sequence[str], output: Path) -
         raise UsageError(f"--output {output}: a report is an HTML file; give a name that ends in .html")
     require_training("report")
     require_writable(output.parent, "--output")
-    for artifact in (artifact for run in found for artifact in run.artifacts.values()):
-        require_whole(store.runs, artifact)
+    require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
 
     from iowbc.report.page import write_page
     from iowbc.report.runs import Run, grouped

@@ -4,7 +4,6 @@ that they were made from, and a key changes with their content."""
 import base64
 import binascii
 import hashlib
-import stat
 import zlib
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -13,6 +12,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from iowbc.files import read_limited
 from iowbc.recipe.section import COSMETIC, Section
 
 
@@ -37,14 +37,11 @@ class FileBeside(Section):
         if file.suffix.lower() not in cls.suffixes:
             raise ValueError(f"should be a file that ends in {' or '.join(cls.suffixes)}")
         try:
-            if not stat.S_ISREG(file.stat().st_mode):
-                raise ValueError(f"{file}: is no regular file")
-            with file.open("rb") as opened:
-                data = opened.read(cls.largest + 1)
+            data = read_limited(file, cls.largest)
         except OSError as error:
             raise ValueError(f"{file}: cannot be read: {error.strerror}; its path is taken from the recipe") from None
-        if not 0 < len(data) <= cls.largest:
-            raise ValueError(f"{file}: has {file.stat().st_size:,} bytes; it may have 1 to {cls.largest:,}")
+        if not data:
+            raise ValueError(f"{file}: is empty")
         packed = base64.b64encode(zlib.compress(data, 9)).decode("ascii")
         return cls(path=path, sha256=hashlib.sha256(data).hexdigest(), content=packed)
 

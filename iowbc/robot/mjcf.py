@@ -1,6 +1,5 @@
 """Reads a robot's MJCF as a tree of bodies with NumPy alone: kinematics where there is no simulator."""
 
-import stat
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.files import read_limited
 from iowbc.robot import rotations
 
 LARGEST_FILE = 1_000_000
@@ -138,12 +138,7 @@ class Tree:
 
 def small_text(path: Path) -> str:
     """Text of one of a robot's files. Raises OSError, or ValueError for what is none of their kind or size."""
-    found = path.stat()
-    if not stat.S_ISREG(found.st_mode):
-        raise ValueError(f"{path}: is no regular file")
-    if found.st_size > LARGEST_FILE:
-        raise ValueError(f"{path}: has {found.st_size:,} bytes; a robot's file has {LARGEST_FILE:,} at most")
-    return path.read_text(encoding="utf-8")
+    return read_limited(path, LARGEST_FILE).decode("utf-8")
 
 
 def read_tree(path: Path) -> Tree:

@@ -231,6 +231,8 @@ def test_an_artifact_and_its_tables_are_opened_from_python(folder: Path) -> None
     assert artifact.manifest.stage == "teacher"
     (artifact.folder / "tables" / "rows.csv").write_text("a,b\n1,2\n")
     assert artifact.table("rows").to_dict("list") == {"a": [1], "b": [2]}
+    (artifact.folder / "tables" / "rows.csv").write_text("variant,b\n1e3,2\n")
+    assert artifact.table("rows").to_dict("list") == {"variant": ["1e3"], "b": [2]}
     with pytest.raises(KeyError, match="no table 'nothing'; it has: rows"):
         artifact.table("nothing")
     with pytest.raises(UsageError, match="first/teacher"):

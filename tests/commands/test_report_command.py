@@ -9,6 +9,7 @@ from rich.console import Console
 
 from iowbc.commands.report import report
 from iowbc.errors import UsageError
+from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
@@ -19,6 +20,14 @@ def test_a_report_is_of_recipes_and_an_html_file(folder: Path) -> None:
         report(store, console, ["first/teacher"], folder / "page.html")
     with pytest.raises(UsageError, match=r"ends in \.html"):
         report(store, console, ["first"], folder / "page.txt")
+
+
+def test_what_several_runs_share_is_verified_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    verified, verify = [], Artifact.verify
+    monkeypatch.setattr(Artifact, "verify", lambda artifact: (verified.append(artifact.folder), verify(artifact)))
+    report(Store(Runs(folder / "runs")), Console(), ["first", "second"], folder / "page.html")
+    assert sorted(path.parent.name for path in verified).count("rg-fit") == 1
+    assert len(verified) == len(set(verified)) > 0
 
 
 def test_the_command_writes_a_page_about_two_runs(

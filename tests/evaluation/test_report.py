@@ -176,6 +176,8 @@ def test_captions_say_partner_friction_height_averaging_and_that_it_is_simulatio
     carried, pushed = (error_table(summary, suite) for suite in ("lifting with partner 0.5", "pushing"))
     assert "In simulation, with a partner (share 0.5)." in carried.caption
     assert "without a partner (share 0), rolling resistance μ 0.06." in pushed.caption
+    assert carried.caption.startswith("Command tracking errors under cooperative lifting (paper's Table II): means")
+    assert pushed.caption.startswith("Command tracking errors under pushing alone (paper's Table III): means")
     for table in (carried, pushed):
         assert "the pelvis above the ground" in table.caption
         assert "one gait period of 0.80 s" in table.caption

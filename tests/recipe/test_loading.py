@@ -7,10 +7,13 @@ import time
 from pathlib import Path
 
 import pytest
+import yaml
 
 from iowbc.errors import RecipeError
+from iowbc.pipeline.store.runs import read_yaml
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
+from iowbc.recipe.reading.writing import as_yaml
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -95,6 +98,21 @@ def test_a_recipe_with_one_line_is_all_defaults_under_its_files_name(tmp_path: P
     recipe = loaded(tmp_path, "description: none\n").recipe
     assert recipe.name == "mine"
     assert recipe.stages[0] == "rg-dataset"
+
+
+@pytest.mark.parametrize("name", ["1e3", "12", "0o17", "0x1f", "1_000", "null", "true", "on", "2026-01-01"])
+def test_a_name_that_reads_as_something_else_is_text_wherever_it_is_read_again(tmp_path: Path, name: str) -> None:
+    recipe = load_recipe(write(tmp_path, "seed: 1\n", f"{name}.yaml")).recipe
+    kept = write(tmp_path, as_yaml(recipe))
+    assert read_yaml(kept)["name"] == name
+    assert yaml.safe_load(kept.read_text())["name"] == name
+    assert load_recipe(kept).recipe == recipe
+
+
+def test_a_number_where_text_belongs_is_asked_for_in_quotes(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "name: 1e3\n")
+    assert text == "mine.yaml:1:1: key 'name' = 1000.0: should be text; in quotes, a word that reads as a number is"
+    assert loaded(tmp_path, "seed: 1\n", 'name="1e3"').recipe.name == "1e3"
 
 
 def test_a_misspelt_key_names_place_value_valid_keys_and_the_nearest(tmp_path: Path) -> None:

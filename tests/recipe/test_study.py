@@ -49,3 +49,8 @@ def test_what_is_wrong_is_named_with_its_place(folder: Path) -> None:
     assert "paper.yaml:1:12: key 'variants': 3 is no recipe's name" in refused(folder, "variants: [3, full]\n")
     assert "full is the name of more than one" in refused(folder, "variants: [full, full]\n")
     assert "recipe nothing: no such file" in refused(folder, "variants: [full, nothing]\n")
+
+
+def test_a_file_whose_name_is_no_recipes_is_told_so(folder: Path) -> None:
+    with pytest.raises(RecipeError, match=r"My study\.yaml:1:1: key 'name' = 'my study': lower-case letters"):
+        load_study(write(folder, "variants: [full, wo_rg]\n", "My study.yaml"))

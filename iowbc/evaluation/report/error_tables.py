@@ -143,7 +143,8 @@ def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> 
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
-    title = f"cooperative {kind} (paper's Table {NUMBERS[kind]})" if kind in NUMBERS else f"the suite {kind}"
+    swept = kind in NUMBERS
+    title = f"{_with_whom(chosen, kind)} (paper's Table {NUMBERS[kind]})" if swept else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
     aim = " Success here is survival in posture, for the push is infeasible." if kind == "stagnation" else ""
     beside = (
@@ -155,6 +156,14 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
         f"in hands: part of the weight that the robot carries which rests in its hands; {STANDS_STILL}: what doing "
         f"nothing scores, from the script.{failed}{aim}{beside}"
     )
+
+
+def _with_whom(chosen: pd.DataFrame, kind: str) -> str:
+    """What is done, as the paper says it, and that nobody helps where nobody does."""
+    shares = set(chosen["partner_share"])
+    if shares == {0.0}:
+        return f"{kind} alone"
+    return f"cooperative {kind}" if min(shares) > 0 else kind
 
 
 def _with_half(value: float, half: float) -> str:

@@ -127,7 +127,9 @@ class Artifact:
         found = {path.stem: path for path in sorted(paths)}
         if name not in found:
             raise KeyError(f"{self.folder} has no table '{name}'; it has: {', '.join(found) or 'none'}")
-        return pd.read_parquet(found[name]) if found[name].suffix == ".parquet" else pd.read_csv(found[name])
+        if found[name].suffix == ".parquet":
+            return pd.read_parquet(found[name])
+        return pd.read_csv(found[name], dtype={"variant": str, "reference": str})
 
     def verify(self) -> None:
         """Compare everything with its digest. Raises `Damaged`."""

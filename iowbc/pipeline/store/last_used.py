@@ -3,6 +3,7 @@
 import json
 import shlex
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -67,14 +68,18 @@ def remaking(runs: Runs, artifact: Artifact) -> str:
     return shlex.join(words)
 
 
-def require_whole(runs: Runs, artifact: Artifact) -> None:
-    """Raises `UsageError` with the command that makes an artifact anew, where a file of it is not what was written."""
-    try:
-        artifact.verify()
-    except Damaged as error:
-        raise UsageError(
-            f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(runs, artifact)}"
-        ) from None
+def require_whole(runs: Runs, artifacts: Iterable[Artifact]) -> None:
+    """Raises `UsageError` with the command that makes an artifact anew, where a file of it is not what was written.
+
+    One that is named repeatedly is read once.
+    """
+    for artifact in {artifact.folder: artifact for artifact in artifacts}.values():
+        try:
+            artifact.verify()
+        except Damaged as error:
+            raise UsageError(
+                f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(runs, artifact)}"
+            ) from None
 
 
 def _record(path: Path) -> dict[str, Any] | None:

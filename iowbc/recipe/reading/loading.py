@@ -1,12 +1,12 @@
 """Reads a recipe file: inheritance, overrides, validation, and where each value came from."""
 
 import os
-import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, nearest, shown
+from iowbc.files import read_limited
 from iowbc.recipe.reading.beside import with_files
 from iowbc.recipe.reading.document import Located, leaves, merged, read_document
 from iowbc.recipe.reading.finding import SUFFIXES, known_files, recipe_file
@@ -103,16 +103,12 @@ def _mapping(tree: Located) -> dict[str, Located]:
 def read_text(file: str, place: str) -> str:
     """The text of a recipe file. Raises `RecipeError` where it cannot be read."""
     try:
-        found = os.stat(file)
-        if not stat.S_ISREG(found.st_mode):
-            raise RecipeError([Problem(place, f"recipe {file}: is no regular file")])
-        if found.st_size > LARGEST_FILE:
-            text = f"recipe {file}: has {found.st_size:,} bytes; a recipe has {LARGEST_FILE:,} at most"
-            raise RecipeError([Problem(place, text)])
-        return Path(file).read_text(encoding="utf-8")
+        return read_limited(Path(file), LARGEST_FILE).decode("utf-8")
     except UnicodeDecodeError as error:
         text = f"is not UTF-8 text ({error.reason} at byte {error.start})"
         raise RecipeError([Problem(f"{file}:1:1", text)]) from None
+    except ValueError as error:
+        raise RecipeError([Problem(place, f"recipe {error}")]) from None
     except OSError as error:
         folder = Path(file).parent
         known = sorted(str(found.name) for found in folder.glob("*.yaml")) if folder.is_dir() else []

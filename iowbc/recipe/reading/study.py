@@ -43,7 +43,9 @@ def load_study(word: str | Path, overrides: Sequence[str] = ()) -> Study | None:
     ]
     name = entries["name"].value if "name" in entries else file.stem.lower()
     if not isinstance(name, str) or not re.fullmatch(NAME, name):
-        problems.append(Problem(entries["name"].place, "key 'name': lower-case letters, digits, `-` and `_`"))
+        place = entries["name"].place if "name" in entries else tree.place
+        text = f"key 'name' = {shown(name)}: lower-case letters, digits, `-` and `_`; in quotes what reads as a number"
+        problems.append(Problem(place, text))
     found = _files(entries["variants"], file, problems)
     if problems:
         raise RecipeError(problems)

@@ -97,6 +97,8 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
         text = f"is not a key {where}; valid: {', '.join(known) or 'none'}{hint}"
         return found.place, f"key '{'.'.join(path)}' = {shown(plain(found))}", text
     text = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
+    if error["type"] == "string_type" and isinstance(found.value, (int, float)):
+        text = "should be text; in quotes, a word that reads as a number is"
     if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
         text += nearest(found.value, re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", ""))))
     return found.place, _head(path, found), text
