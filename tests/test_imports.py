@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
-    "report": {"pipeline", "recipe", "errors"},
+    "report": {"learning", "pipeline", "recipe", "errors"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD

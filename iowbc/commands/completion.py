@@ -17,21 +17,21 @@ def recipes(incomplete: str) -> list[str]:
 
 
 def ran(incomplete: str) -> list[str]:
-    """Recipes that have run."""
-    from iowbc.commands.named import known_recipes
+    """Recipes that have run, or are published."""
+    from iowbc.commands.named import nameable
 
-    return _beginning(incomplete, known_recipes(_store()))
+    return _beginning(incomplete, nameable(_store()))
 
 
 def artifacts(incomplete: str) -> list[str]:
-    """Recipes that have run, `RECIPE/STAGE`, and, once something is typed, keys."""
-    from iowbc.commands.named import known_recipes, last_used
+    """Recipes that have run or are published, `RECIPE/STAGE`, and, once something is typed, keys."""
+    from iowbc.commands.named import nameable
 
     store = _store()
-    used = {name: last_used(store, name) for name in known_recipes(store)}
-    stages = [f"{name}/{stage}" for name, found in used.items() for stage in found]
-    keys = [folder.name for folder in store.runs.store.glob("*/*")] if incomplete else []
-    return _beginning(incomplete, [*used, *stages, *keys])
+    known = nameable(store)
+    stages = [f"{name}/{stage}" for name, found in known.items() for stage in found]
+    keys = [found.manifest.key for found in store.artifacts()] if incomplete else []
+    return _beginning(incomplete, [*known, *stages, *keys])
 
 
 def stages(incomplete: str) -> list[str]:

@@ -37,7 +37,7 @@ def list_artifacts(store: Store, console: Console, stage: str | None, as_json: b
         table.add_row(
             manifest.stage,
             manifest.key[:KEY_LENGTH],
-            ", ".join(users.get(manifest.key, ["(published)" if artifact.published else "-"])),
+            ", ".join(users.get(manifest.key, [f"{manifest.recipe} (published)" if artifact.published else "-"])),
             ago(manifest.made),
             duration(manifest.seconds),
             size(artifact.size),

@@ -70,6 +70,12 @@ def known_recipes(store: Store) -> list[str]:
     return sorted(path.stem for path in store.runs.recipes.glob("*.json"))
 
 
+def nameable(store: Store) -> dict[str, tuple[str, ...]]:
+    """By the name of each recipe that `named` knows, alphabetically: stages that can be named with it."""
+    names = sorted({*known_recipes(store), *_published(store)})
+    return {name: tuple(_recipe(store, name, name, names).usable) for name in names}
+
+
 def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     """By stage: the artifacts that a recipe used last, as far as they are still stored."""
     found = {}
@@ -114,9 +120,10 @@ def _by_key(store: Store, prefix: str) -> Artifact:
     if len(prefix) >= SHORTEST_PREFIX and found:
         keys = ", ".join(f"{artifact.manifest.stage} {artifact.manifest.key[:12]}" for artifact in found)
         raise UsageError(f"'{prefix}' is the beginning of several keys: {keys}")
-    recipes = known_recipes(store)
+    recipes = [*nameable(store)]
     raise UsageError(
-        f"'{prefix}' is neither a recipe that has run in {store.runs.root} ({', '.join(recipes) or 'none has'}), "
+        f"'{prefix}' is neither a recipe that has run or is published in {store.runs.root} "
+        f"({', '.join(recipes) or 'none is'}), "
         f"nor RECIPE/STAGE, nor the first {SHORTEST_PREFIX} or more characters of a key; `iowbc ls` lists them"
         f"{nearest(prefix, recipes)}"
     )

@@ -1,16 +1,33 @@
-"""What the learning curves are called in figures, with units."""
+"""What the learning curves are called in figures and reports, with units."""
 
 TITLES = {
     "episode_seconds": "length of an episode [s]",
     "terminations/fallen": "episodes that end in a fall [share]",
+    "episode_return": "reward of an episode",
     "terminations/dropped": "episodes that end in a drop [share]",
+    "terminations/diverged": "episodes that diverge [share]",
+    "terminations/lagging": "episodes that end for lagging [share]",
+    "terminations/time_limit": "episodes that reach their end [share]",
+    "tracking": "tracking of the command [share of the best]",
+    "infeasible_pushes": "pushes that nobody could make [share]",
+    "divergences": "simulations that diverged",
+    "rollbacks": "returns to the best policy",
     "reward": "reward [1/s]",
     "curriculum_level": "level, mean of all axes",
     "check/score": "score of the check",
     "check/survived": "trials of the check survived [share]",
-    "check/E_v": "E_v in the check [m/s]",
+    "check/succeeded": "trials of the check that succeed [share]",
+    "check/upright": "time upright in the check [share]",
+    "check/weight_in_hands": "weight in the hands in the check [share]",
     "check/transport": "way covered in the check [share]",
+    "check/E_v": "E_v in the check [m/s]",
+    "check/E_psi": "E_ψ in the check [rad]",
+    "check/E_alpha": "E_α in the check [rad]",
+    "check/E_h": "E_h in the check [m]",
     "train/kl": "KL divergence of an update [nat]",
+    "train/approx_kl": "KL divergence of an update, sampled [nat]",
+    "train/policy_loss": "loss of the policy",
+    "train/value_loss": "loss of the value",
     "train/clip_share": "samples clipped [share]",
     "train/learning_rate": "step size",
     "train/std": "standard deviation of the action",
@@ -29,12 +46,19 @@ FAMILIES = {
     "level/": "level of {}",
     "falls/": "falls, {} [share of episodes]",
     "reward/": "reward of {} [1/s]",
+    "seconds/": "time of an update, {} [s]",
 }
 """By the beginning of the name; the rest takes the place of the braces."""
+ERROR_UNITS = {"velocity": "m/s", "heading": "rad", "height": "m", "pitch": "rad"}
+"""Units of `error/<scene>/<standing or walking>/<error>`."""
 
 
 def title_of(name: str) -> str:
     """Title of a panel; a name that is not listed is its own."""
+    family, _, rest = name.partition("/")
+    if family == "error" and rest.count("/") == 2:
+        scene, kind, error = rest.split("/")
+        return f"error of {error}, {scene}, {kind} [{ERROR_UNITS[error]}]"
     for beginning, title in FAMILIES.items():
         if name.startswith(beginning):
             return title.format(name.removeprefix(beginning))

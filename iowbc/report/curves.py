@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.learning.curve_titles import title_of
+from iowbc.learning.curves import TABLE
 from iowbc.report.runs import Group
 
 Values = NDArray[np.float64]
@@ -19,22 +21,18 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 """Colours that colour-blind readers tell apart (Okabe and Ito), one for each group."""
 BAND = "33"
 """Opacity of a band, as the last two digits of its colour."""
-LEARNING: Mapping[str, Mapping[str, str]] = {
-    "teacher": {
-        "reward": "reward of a step",
-        "episode_seconds": "length of an episode [s]",
-        "terminations/fallen": "episodes that end in a fall",
-        "curriculum_level": "level of the curriculum",
-        "check/score": "score of the check",
-        "check/E_v": "E_v in the check [m/s]",
-    },
-    "distill": {
-        "kl": "KL divergence to the teacher",
-        "action_agreement": "agreement with the teacher's action",
-        "episode_seconds": "length of an episode [s]",
-    },
+LEARNING: Mapping[str, tuple[str, ...]] = {
+    "teacher": (
+        "reward",
+        "episode_seconds",
+        "terminations/fallen",
+        "curriculum_level",
+        "check/score",
+        "check/E_v",
+    ),
+    "distill": ("kl", "action_agreement", "episode_seconds"),
 }
-"""The curves of each stage that are always shown, and what they are called; all others can be unfolded."""
+"""The curves of each stage that are always shown; all others can be unfolded."""
 ERRORS = {
     "rate": "success rate",
     "E_v": "E_v [m/s]",
@@ -69,14 +67,14 @@ def learning_panels(groups: Sequence[Group], stage: str) -> tuple[list[Panel], l
         [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
     ]
     names = dict.fromkeys(name for group in found for columns in group for name in columns if name != "step")
-    titles = LEARNING.get(stage, {})
-    panels = {name: Panel(titles.get(name, name)) for name in [*titles, *names] if name in names}
+    first = LEARNING.get(stage, ())
+    panels = {name: Panel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
             curves = [_thinned(columns["step"] / 1e6, columns[name]) for columns in runs if name in columns]
             panel.traces += _band(group.label, place, *_joined(curves)) if curves else []
-    return [panel for name, panel in panels.items() if name in titles], [
-        panel for name, panel in panels.items() if name not in titles
+    return [panel for name, panel in panels.items() if name in first], [
+        panel for name, panel in panels.items() if name not in first
     ]
 
 
@@ -97,7 +95,7 @@ def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
 
 def _columns(folder: Path) -> dict[str, Values]:
     """The columns of an artifact's learning curves; a value that a row lacks is NaN."""
-    path = folder / "tables" / "learning_curves.csv"
+    path = folder / TABLE
     if not path.is_file():
         return {}
     with path.open(newline="") as file:

@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 
+from iowbc.learning.curves import FIGURE
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.report.curves import Panel, evaluation_panels, learning_panels
@@ -92,7 +93,10 @@ def _address(content: bytes, kind: str) -> str:
 
 
 def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
-    """Whose it is, name, and content as a data address of every film or picture, each artifact once."""
+    """Whose it is, name, and content as a data address of every film or picture, each artifact once.
+
+    The picture of the learning curves is left out: the page draws them.
+    """
     seen = set()
     for run in runs:
         for stage, artifact in run.artifacts.items():
@@ -100,7 +104,7 @@ def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
                 continue
             seen.add(artifact.manifest.key)
             for path in sorted((artifact.folder / folder).glob("*")):
-                if path.suffix in KINDS:
+                if path.suffix in KINDS and path != artifact.folder / FIGURE:
                     yield f"{run.label}, {stage}", path.name, _address(path.read_bytes(), path.suffix)
 
 
@@ -111,13 +115,13 @@ def _beside(artifact: Artifact) -> list[tuple[str, str]]:
 
 
 def _table(markdown: str) -> str:
-    """A Markdown table as HTML, with its caption."""
+    """A Markdown table as HTML, which may be scrolled sideways, below its caption, which is not."""
     lines = markdown.splitlines()
     caption = next((line.strip("*") for line in lines if line.startswith("*")), "")
     rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines if line.startswith("|")]
-    parts = [f"<caption>{html.escape(caption)}</caption>"]
+    parts = []
     for place, row in enumerate(rows):
         if place != 1:
             kind = "th" if place == 0 else "td"
             parts.append("<tr>" + "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in row) + "</tr>")
-    return f"<table>{''.join(parts)}</table>"
+    return f'<p class="caption">{html.escape(caption)}</p><div class="wide"><table>{"".join(parts)}</table></div>'

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from iowbc import open_artifact
+from iowbc.commands import completion
 from iowbc.commands.export import exported_folder as exported_by
 from iowbc.commands.named import named
 from iowbc.commands.play import playable
@@ -52,11 +53,18 @@ def test_a_recipe_that_is_named_like_a_part_of_runs_has_no_links(folder: Path, c
     assert not any(path.is_symlink() for path in (folder / "runs" / "store").iterdir())
 
 
-def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(folder: Path, command: Command) -> None:
+def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(
+    folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert command("publish", "first.yaml").returncode == 0
     for name in ("store", "recipes", "first", "second"):
         shutil.rmtree(folder / "runs" / name)
     assert "teacher" in command("show", "first").stdout
+    assert "did you mean 'first'?" in command("show", "frist").stderr
+    assert "first (published)" in command("ls").stdout
+    monkeypatch.chdir(folder)
+    assert completion.ran("") == ["first"]
+    assert completion.artifacts("first/t") == ["first/teacher"]
     assert open_artifact("first/export", folder / "runs").published
 
 

@@ -63,3 +63,9 @@ def test_the_figure_leaves_out_what_was_never_recorded(tmp_path: Path) -> None:
     curves.write_csv(tmp_path / "curves.csv")
     assert (tmp_path / "figure.png").stat().st_size > 2000
     assert (tmp_path / "curves.csv").read_text().splitlines() == ["step,reward,late", "10,1.0,", "20,2.0,1.0"]
+
+
+def test_every_figure_that_a_published_training_recorded_has_a_title() -> None:
+    for table in (Path(__file__).parents[2] / "runs" / "published").glob("*/*/tables/learning_curves.csv"):
+        names = table.read_text().splitlines()[0].split(",")[1:]
+        assert [name for name in names if title_of(name) == name] == []

@@ -94,7 +94,7 @@ def test_metrics_of_a_stage_stand_together_also_those_that_only_a_later_run_has(
 
 def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) -> None:
     main, others = learning_panels(grouped(runs), "teacher")
-    assert [panel.title for panel in main] == ["reward of a step", "score of the check"]
+    assert [panel.title for panel in main] == ["reward [1/s]", "score of the check"]
     assert others == []
     low, high, mean, other = main[0].traces
     assert (low["line"]["width"], high["fill"], mean["name"], other["name"]) == (
@@ -106,6 +106,17 @@ def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) 
     assert len(mean["x"]) == MOST_POINTS
     np.testing.assert_allclose(mean["y"], 2.0 * 1e6 * np.array(mean["x"]), rtol=1e-4)
     np.testing.assert_allclose(high["y"], 3.0 * 1e6 * np.array(mean["x"]), rtol=1e-4)
+
+
+def test_every_curve_of_a_training_has_a_title_with_its_unit(runs: list[Run]) -> None:
+    table = runs[0].artifacts["teacher"].folder / "tables" / "learning_curves.csv"
+    table.write_text("step,reward,error/lift/walking/velocity,seconds/learning,own\n0,1,2,3,4\n")
+    _, others = learning_panels(grouped(runs[:1]), "teacher")
+    assert [panel.title for panel in others] == [
+        "error of velocity, lift, walking [m/s]",
+        "time of an update, learning [s]",
+        "own",
+    ]
 
 
 def test_errors_over_the_mass_have_their_intervals_and_gaps_where_nobody_survived(runs: list[Run]) -> None:
@@ -129,8 +140,19 @@ def test_the_main_tables_are_shown_at_once_and_the_others_folded(runs: list[Run]
     text = written(runs, tmp_path).read_text()
     shown, _, folded = text.partition("<summary>1 more table</summary>")
     assert "<td>main</td>" in shown
+    assert '<p class="caption">A caption.</p><div class="wide"><table><tr>' in shown
     assert "<td>folded</td>" in folded.partition("</details>")[0]
     assert split_tables({"joints": "a", "heavy": "b", "lifting": "c", "pushes": "d"}) == (["c", "b"], ["a", "d"])
+
+
+def test_the_picture_of_curves_that_the_page_draws_is_left_out(runs: list[Run], tmp_path: Path) -> None:
+    pictures = runs[0].artifacts["teacher"].folder / "figures"
+    pictures.mkdir(exist_ok=True)
+    for name in ("learning_curves.png", "other.png"):
+        (pictures / name).write_bytes(b"picture")
+    text = written(runs, tmp_path).read_text()
+    assert "first, teacher: other.png</figcaption>" in text
+    assert "learning_curves.png</figcaption>" not in text
 
 
 def test_what_shows_all_runs_comes_first(runs: list[Run], tmp_path: Path) -> None:
