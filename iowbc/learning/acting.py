@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from iowbc.learning.history import History
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import Network, load_network
+from iowbc.rollouts.history import History
 
 
 class Policy(Protocol):

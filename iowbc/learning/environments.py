@@ -6,9 +6,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.trajectories import Trajectories
+
 
 class Environments(Protocol):
-    """A stable-baselines3 vector environment that can be stopped and continued; `VectorEnv` of the task is one."""
+    """A stable-baselines3 vector environment that makes whole rollouts, and can be stopped and continued; `VectorEnv`
+    of the task is one."""
 
     num_envs: int
     observation_space: Any
@@ -17,10 +21,8 @@ class Environments(Protocol):
     def reset(self) -> NDArray[np.float32]:
         """Observations, (num_envs, size), at the beginning of an episode everywhere."""
 
-    def step(
-        self, actions: NDArray[Any]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Observations, rewards, dones and infos of a control step."""
+    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
+        """Lets a pilot drive for some control steps."""
 
     def statistics(self) -> dict[str, float]:
         """Figures since the last call."""

@@ -1,6 +1,7 @@
 """Environments that deliver the history of what they observe: rows of H_t, oldest first, with s_priv behind."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from iowbc.learning.history import History
+from iowbc.rollouts.history import History
+from iowbc.rollouts.pilots import Explorer, Past
+from iowbc.rollouts.trajectories import Trajectories
 
 
 class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
@@ -31,13 +34,32 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
         """As the environments' own; the last observation of an episode comes with the history before it."""
         row, rewards, dones, infos = self.venv.step_wait()
         for index in np.flatnonzero(dones).tolist():
-            last = infos[index]["terminal_observation"]
-            past = self._history.frames[index, 1:].ravel()
-            infos[index]["terminal_observation"] = np.concatenate([past, last]).astype(np.float32)
+            infos[index]["terminal_observation"] = self._last_row(index, infos[index]["terminal_observation"])
         return self._rows(row, dones), rewards, dones, infos
 
+    def roll(self, pilot: Explorer, steps: int) -> Trajectories:
+        """See `Environments`; the pilot sees histories, which the rows of its trajectories then are."""
+        past = Past(self._history.frames, np.zeros(self.num_envs, np.bool_))
+        found: Trajectories = self.venv.roll(replace(pilot, past=past), steps)
+        rows = np.empty((steps + 1, self.num_envs, *self.observation_space.shape), np.float32)
+        last = np.empty((len(found.cut), rows.shape[2]), np.float32)
+        rows[0] = self._beside(self._history.frames, found.observation[0])
+        for step in range(steps):
+            for place in np.flatnonzero(found.cut[:, 0] == step):
+                last[place] = self._last_row(found.cut[place, 1], found.cut_observation[place])
+            rows[step + 1] = self._rows(found.observation[step + 1], found.ended[step])
+        return replace(found, observation=rows, cut_observation=last)
+
+    def _last_row(self, index: int, last: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The row of an environment whose episode ends with an observation."""
+        past = self._history.frames[index, 1:].ravel()
+        return np.concatenate([past, last]).astype(np.float32)
+
     def _rows(self, row: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
-        frames = self._history.push(row[:, : self._size], starts)
+        return self._beside(self._history.push(row[:, : self._size], starts), row)
+
+    def _beside(self, frames: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Histories with s_priv behind."""
         return np.concatenate([frames.reshape(len(row), -1), row[:, self._size :]], axis=1)
 
     def statistics(self) -> dict[str, float]:

@@ -45,13 +45,15 @@ class Normalization:
         self.frozen = False
         """Whether the statistics of observations are kept as they are."""
 
-    def observe(self, observations: NDArray[np.float32], into: Normalizer) -> None:
-        """Take observations, (n, size), into account, and let the normaliser use what is known by now."""
-        if self.frozen:
-            return
-        self.observations.update(observations)
-        into.mean.copy_(torch.from_numpy(self.observations.mean))
-        into.std.copy_(torch.from_numpy(np.sqrt(self.observations.var + VARIANCE_FLOOR)))
+    def observe(self, observations: NDArray[np.float32]) -> None:
+        """Take observations, (n, size), into account."""
+        if not self.frozen:
+            self.observations.update(observations)
+
+    def move(self, normalizer: Normalizer) -> None:
+        """Let the normaliser use what is known by now."""
+        normalizer.mean.copy_(torch.from_numpy(self.observations.mean))
+        normalizer.std.copy_(torch.from_numpy(np.sqrt(self.observations.var + VARIANCE_FLOOR)))
 
     def reward(self, rewards: NDArray[np.float32], ended: NDArray[np.bool_]) -> NDArray[np.float32]:
         """Rewards (n,) of a step in standard deviations of the return; `ended`: environments whose episode ends."""

@@ -16,6 +16,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from torch import Tensor
 
+from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirror_as_json
@@ -26,6 +27,9 @@ from iowbc.learning.rollout import Rollout
 from iowbc.learning.side_by_side import SideBySide
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
 from iowbc.recipe.teacher import Teacher
+from iowbc.rollouts.blocks import block_size
+from iowbc.rollouts.pilots import Explorer
+from iowbc.rollouts.trajectories import Trajectories
 
 FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 """Means over minibatches: of all, and of the last epoch's for the two divergences."""
@@ -62,49 +66,49 @@ class Learner(PPO):  # type: ignore[misc]
         self.seconds[part] += time.perf_counter() - begin
 
     def collect_rollouts(self, env: Any, callback: Any, rollout_buffer: Rollout, n_rollout_steps: int) -> bool:
-        """See stable-baselines3; observations and rewards of `env` are raw."""
-        policy, columns = self.policy, rollout_buffer.columns
+        """See stable-baselines3; observations and rewards of `env` are raw. The environments make the whole rollout
+        themselves; what they saw before it moves the normalisation of this one."""
+        policy = self.policy
         policy.set_training_mode(False)
         callback.on_rollout_start()
         self.normalization.frozen = self.num_timesteps >= self.settings.statistics_until
-        low, high = self.action_space.low, self.action_space.high
-        cut: list[tuple[int, int, Any]] = []
-        observation = self._last_obs
-        for step in range(n_rollout_steps):
-            with self._timed("inference"), torch.inference_mode():
-                self.normalization.observe(policy.normalizer.newest(observation), policy.normalizer)
-                prepared = policy.prepared(torch.from_numpy(observation))
-                mean = policy.actor.head(policy.actor.hidden(prepared))
-                action = mean + torch.randn_like(mean) * torch.exp(policy.log_std)
-                columns["observation"][step], columns["action"][step] = prepared, action
-            with self._timed("simulation"):
-                observation, reward, ended, infos = env.step(np.clip(action.numpy(), low, high))
-            rollout_buffer.rewards[step] = self.normalization.reward(reward, ended)
-            rollout_buffer.ended[step] = ended
-            for index in np.flatnonzero(ended).tolist():
-                if infos[index].get("TimeLimit.truncated", False):
-                    cut.append((step, index, infos[index]["terminal_observation"]))
-            self.num_timesteps += env.num_envs
-            callback.update_locals({"infos": infos, "dones": ended})
-            if not callback.on_step():
-                return False
-        self._last_obs = observation
-        self._last_episode_starts = ended
+        with self._timed("simulation"), torch.inference_mode():
+            self.normalization.move(policy.normalizer)
+            noise = torch.randn(n_rollout_steps, env.num_envs, self.action_space.shape[0]) * torch.exp(policy.log_std)
+            pilot = Explorer(acting_policy(policy), noise.numpy(), block_size(env.num_envs))
+            found = env.roll(pilot, n_rollout_steps)
+        self.seconds["simulation"] -= found.acting
+        self.seconds["inference"] += found.acting
+        self.num_timesteps += n_rollout_steps * env.num_envs
+        self._last_obs = found.observation[-1]
         with self._timed("learning"):
-            self._look_back(rollout_buffer, cut)
+            self._look_back(rollout_buffer, found)
         callback.on_rollout_end()
         return True
 
-    def _look_back(self, rollout: Rollout, cut: list[tuple[int, int, Any]]) -> None:
-        """What policy and value were during a rollout, and its advantages; `cut`: where time limits ended episodes."""
+    def _look_back(self, rollout: Rollout, found: Trajectories) -> None:
+        """What policy and value were during a rollout, and its advantages."""
+        columns, shape = rollout.columns, found.reward.shape
+        rows = found.observation[:-1].reshape(shape[0] * shape[1], -1)
+        prepared = torch.cat(self.side_by_side(self._prepare, torch.from_numpy(rows)))
+        columns["observation"].copy_(prepared.view(*shape, -1))
+        columns["action"].copy_(torch.from_numpy(found.action))
         self.side_by_side(self._judge, rollout.flat)
-        behind = np.concatenate([self._last_obs, *(observation[None] for _, _, observation in cut)])
+        for step, (reward, ended) in enumerate(zip(found.reward, found.ended, strict=True)):
+            rollout.rewards[step] = self.normalization.reward(reward, ended)
+        rollout.ended[:] = found.ended
+        behind = np.concatenate([found.observation[-1], found.cut_observation])
         with torch.inference_mode():
             values = self.policy.predict_values(torch.from_numpy(behind))[:, 0].numpy()
-        for (step, index, _), value in zip(cut, values[self.n_envs :], strict=True):
-            rollout.rewards[step, index] += self.gamma * value
+        steps, environments = found.cut.T
+        rollout.rewards[steps, environments] += self.gamma * values[self.n_envs :]
         rollout.finish(values[: self.n_envs], self.gamma, self.gae_lambda)
-        self.explained = explained_variance(rollout.columns["value"], rollout.columns["target"])
+        self.explained = explained_variance(columns["value"], columns["target"])
+        self.normalization.observe(self.policy.normalizer.newest(rows))
+
+    def _prepare(self, rows: Tensor) -> Tensor:
+        with torch.inference_mode():
+            return self.policy.prepared(rows)
 
     def _judge(self, samples: Tensor) -> None:
         """Writes the policy's mean, the density of the action and the value into rows of samples."""

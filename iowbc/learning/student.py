@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from iowbc.learning import checkpoint
-from iowbc.learning.acting import TeacherPolicy
+from iowbc.learning.as_numpy import student_policy, teacher_policy
 from iowbc.learning.distillation import Experience, mirror_half, spread
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.environments import Environments
-from iowbc.learning.history import History
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
 from iowbc.processes import keep_freed_memory
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
+from iowbc.rollouts.blocks import block_size
+from iowbc.rollouts.history import History
+from iowbc.rollouts.pilots import Apprentice, Past
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class StudentTraining:
         torch.manual_seed(seed)
         keep_freed_memory()
         self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
-        self.teacher = TeacherPolicy(teacher)
+        self.teacher = teacher_policy(teacher)
         size, actions = rows.observation.stop, environments.action_space.shape[0]
         mirrors = [mirror_as_json(rows.observation_mirror), mirror_as_json(rows.action_mirror)]
         inherits = settings.start == "teacher"
@@ -134,28 +136,28 @@ class StudentTraining:
 
     def _rollout(self, teacher_share: float) -> tuple[np.floating[Any], np.floating[Any]]:
         """Lets the student drive, the teacher in its share; mean squares of student's error and teacher's action."""
+        rows, history = self.rows, self.history
         if self.observation is None:
             self.observation = self.environments.reset()
-        errors, squares = [], []
-        for _ in range(self.settings.rollout):
-            frame = self.observation[:, self.rows.observation]
-            target = self.teacher.act(frame, self._told(self.observation[:, self.rows.privileged]))
-            facts = (self.observation[:, self.rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
-            frames = self.history.push(frame, self.starts)
-            with torch.inference_mode():
-                action = self.network(torch.from_numpy(frames)).numpy()
-            self.experience.add(frame, np.concatenate([target, facts], axis=1), self.starts)
-            errors.append(np.mean((action - target) ** 2))
-            squares.append(np.mean(target**2))
-            driven = np.where((self.teacher_drives < teacher_share)[:, None], target, action)
-            self.observation, _, self.starts, _ = self.environments.step(driven)
-        return np.mean(errors), np.mean(squares)
-
-    def _told(self, privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        """s_priv (n, P) as the teacher is told it: what is withheld is at its mean."""
-        withheld, told = self.rows.withheld, privileged.copy()
-        told[:, withheld] = self.teacher.network.normalizer.mean[self.rows.privileged][withheld]
-        return told
+        pilot = Apprentice(
+            student=student_policy(self.network),
+            teacher=self.teacher,
+            observation=rows.observation,
+            privileged=rows.privileged,
+            untold=rows.privileged.start + rows.withheld,
+            taught=self.teacher_drives < teacher_share,
+            block=block_size(len(self.starts)),
+            past=Past(history.frames, self.starts),
+        )
+        found = self.environments.roll(pilot, self.settings.rollout)
+        facts = (found.observation[:-1][..., rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
+        frames, targets = found.observation[:-1, :, rows.observation], found.told["answer"]
+        for frame, target, fact, ended in zip(frames, targets, facts, found.ended, strict=True):
+            self.experience.add(frame, np.concatenate([target, fact], axis=1), self.starts)
+            history.push(frame, self.starts)
+            self.starts = ended
+        self.observation = found.observation[-1]
+        return np.mean((found.told["own"] - targets) ** 2), np.mean(targets**2)
 
     def _gradient_step(self) -> dict[str, float]:
         """One step, of a gradient no larger than the recipe's, down the loss; its figures as they were before."""

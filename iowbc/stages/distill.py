@@ -88,6 +88,6 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("student.safetensors", "student.json"),
-    packages=("stages.distill", "stages.training", "learning", *ENVIRONMENTS),
+    packages=("stages.distill", "stages.training", "learning", "rollouts", *ENVIRONMENTS),
     counts=("distill.steps",),
 )

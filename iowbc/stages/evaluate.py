@@ -156,7 +156,7 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("*.parquet",),
-    packages=("stages.evaluate", "evaluation", "deploy", "learning", *ENVIRONMENTS),
+    packages=("stages.evaluate", "evaluation", "deploy", "learning", "rollouts", *ENVIRONMENTS),
     counts=("eval.trials",),
     spreads=True,
 )

@@ -131,5 +131,5 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("policy.onnx", "contract.json", "golden.npz"),
-    packages=("stages.export", "export", "deploy", "evaluation", "learning", *ENVIRONMENTS),
+    packages=("stages.export", "export", "deploy", "evaluation", "learning", "rollouts", *ENVIRONMENTS),
 )

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from iowbc.arrays import Array, Indices, as_slice
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.robot.description import load_robot
+from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.trajectories import Trajectories, roll
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import MeasuredState
 from iowbc.task.endings import Ending
@@ -141,6 +143,10 @@ class Batch:
         memory.action[:] = action
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)
+
+    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
+        """Lets a pilot of these environments drive for some control steps."""
+        return roll(self, pilot, steps)
 
     def _finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""

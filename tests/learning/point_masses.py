@@ -9,6 +9,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap
+from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.trajectories import Trajectories, roll
 
 MIRRORS = (
     MirrorMap(np.array([0, 1, 2]), np.array([-1, -1, 1], np.float32)),
@@ -57,6 +59,9 @@ class PointMasses(VecEnv):  # type: ignore[misc]
         self.masses[ended], self.age[ended] = self.start[ended], 0
         return self.observed(), reward, ended, infos
 
+    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
+        return roll(Buffered(self), pilot.part(0, 8), steps)
+
     def statistics(self) -> dict[str, float]:
         mean = self.total[0] / max(self.total[1], 1)
         self.total[:] = 0.0
@@ -76,3 +81,17 @@ class PointMasses(VecEnv):  # type: ignore[misc]
     def env_method(self, name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any: ...
     def env_is_wrapped(self, wrapper: Any, indices: Any = None) -> Any:
         return [False] * 8
+
+
+class Buffered:
+    """The masses as their rollouts are made."""
+
+    def __init__(self, masses: PointMasses) -> None:
+        self.masses = masses
+        self.buffers: dict[str, Any] = {"observation": masses.observed(), "action": np.zeros((8, 1), np.float32)}
+
+    def step(self) -> None:
+        observation, reward, ended, infos = self.masses.step(self.buffers["action"].clip(-1, 1))
+        last = np.stack([info.get("terminal_observation", row) for info, row in zip(infos, observation, strict=True)])
+        self.buffers |= {"observation": observation, "reward": reward, "done": ended, "truncated": ended}
+        self.buffers["terminal_observation"] = last

@@ -1,8 +1,8 @@
 import numpy as np
 
 from iowbc.learning.distillation import Experience, mirror_half, spread
-from iowbc.learning.history import History
 from iowbc.robot.mirror import MirrorMap
+from iowbc.rollouts.history import History
 
 
 def test_a_sampled_history_is_the_one_that_the_student_saw() -> None:

@@ -10,13 +10,16 @@ from point_masses import MIRRORS, PointMasses
 from point_masses import SETTINGS as POINT_MASSES
 
 from iowbc.learning.acting import StudentPolicy, policy_of
+from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.history_environments import HistoryEnvironments
+from iowbc.learning.networks import StudentNetwork
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.learning.unfinished import unfinished_policy
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
+from iowbc.rollouts.pilots import Explorer
 
 SEEN, LENGTH = 2, 4
 """Of a mass its position and velocity are observed; the distance is privileged."""
@@ -48,6 +51,21 @@ def test_the_history_ends_with_the_newest_observation_and_an_episode_with_its_ow
             rows[goes_on, : (LENGTH - 1) * SEEN], before[goes_on, SEEN : LENGTH * SEEN], "shifted by one"
         )
         before = rows
+
+
+def test_the_rows_of_a_rollout_are_those_of_its_steps() -> None:
+    whole, single = (HistoryEnvironments(PointMasses(), SEEN, LENGTH) for _ in range(2))
+    student = student_policy(StudentNetwork(SEEN, LENGTH, 1, 8, 8, (16,), "elu", 10.0))
+    noise = np.random.default_rng(0).normal(size=(30, 8, 1)).astype(np.float32)
+    np.testing.assert_array_equal(whole.reset(), single.reset())
+    for _ in range(2):
+        found = whole.roll(Explorer(student, noise, 1), 30)
+        last = []
+        for step in range(30):
+            rows, _, ended, infos = single.step(found.action[step].clip(-1, 1))
+            np.testing.assert_array_equal(found.observation[step + 1], rows)
+            last += [infos[index]["terminal_observation"] for index in np.flatnonzero(ended)]
+        np.testing.assert_array_equal(found.cut_observation, last)
 
 
 @pytest.mark.parametrize("symmetry", ["construction", "none"])

@@ -7,6 +7,7 @@ import torch
 from point_masses import MIRRORS, SETTINGS, PointMasses
 
 from iowbc.learning import ppo
+from iowbc.learning.gaussian import log_density
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
@@ -130,6 +131,29 @@ def test_the_statistics_of_observations_are_kept_once_they_are_frozen() -> None:
     after = some.model.normalization.arrays()
     for name in ("observation_mean", "observation_variance", "return_variance"):
         np.testing.assert_array_equal(before[name], after[name])
+
+
+def test_what_a_rollout_saw_moves_the_normalisation_of_the_next_one_and_nothing_of_its_own() -> None:
+    some = training()
+    for _ in range(3):
+        before = some.model.normalization.arrays()["observation_mean"]
+        some.update()
+        used, after = some.model.policy.normalizer.mean.numpy(), some.model.normalization.arrays()["observation_mean"]
+        np.testing.assert_allclose(used, before, rtol=1e-6)
+        assert abs(after - before).max() > 1e-3
+
+
+def test_the_policy_that_acts_in_a_rollout_is_the_one_that_is_judged() -> None:
+    some = training()
+    for _ in range(3):
+        before = some.model.policy.log_std.detach().clone()
+        some.update()
+    columns = some.model.rollout_buffer.columns
+    noise = (columns["action"] - columns["mean"]) / before.exp()
+    assert abs(float(noise.mean())) < 0.2
+    assert 0.8 < float(noise.std()) < 1.2
+    expected = log_density(columns["action"], columns["mean"], before)
+    torch.testing.assert_close(columns["log_density"], expected)
 
 
 def test_the_true_divergence_of_an_update_comes_near_the_desired_one() -> None:

@@ -80,6 +80,16 @@ def test_a_student_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(
     assert rows(tmp_path / "work") == rows(trained / "distill" / "work")
 
 
+def test_both_stages_learn_the_same_with_any_number_of_workers(trained: Path, tmp_path: Path) -> None:
+    inputs = {"teacher": trained / "teacher" / "out"}
+    for stage, network, reads in ((teacher.STAGE, "teacher", None), (distill.STAGE, "student", inputs)):
+        job = make_job(tmp_path / stage.name, small_recipe(), inputs=reads, workers=2)
+        stage.run(job)
+        name = f"{network}.safetensors"
+        assert (job.out / name).read_bytes() == (trained / stage.name / "out" / name).read_bytes(), name
+        assert rows(job.work) == rows(trained / stage.name / "work")
+
+
 def test_both_stages_leave_a_policy_its_layout_and_its_curves(trained: Path) -> None:
     for stage, network in (("teacher", "teacher"), ("distill", "student")):
         out = trained / stage / "out"

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
 from iowbc.evaluation.trials.rollout import Acting, play_episodes
 from iowbc.learning.acting import StudentPolicy
-from iowbc.learning.history import History
 from iowbc.recipe.recipe import Recipe
+from iowbc.rollouts.history import History
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 

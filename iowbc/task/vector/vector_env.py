@@ -13,6 +13,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
+from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.trajectories import Trajectories, side_by_side
 from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
@@ -115,6 +117,11 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         for index in np.flatnonzero(done).tolist():
             infos[index] = self._ending(index)
         return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
+
+    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
+        """Lets a pilot drive for some control steps, each group of environments where it is: one message to each worker
+        and one back. What comes of it does not depend on the workers."""
+        return side_by_side(self._call("roll", [(pilot.part(*group), steps) for group in self.workers.groups]))
 
     def _ending(self, index: int) -> dict[str, Any]:
         """What stable-baselines3 wants to know of an episode's end, and why it ended."""

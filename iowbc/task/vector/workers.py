@@ -18,9 +18,11 @@ from typing import Any, Protocol
 
 from iowbc.errors import WorkerFailed
 from iowbc.processes import SINGLE_THREADED
+from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.batch import Batch
+from iowbc.task.record.signals import COUNTERS
 from iowbc.task.vector import worker
-from iowbc.task.vector.setup import Setup, shares
+from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import Buffers, create_shared, private_buffers
 
 STARTING = 300.0
@@ -29,6 +31,8 @@ LEAVING = 2.0
 """How long workers may take to leave by themselves [s]."""
 SLICE = 0.5
 """Patience is counted in waits of this length [s], so that a suspended machine does not use it up."""
+STEPS = COUNTERS.index("steps")
+"""Column of the counters that tells that a worker is at it."""
 DUMPING = 0.5
 """Time that a hung worker gets to write down where it is [s]."""
 
@@ -87,7 +91,7 @@ class WorkerProcesses:
 
     def __init__(self, setup: Setup, count: int, patience: float) -> None:
         """`patience`: how long a request may take before a worker counts as hung [s]."""
-        self.groups = shares(setup.count, min(count, setup.count))
+        self.groups = shares_in_blocks(setup.count, count)
         self._patience = patience
         fields = setup.buffer_fields()
         memory, self.buffers = create_shared(fields, setup.count)
@@ -142,14 +146,21 @@ class WorkerProcesses:
         self._ended()
 
     def _wait(self, patience: float) -> None:
-        left = patience
+        """Until all have answered. One that is at a rollout has `patience` for each step."""
+        left, steps = patience, self._steps()
         while self._asked:
             ready = {self._pipes[pipe] for pipe, _ in self._poll.poll(1e3 * SLICE)}
             for index in sorted(ready & self._asked):
                 self._receive(index)
-            left -= 0.0 if ready else SLICE
+            before, steps = steps, self._steps()
+            left = patience if steps != before else left - (0.0 if ready else SLICE)
             if left <= 0.0 and self._asked:
                 self._fail(min(self._asked), hung=patience)
+
+    def _steps(self) -> float:
+        """Control steps that the environments of those who are asked have made since they were last counted."""
+        rows = [slice(*self.groups[index]) for index in self._asked]
+        return float(sum(self.buffers["counters"][row, STEPS].sum() for row in rows))
 
     def _receive(self, index: int) -> None:
         try:

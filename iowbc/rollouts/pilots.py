@@ -1,0 +1,125 @@
+"""Who drives environments through a rollout. A pilot is a message: it is sent to where the environments are."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol, Self
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices, Mask
+from iowbc.rollouts.blocks import in_blocks
+from iowbc.rollouts.history import History
+from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
+
+Decision = tuple[Array, Mapping[str, Array]]
+"""The action, (n, A), and what is recorded beside it, (n, ...) by name."""
+
+
+class Pilot(Protocol):
+    """Drives n environments through one rollout."""
+
+    @property
+    def starts(self) -> Mask:
+        """Environments whose episode begins with the first row, (n,)."""
+
+    def part(self, first: int, last: int) -> "Pilot":
+        """Of the environments from `first` to `last`, the latter excluded; `first` begins a block."""
+
+    def act(self, step: int, rows: Array, starts: Mask) -> Decision:
+        """What to do, from rows (n, S); `starts`: environments whose episode begins with them, (n,)."""
+
+
+@dataclass(frozen=True)
+class Past:
+    """The observations before a rollout."""
+
+    frames: Array
+    """(n, K, S), oldest first; of these all but the first are looked at."""
+    starts: Mask
+    """Environments to which they do not matter, for an episode begins, (n,)."""
+
+    def of(self, first: int, last: int) -> "Past":
+        """Of some environments."""
+        return Past(self.frames[first:last], self.starts[first:last])
+
+    def history(self) -> History:
+        """Where they are continued."""
+        history = History(*self.frames.shape)
+        history.frames[:] = self.frames
+        return history
+
+
+@dataclass(frozen=True)
+class Explorer:
+    """A policy with exploration noise. With a past it sees the history of the first part of the rows."""
+
+    policy: RowPolicy | HistoryPolicy
+    noise: Array
+    """What is added to the mean action, (T, n, A)."""
+    block: int
+    """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
+    past: Past | None = None
+
+    @property
+    def starts(self) -> Mask:
+        """See `Pilot`."""
+        return np.zeros(self.noise.shape[1], np.bool_) if self.past is None else self.past.starts
+
+    def part(self, first: int, last: int) -> Self:
+        """See `Pilot`."""
+        past = None if self.past is None else self.past.of(first, last)
+        return replace(self, noise=self.noise[:, first:last], past=past)
+
+    @cached_property
+    def _history(self) -> History | None:
+        return None if self.past is None else self.past.history()
+
+    def act(self, step: int, rows: Array, starts: Mask) -> Decision:
+        """See `Pilot`."""
+        seen = rows
+        if self._history is not None:
+            seen = self._history.push(rows[:, : self._history.frames.shape[2]], starts)
+        return in_blocks(self.policy, self.block, seen) + self.noise[step], {}
+
+
+@dataclass(frozen=True)
+class Apprentice:
+    """A student, and a teacher that says what it would have done and drives some of the environments."""
+
+    student: HistoryPolicy
+    teacher: RowPolicy
+    observation: slice
+    """Where in a row is s_t."""
+    privileged: slice
+    """Where in a row is s_priv."""
+    untold: Indices
+    """Places in a row of what the teacher is not told: it takes each for its mean."""
+    taught: Mask
+    """Environments that the teacher drives, (n,)."""
+    block: int
+    """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
+    past: Past
+
+    @property
+    def starts(self) -> Mask:
+        """See `Pilot`."""
+        return self.past.starts
+
+    def part(self, first: int, last: int) -> Self:
+        """See `Pilot`."""
+        return replace(self, taught=self.taught[first:last], past=self.past.of(first, last))
+
+    @cached_property
+    def _history(self) -> History:
+        return self.past.history()
+
+    def act(self, step: int, rows: Array, starts: Mask) -> Decision:
+        """See `Pilot`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
+        del step
+        told = rows.copy()
+        told[:, self.untold] = self.teacher.normal.mean[self.untold]
+        told = np.concatenate([told[:, self.observation], told[:, self.privileged]], axis=1)
+        answer = in_blocks(self.teacher, self.block, told)
+        own = in_blocks(self.student, self.block, self._history.push(rows[:, self.observation], starts))
+        return np.where(self.taught[:, None], answer, own), {"own": own, "answer": answer}

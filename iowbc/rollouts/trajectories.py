@@ -1,0 +1,110 @@
+"""Many steps of many environments: what a rollout records, and how it is made."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.rollouts.pilots import Pilot
+
+
+class Stepped(Protocol):
+    """n environments that read actions from their buffers and leave there what comes of them."""
+
+    @property
+    def buffers(self) -> Any:
+        """By name `action` (n, A), `observation` and `terminal_observation` (n, S), `reward`, `done` and `truncated`
+        (n,); where an episode ended, `observation` is of the next one."""
+
+    def step(self) -> None:
+        """One control step of every environment; those that end begin anew."""
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """T steps of n environments."""
+
+    observation: Array
+    """Rows before each step and behind the last one, (T + 1, n, S)."""
+    action: Array
+    """What drove, (T, n, A)."""
+    reward: Array
+    """(T, n)."""
+    ended: Mask
+    """Where an episode ended with the step, (T, n)."""
+    cut: Array
+    """Step and environment of each episode that its time limit ended, (k, 2), in order."""
+    cut_observation: Array
+    """The last row of those episodes, (k, S)."""
+    told: Mapping[str, Array]
+    """What the pilot recorded beside, (T, n, ...) by name."""
+    acting: float
+    """Time that the policy took of it [s], the mean over those who worked side by side."""
+
+
+def roll(environments: Stepped, pilot: Pilot, steps: int) -> Trajectories:
+    """Lets a pilot drive for some steps. Raises ValueError where an action is not finite."""
+    buffers, acting = environments.buffers, 0.0
+    observations, actions, rewards, ends = [], [], [], []
+    told: list[Mapping[str, Array]] = []
+    cut: list[tuple[int, int]] = []
+    cut_off: list[Array] = []
+    starts = pilot.starts
+    for step in range(steps):
+        began = time.perf_counter()
+        observations.append(buffers["observation"].copy())
+        action, beside = pilot.act(step, observations[-1], starts)
+        _check_finite(action)
+        buffers["action"][:] = action
+        acting += time.perf_counter() - began
+        environments.step()
+        actions.append(action)
+        told.append(beside)
+        rewards.append(buffers["reward"].copy())
+        ends.append(starts := buffers["done"].copy())
+        for index in np.flatnonzero(starts & buffers["truncated"]).tolist():
+            cut.append((step, index))
+            cut_off.append(buffers["terminal_observation"][index].copy())
+    observations.append(buffers["observation"].copy())
+    return Trajectories(
+        observation=np.stack(observations),
+        action=np.stack(actions),
+        reward=np.stack(rewards),
+        ended=np.stack(ends),
+        cut=np.array(cut, np.int64).reshape(-1, 2),
+        cut_observation=np.array(cut_off, np.float32).reshape(len(cut), observations[0].shape[1]),
+        told={name: np.stack([beside[name] for beside in told]) for name in told[0]},
+        acting=acting,
+    )
+
+
+def _check_finite(action: Array) -> None:
+    wrong = np.flatnonzero(~np.isfinite(action).all(axis=1))
+    if len(wrong):
+        raise ValueError(f"actions of environments {wrong.tolist()} are not finite, the first is {action[wrong[0]]}")
+
+
+def side_by_side(parts: Sequence[Trajectories]) -> Trajectories:
+    """Trajectories of consecutive groups of environments as those of all."""
+    if len(parts) == 1:
+        return parts[0]
+    offsets = np.cumsum([0, *(part.reward.shape[1] for part in parts[:-1])])
+    cut = np.concatenate([part.cut + np.array([0, offset]) for part, offset in zip(parts, offsets, strict=True)])
+    order = np.lexsort((cut[:, 1], cut[:, 0]))
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in parts], axis=1)
+
+    return Trajectories(
+        observation=joined("observation"),
+        action=joined("action"),
+        reward=joined("reward"),
+        ended=joined("ended"),
+        cut=cut[order],
+        cut_observation=np.concatenate([part.cut_observation for part in parts])[order],
+        told={name: np.concatenate([part.told[name] for part in parts], axis=1) for name in parts[0].told},
+        acting=float(np.mean([part.acting for part in parts])),
+    )

@@ -1,0 +1,101 @@
+"""Those who drive a rollout: alike for a part of the environments, and with a memory of what was before."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iowbc.rollouts.encoders import Whole
+from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
+from iowbc.rollouts.pilots import Apprentice, Explorer, Past, Pilot
+from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
+
+ENVIRONMENTS, LENGTH, STATE, TOLD, ACTIONS, BLOCK, STEPS = 10, 4, 3, 2, 2, 2, 6
+RANDOM = np.random.default_rng(0)
+
+
+def normal(*shape: int) -> Any:
+    return RANDOM.normal(size=shape).astype(np.float32)
+
+
+def linear(inputs: int, outputs: int) -> Linear:
+    return Linear(normal(inputs, outputs), normal(outputs))
+
+
+def scale(size: int) -> Normal:
+    return Normal(normal(size), np.ones(size, np.float32), 5.0)
+
+
+TEACHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
+STUDENT = HistoryPolicy(
+    scale(STATE),
+    Whole(linear(STATE, 4), linear(4 * LENGTH, 6), "elu"),
+    None,
+    Perceptron((linear(STATE + 6, 8), linear(8, ACTIONS)), "relu"),
+)
+ROWS, ENDS = normal(STEPS + 1, ENVIRONMENTS, STATE + TOLD), RANDOM.random((STEPS, ENVIRONMENTS)) < 0.3
+
+
+def past() -> Past:
+    return Past(normal(ENVIRONMENTS, LENGTH, STATE), np.arange(ENVIRONMENTS) % 3 == 0)
+
+
+def explorer() -> Explorer:
+    return Explorer(TEACHER, normal(STEPS, ENVIRONMENTS, ACTIONS), BLOCK)
+
+
+def remembering() -> Explorer:
+    return Explorer(STUDENT, normal(STEPS, ENVIRONMENTS, ACTIONS), BLOCK, past())
+
+
+def apprentice() -> Apprentice:
+    return Apprentice(
+        student=STUDENT,
+        teacher=TEACHER,
+        observation=slice(0, STATE),
+        privileged=slice(STATE, STATE + TOLD),
+        untold=np.array([STATE + 1]),
+        taught=np.arange(ENVIRONMENTS) < 4,
+        block=BLOCK,
+        past=past(),
+    )
+
+
+def driven(pilot: Pilot, first: int = 0, last: int = ENVIRONMENTS) -> Any:
+    """Actions of steps and what is recorded beside them."""
+    own, starts = pilot.part(first, last), pilot.starts[first:last]
+    found = []
+    for step in range(STEPS):
+        action, beside = own.act(step, ROWS[step, first:last], starts)
+        found.append(np.concatenate([action, *beside.values()], axis=1))
+        starts = ENDS[step, first:last]
+    return np.stack(found)
+
+
+@pytest.mark.parametrize("make", [explorer, remembering, apprentice])
+def test_a_pilot_drives_a_part_of_the_environments_as_it_does_among_all(make: Callable[[], Pilot]) -> None:
+    pilot = make()
+    whole = driven(pilot)
+    np.testing.assert_array_equal(np.concatenate([driven(pilot, 0, 4), driven(pilot, 4, 10)], axis=1), whole)
+    np.testing.assert_array_equal(driven(pilot), whole, "a rollout leaves nothing in the pilot")
+
+
+def test_a_history_goes_on_where_the_rollout_before_ended() -> None:
+    pilot = remembering()
+    assert pilot.past is not None
+    frames = pilot.past.frames
+    action, _ = pilot.part(0, ENVIRONMENTS).act(0, ROWS[0], pilot.starts)
+    newest = ROWS[0, :, None, :STATE]
+    seen = np.where(pilot.starts[:, None, None], newest, np.concatenate([frames[:, 1:], newest], axis=1))
+    np.testing.assert_allclose(action, STUDENT(seen) + pilot.noise[0], atol=1e-6)
+
+
+def test_the_teacher_drives_its_environments_and_answers_without_what_it_is_not_told() -> None:
+    pilot = apprentice()
+    action, told = pilot.part(0, ENVIRONMENTS).act(0, ROWS[0], pilot.starts)
+    np.testing.assert_array_equal(action[:4], told["answer"][:4])
+    np.testing.assert_array_equal(action[4:], told["own"][4:])
+    rows = ROWS[0].copy()
+    rows[:, STATE + 1] = TEACHER.normal.mean[STATE + 1]
+    np.testing.assert_allclose(told["answer"], TEACHER(rows), atol=1e-6)
