@@ -39,7 +39,8 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
 
     def roll(self, pilot: Explorer, steps: int) -> Trajectories:
         """See `Environments`; the pilot sees histories, which the rows of its trajectories then are."""
-        past = Past(self._history.frames, np.zeros(self.num_envs, np.bool_))
+        before = np.roll(self._history.frames, 1, axis=1)  # the pilot takes in the newest observation itself
+        past = Past(before, np.zeros(self.num_envs, np.bool_))
         found: Trajectories = self.venv.roll(replace(pilot, past=past), steps)
         rows = np.empty((steps + 1, self.num_envs, *self.observation_space.shape), np.float32)
         last = np.empty((len(found.cut), rows.shape[2]), np.float32)

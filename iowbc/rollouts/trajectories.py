@@ -84,7 +84,8 @@ def roll(environments: Stepped, pilot: Pilot, steps: int) -> Trajectories:
 def _check_finite(action: Array) -> None:
     wrong = np.flatnonzero(~np.isfinite(action).all(axis=1))
     if len(wrong):
-        raise ValueError(f"actions of environments {wrong.tolist()} are not finite, the first is {action[wrong[0]]}")
+        which = f"environments {wrong.tolist()} of the {len(action)} here"
+        raise ValueError(f"actions of {which} are not finite, the first is {action[wrong[0]]}")
 
 
 def side_by_side(parts: Sequence[Trajectories]) -> Trajectories:
