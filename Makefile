@@ -2,6 +2,7 @@
 # make run    sets everything up, then the quickstart recipe
 # make measure   makes the tables of the README anew
 # make chaos   disturbs runs 240 times and counts what is lost (docs/reliability.md)
+# make chaos-nodes   kills nodes of a Ray cluster ten times over a run and a sweep (docs/cluster.md)
 # make docs   builds the documentation's site into build/site, to be opened without a network
 # make leaks   watches memory and descriptors of a training for an hour
 PYTHON ?= python3.11
@@ -9,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup test lint types run measure docs chaos leaks image clean
+.PHONY: setup test lint types run measure docs chaos chaos-nodes leaks image clean
 
 setup: $(READY)
 
@@ -48,6 +49,10 @@ docs: setup
 chaos: setup
 	$(BIN)/python tests/chaos/chaos.py --events 200
 	$(BIN)/python tests/chaos/chaos.py --recipe tests/chaos/workers.yaml --events 40
+
+chaos-nodes: setup
+	$(BIN)/python tests/chaos/nodes.py --kills 10
+	$(BIN)/python tests/chaos/nodes.py --vary seed=0..1 --until teacher --kills 10
 
 leaks: setup
 	$(BIN)/python tests/chaos/leaks.py

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from iowbc.errors import Damaged
+from iowbc.errors import Damaged, UsageError
 from iowbc.pipeline.cluster import folders, remote
+from iowbc.pipeline.cluster.cluster import Cluster
 from iowbc.pipeline.cluster.folders import Folder, files_of, placed, write_files
 from iowbc.pipeline.cluster.identity import identity
 from iowbc.pipeline.cluster.remote import NodeReport
@@ -96,3 +98,48 @@ def test_a_report_sends_the_last_progress_and_only_new_files(tmp_path: Path, mon
         [],
     ]
     assert report.stopping()
+
+
+HEAD, DYING = "a" * 56, "d" * 56
+"""Numbers of nodes, as Ray writes them."""
+
+
+class Asked:
+    """Ray, as far as nodes are asked who they are; one of two dies before it answers."""
+
+    def __init__(self, known: bool) -> None:
+        """known: whether Ray tells of a death once it has happened."""
+        from ray import exceptions
+
+        self.exceptions, self.known = exceptions, known
+        self.alive = [HEAD, DYING]
+
+    def nodes(self) -> list[dict[str, Any]]:
+        return [{"NodeID": one, "NodeManagerAddress": one[0], "Alive": one in self.alive} for one in (HEAD, DYING)]
+
+    def remote(self, **settings: Any) -> Any:
+        return lambda function: self
+
+    def options(self, *, scheduling_strategy: Any) -> Any:
+        return SimpleNamespace(remote=lambda: scheduling_strategy.node_id)
+
+    def get(self, node: str) -> Any:
+        if node == DYING:
+            self.alive = [HEAD] if self.known else self.alive
+            raise self.exceptions.NodeDiedError("it is gone")
+        return identity()
+
+    def shutdown(self) -> None:
+        """Nothing to end."""
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_node_that_dies_while_it_is_asked_who_it_is_stops_nobody(known: bool) -> None:
+    pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
+    cluster = object.__new__(Cluster)
+    cluster._ray = Asked(known)
+    if known:
+        cluster._require_alike()
+        return
+    with pytest.raises(UsageError, match="node d: cannot run iowbc"):
+        cluster._require_alike()

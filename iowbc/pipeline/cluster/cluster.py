@@ -192,7 +192,10 @@ class Cluster:
         return [node for node in self._ray.nodes() if node["Alive"]]
 
     def _require_alike(self) -> None:
-        """Raises `UsageError` naming each node whose packages or code differ from this machine's."""
+        """Raises `UsageError` naming each node whose packages or code differ from this machine's.
+
+        A node that dies while it is asked is as one that died before.
+        """
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
         ask = self._ray.remote(num_cpus=0, max_retries=0)(identity)
@@ -206,6 +209,8 @@ class Cluster:
             try:
                 different = identity().mismatch(self._ray.get(reference))
             except self._ray.exceptions.RayError as error:
+                if node["NodeID"] not in [one["NodeID"] for one in self._alive()]:
+                    continue
                 different = f"cannot run iowbc: {str(error).strip().splitlines()[-1]}"
             if different:
                 problems.append(f"node {node['NodeManagerAddress']}: {different}")
