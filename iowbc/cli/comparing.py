@@ -19,7 +19,11 @@ def diff(first: Named, second: Named, as_json: AsJson = False, runs: RunsFolder 
 def compare(
     recipes: Annotated[
         list[str],
-        typer.Argument(help="Recipes that have run, two or more.", metavar="RECIPE...", autocompletion=completion.ran),
+        typer.Argument(
+            help="Recipes that have run, two or more, or a recipe of recipes.",
+            metavar="RECIPE...",
+            autocompletion=completion.ran,
+        ),
     ],
     output: Annotated[Path | None, typer.Option(help="Folder to write to; runs/compare.")] = None,
     film: Annotated[bool, typer.Option("--film", help="Also film one trial with all of them side by side.")] = False,
@@ -30,7 +34,7 @@ def compare(
     from iowbc.commands.compare import compare as write_comparison
 
     store = store_in(runs)
-    write_comparison(store, console(), recipes, output or store.runs.compared, film, as_json)
+    write_comparison(store, console(), recipes, output, film, as_json)
 
 
 def report(

@@ -1,7 +1,6 @@
 """`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
 
 import tempfile
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +14,9 @@ from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
-from iowbc.commands.swept import points_of
+from iowbc.commands.swept import members_of, points_of
 from iowbc.commands.training import require_training
+from iowbc.commands.trainings import trainings_table
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.store.last_used import require_whole
@@ -33,26 +33,35 @@ CURVE_WIDTH = 40
 
 
 def compare(
-    store: Store, console: Console, words: Sequence[str], output: Path, film: bool = False, as_json: bool = False
+    store: Store,
+    console: Console,
+    words: Sequence[str],
+    output: Path | None = None,
+    film: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Write `metrics.md`, and the report over all trials, under `output`; print the tables. Raises `UsageError`.
 
-    film: also play one trial that all share again, and show the runs side by side.
+    words: runs, two or more, or a recipe of recipes, of which those are compared that have finished. output: empty for
+    a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side.
     """
     found = [named(store, word) for word in points_of(store, words)]
-    if len(found) < 2:
+    members = [name for word in words for name in members_of(word)]
+    if len(found) < 2 and not members:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
+    output = output or (store.runs.compared / Path(words[0]).stem if members else store.runs.compared)
     require_training("compare")
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
     record([run.word for run in found], output)
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = _having(found, TRIALS)
+    missing = [name for name in members if name not in {run.word for run in tried}]
     _report_probes(_having(found, PROBE), output)
-    if len(tried) > 1:
-        trials = _report(tried, output)
-        if film:
-            _film(store, tried, trials, output / FILM)
+    if len(tried) > 1 or (tried and members):
+        trials = report_together(tried, output, missing)
+    if film and len(tried) > 1:
+        _film(store, *_of_each_recipe(tried, trials), output / FILM)
     elif film:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     if as_json:
@@ -63,6 +72,9 @@ def compare(
         console.print(drawn(cells, console.width) if cells.rows else "no metric differs")
         console.print()
     _print_curves(found, console)
+    if missing:
+        text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
+        console.print(f"{text}that takes", markup=False, highlight=False, soft_wrap=True)
     for path in sorted(output.rglob("*.*")):
         console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
 
@@ -132,7 +144,7 @@ def joined(store: Store, found: Sequence[Named]) -> Joined:
         else:
             _report_probes(_having(evaluated, PROBE), output)
             if len(tried) > 1:
-                _report(tried, output)
+                report_together(tried, output)
         tables = {path.stem: path.read_text(encoding="utf-8") for path in sorted((output / "tables").glob("*.md"))}
         if len(evaluated) < 2:
             return Joined(tables, {})
@@ -153,8 +165,17 @@ def film_together(store: Store, words: Sequence[str], output: Path) -> Path | No
         return None
     newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)
     if not (film.is_file() and film.stat().st_mtime > newest):
-        _film(store, tried, _told_apart(tried, TRIALS)[0], film)
+        _film(store, *_of_each_recipe(tried, _told_apart(tried, TRIALS)[0]), film)
     return film
+
+
+def _of_each_recipe(
+    runs: Sequence[Named], trials: "Sequence[pd.DataFrame]"
+) -> "tuple[list[Named], list[pd.DataFrame]]":
+    """The first training of each recipe with its trials; all of them where there is one recipe."""
+    first = [group.runs[0].label for group in _groups(runs)]
+    chosen = [place for place, run in enumerate(runs) if len(first) == 1 or run.word in first]
+    return [runs[place] for place in chosen], [trials[place] for place in chosen]
 
 
 def _having(runs: Sequence[Named], name: str) -> list[Named]:
@@ -162,19 +183,26 @@ def _having(runs: Sequence[Named], name: str) -> list[Named]:
     return [run for run in runs if "eval" in run.artifacts and (run.artifacts["eval"].folder / name).is_file()]
 
 
-def _told_apart(runs: Sequence[Named], name: str) -> "tuple[list[pd.DataFrame], dict[str, str]]":
-    """A table of each run's evaluation, its variant called by the run where two share one; their labels by run."""
+def _told_apart(runs: Sequence[Named], name: str, together: bool = True) -> "tuple[list[pd.DataFrame], dict[str, str]]":
+    """A table of each run's evaluation, and the labels of variants that go by another name.
+
+    Runs that differ in their seed alone are trainings of one variant, unless `together` is false; a variant is called
+    by its first run where another one has its label.
+    """
     import pandas as pd
 
-    tables = [pd.read_parquet(run.artifacts["eval"].folder / name) for run in runs]
-    counts = Counter(label for table in tables for label in table["variant"].unique())
+    from iowbc.evaluation.report.aggregate import TRAINING
+
+    tables = {run.word: pd.read_parquet(run.artifacts["eval"].folder / name) for run in runs}
+    groups = _groups(runs) if together else [group for run in runs for group in _groups([run])]
+    own = [str(tables[group.runs[0].label]["variant"].iloc[0]) for group in groups]
     labels: dict[str, str] = {}
-    for index, (table, run) in enumerate(zip(tables, runs, strict=True)):
-        own = [str(label) for label in table["variant"].unique()]
-        if any(counts[label] > 1 for label in own):
-            labels[run.word] = own[0]
-            tables[index] = table.assign(variant=run.word)
-    return tables, labels
+    for group, label in zip(groups, own, strict=True):
+        called = label if own.count(label) == 1 else group.runs[0].label
+        labels |= {} if called == label else {called: label}
+        for run, seed in zip(group.runs, group.seeds, strict=True):
+            tables[run.label] = tables[run.label].assign(variant=called, **{TRAINING: seed})
+    return [tables[run.word] for run in runs], labels
 
 
 def _report_probes(runs: Sequence[Named], output: Path) -> None:
@@ -184,14 +212,18 @@ def _report_probes(runs: Sequence[Named], output: Path) -> None:
     from iowbc.evaluation.report.probe import write_probe
 
     if runs:
-        write_probe(pd.concat(_told_apart(runs, PROBE)[0], ignore_index=True), output)
+        write_probe(pd.concat(_told_apart(runs, PROBE, together=False)[0], ignore_index=True), output)
 
 
-def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
-    """The trials of each run, each under a name of its own."""
+def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] = ()) -> "list[pd.DataFrame]":
+    """Write tables and figures over all trials under `output`; the trials of each run.
+
+    missing: recipes that belong to them and have not run. Raises `UsageError` where the runs count masses differently.
+    """
     import pandas as pd
 
     from iowbc.evaluation.report.report import write_report
+    from iowbc.evaluation.report.tables import write_table
 
     trials, labels = _told_apart(runs, TRIALS)
     rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}
@@ -200,6 +232,7 @@ def _report(runs: Sequence[Named], output: Path) -> "list[pd.DataFrame]":
             f"the recipes count a mass as carried at different rates (eval.success.capacity_rate): {rates}"
         )
     write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)
+    write_table(trainings_table(_groups(runs), missing), output / "tables")
     return trials
 
 

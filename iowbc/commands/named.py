@@ -38,7 +38,7 @@ class Named:
 
 def named(store: Store, word: str) -> Named:
     """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
-    recipes = [*known_recipes(store), *_published(store)]
+    recipes = finished_recipes(store)
     if Path(word).suffix in SUFFIXES:
         return _recipe(store, word, _name_in(Path(word)), recipes)
     if word in recipes:
@@ -70,9 +70,14 @@ def known_recipes(store: Store) -> list[str]:
     return sorted(path.stem for path in store.runs.recipes.glob("*.json"))
 
 
+def finished_recipes(store: Store) -> list[str]:
+    """Names of the recipes that have finished a stage here, or came with the repository, alphabetically."""
+    return sorted({*known_recipes(store), *_published(store)})
+
+
 def nameable(store: Store) -> dict[str, tuple[str, ...]]:
     """By the name of each recipe that `named` knows, alphabetically: stages that can be named with it."""
-    names = sorted({*known_recipes(store), *_published(store)})
+    names = finished_recipes(store)
     return {name: tuple(_recipe(store, name, name, names).usable) for name in names}
 
 

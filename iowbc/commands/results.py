@@ -26,7 +26,7 @@ HEADLINES: Mapping[str, tuple[str, ...]] = {
 """Patterns of the metrics that are shown of each stage, the most telling first; `show` has all."""
 METRICS_SHOWN = 3
 """Metrics of a stage that are shown at most."""
-TABLES = ("lifting", "pushing", "heavy", "capacity", "probe")
+TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "trainings", "probe")
 """Tables that are drawn; the others are named."""
 EXPORTED = "policy.onnx"
 

@@ -13,11 +13,9 @@ from iowbc.commands.named import Named
 from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.recipe.reading.sweep import Point, Sweep, written
-from iowbc.recipe.recipe import PIPELINE
+from iowbc.recipe.recipe import PIPELINE, SEEDS
 from iowbc.report.parallel import Line, parallel_coordinates, write_figure
 
-SEED = "seed"
-"""What is averaged over."""
 OUTCOMES_SHOWN = 6
 """Metrics in the table and in the figure at most: those of the last stages."""
 TABLE, FIGURE, POINTS = "table.md", "parallel.png", "points.csv"
@@ -36,7 +34,7 @@ class Outcomes:
 
 def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
     """What came out; `found`: the finished points by name."""
-    settings = tuple(path for path in sweep.axes if path != SEED)
+    settings = tuple(path for path in sweep.axes if path not in SEEDS)
     points = [point for point in sweep.points if point.name in found]
     metrics = _chosen([found[point.name] for point in points])
     groups: dict[tuple[str, ...], list[Point]] = {}

@@ -58,6 +58,8 @@ class Distillation(Section):
     auxiliary: float = Field(default=0.1, ge=0)
     """Weight of the squared error with which the object's mass and the base's velocity are read from the latent, each
     in its standard deviations; 0 leaves it out. It makes the latent hold what the history tells of the load."""
+    seed: int | None = Field(default=None, ge=0, lt=2**32, json_schema_extra=LATER)
+    """Seed of this training alone; the recipe's `seed` when empty."""
     checkpoint_every: int = Field(default=50, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Rounds between two checkpoints."""
 

@@ -20,6 +20,8 @@ PIPELINE: tuple[StageName, ...] = get_args(StageName)
 """All stages, in the order in which they run."""
 
 
+SEEDS = ("seed", "teacher.seed", "distill.seed")
+"""Dotted paths that tell repetitions of one experiment apart."""
 NAME = "[a-z0-9][a-z0-9_-]*"
 """What the name of an experiment looks like; it names files."""
 

@@ -102,6 +102,9 @@ class Teacher(Section):
     """With it the policy sees H_t alone and not s_priv: it is the student's network, needs no distillation, and can be
     exported. The value network, which nobody deploys, sees the newest s_t and s_priv as ever. `hidden` and `activation`
     are those behind the encoder."""
+    seed: int | None = Field(default=None, ge=0, lt=2**32, json_schema_extra=LATER)
+    """Seed of this training alone; the recipe's `seed` when empty. With another one here and in `distill`, a recipe is
+    a second training of the same controller, on the same reference generator."""
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.recipe.recipe import SEEDS
 
-NAMING = ("seed", "name", "description", "execution")
-"""Parts of a recipe in which runs of one group may differ."""
+NAMING = ("name", "description", "execution")
+"""Parts of a recipe in which runs of one group may differ, beside their seeds."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,12 @@ class Group:
 
     label: str
     runs: tuple[Run, ...]
+
+    @property
+    def seeds(self) -> tuple[str, ...]:
+        """Of each run's training; where that does not tell them apart, what the runs are called."""
+        told = [str(_seed(run.recipe)) for run in self.runs]
+        return tuple(told if len({*told}) == len(told) else (run.label for run in self.runs))
 
     def values(self, stage: str, metric: str) -> NDArray[np.float64]:
         """A stage's metric in each run that has it."""
@@ -97,4 +104,21 @@ def _cell(values: NDArray[np.float64]) -> str:
 
 
 def _compared(run: Run) -> dict[str, Any]:
-    return {name: value for name, value in run.recipe.items() if name not in NAMING}
+    """A recipe without what only tells repetitions apart."""
+    return {
+        name: _without_seed(name, value)
+        for name, value in run.recipe.items()
+        if name not in NAMING and name not in SEEDS
+    }
+
+
+def _without_seed(name: str, value: Any) -> Any:
+    if f"{name}.seed" not in SEEDS or not isinstance(value, Mapping):
+        return value
+    return {key: item for key, item in value.items() if key != "seed"}
+
+
+def _seed(recipe: Mapping[str, Any]) -> Any:
+    """Seed of a recipe's training."""
+    own = recipe.get("teacher", {}).get("seed")
+    return recipe.get("seed", 0) if own is None else own

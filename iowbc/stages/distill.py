@@ -43,12 +43,13 @@ def run(job: Job) -> None:
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
+    seed = recipe.seed if settings.seed is None else settings.seed
     teacher, about = load_teacher(job.inputs["teacher"])
     environments = VectorEnv(
         Specification(recipe, job.robot, job.inputs.get("rg-fit")),
         num_envs=settings.environments,
         workers=job.workers,
-        seed=recipe.seed + 1,
+        seed=seed + 1,
     )
     try:
         environments.set_curriculum(about["curriculum"])
@@ -65,7 +66,7 @@ def run(job: Job) -> None:
             action_mirror=action_mirror(robot),
         )
         training = StudentTraining(
-            settings, environments, teacher, about["architecture"], rows, recipe.teacher.symmetry, recipe.seed
+            settings, environments, teacher, about["architecture"], rows, recipe.teacher.symmetry, seed
         )
         curves = train(job, training, settings.checkpoint_every, _note)
     finally:

@@ -56,13 +56,14 @@ def run(job: Job) -> None:
     from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings = job.recipe, job.recipe.teacher
+    seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
     with ExitStack() as open_ones:
         environments = VectorEnv(
             world,
             num_envs=settings.environments,
             workers=job.workers,
-            seed=recipe.seed,
+            seed=seed,
             divergences=job.work / "divergences",
         )
         open_ones.enter_context(closing(environments))
@@ -77,7 +78,7 @@ def run(job: Job) -> None:
             settings,
             rows,
             (environments.layout.mirror, action_mirror(load_robot(job.robot))),
-            recipe.seed,
+            seed,
             cores=available_cores(),
             value_only=environments.layout.privileged_places(settings.value_only).tolist(),
             score=score,

@@ -131,7 +131,8 @@ def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_pat
     assert len(summary) == 8 * len(variants)
     names = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*")}
     tables = ["lifting", "lifting_moving", "pushing", "pushing_moving", "heavy", "heavy_errors", "stagnation"]
-    tables += ["capacity", "pushes", "joints", *(["differences"] if len(variants) > 1 else [])]
+    tables += ["paper", "capacity", "pushes", "joints"]
+    tables += ["differences", "interquartile"] if len(variants) > 1 else []
     assert names == {
         *(f"tables/{name}.{kind}" for name in tables for kind in ("md", "tex", "csv")),
         "tables/summary.csv",

@@ -1,13 +1,16 @@
 """What is published with the repository belongs to the recipes that come with it: a fresh clone starts from it."""
 
 import json
+from io import StringIO
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
 from iowbc.deploy.controller import Controller
+from iowbc.evaluation.report.aggregate import aggregate
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,6 +26,18 @@ def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last:
     states = {stage["stage"]: stage["cached"] and stage["published"] for stage in plan["stages"]}
     assert all(states.values()), (states, plan["stages"])
     assert last in states
+
+
+@pytest.mark.parametrize(
+    "folder", sorted((ROOT / "runs" / "published" / "eval").iterdir()), ids=lambda path: path.name[:8]
+)
+def test_a_fresh_clone_makes_the_published_figures_from_the_published_trials(folder: Path) -> None:
+    table = folder / "tables" / "summary.csv"
+    if not table.is_file():
+        pytest.skip("it holds a probe alone")
+    published = pd.read_csv(table)
+    made = pd.read_csv(StringIO(aggregate(pd.read_parquet(folder / "trials.parquet")).to_csv(index=False)))
+    pd.testing.assert_frame_equal(made[published.columns], published, rtol=1e-12)
 
 
 def test_a_fresh_clone_has_a_controller_to_try(monkeypatch: pytest.MonkeyPatch) -> None:

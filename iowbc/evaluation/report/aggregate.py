@@ -44,17 +44,20 @@ SETTINGS = ("commanded_distance", "partner_share", "rolling_resistance", "height
 """Columns that are the same for all trials of a row."""
 JOINT_COSTS = ("peak_torque/", "saturated/")
 """Beginnings of columns with a value a joint, averaged over the surviving trials."""
+TRAINING = "training_seed"
+"""Column that tells the trainings of one variant apart; where it is absent, there is one."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
 def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     """One row for each of `GROUP`, by suite and case in order of appearance, mass, and the paper's order of variants.
 
-    Columns: `trials`, `survived`, `succeeded`, `carried` (trials with an object in the hands whose weight they carried)
-    of `held`; `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving
-    trials and `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. NaN where no trial survived
-    (or one alone, for the half widths): "Fails" in the tables.
+    Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
+    in the hands whose weight they carried) of `held`; `rate` of success with its Wilson interval `rate_low`,
+    `rate_high`; each error's mean over the surviving trials and `<error>_half`, half its 95 % interval; `norm`, the
+    norm of the four means. NaN where no trial survived (or one alone, for the half widths): "Fails" in the tables.
     """
+    trials = with_trainings(trials)
     rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
     table = pd.DataFrame(rows)
     ranks = {
@@ -73,6 +76,7 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
     low, high = wilson_interval(succeeded, len(group))
     row: dict[str, object] = {
         **key,
+        "trainings": group[TRAINING].nunique(),
         "trials": len(group),
         "survived": len(survivors),
         "succeeded": succeeded,
@@ -93,6 +97,11 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
     for name in (*WAYS, *STILL):
         row[name] = float(group[name].mean())
     return row | {name: group[name].iloc[0] for name in SETTINGS}
+
+
+def with_trainings(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials that say of which training they are; those that do not are of one."""
+    return trials if TRAINING in trials else trials.assign(**{TRAINING: "0"})
 
 
 def variants_of(trials: pd.DataFrame) -> list[str]:

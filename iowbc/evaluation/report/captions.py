@@ -11,7 +11,14 @@ def conditions(rows: pd.DataFrame) -> str:
     said = ["In simulation", partner(rows)]
     if (rows["kind"] == "pushing").any():
         said.append(rolling_resistance(rows))
-    return ", ".join(said) + "."
+    return ", ".join(said) + "." + trainings(rows)
+
+
+def trainings(rows: pd.DataFrame) -> str:
+    """Which variants were trained more than once."""
+    several = rows[rows["trainings"] > 1].groupby("variant", sort=False)["trainings"].max()
+    told = ", ".join(f"{variant}: {count} trainings" for variant, count in several.items())
+    return f" Trials of all trainings together ({told})." if told else ""
 
 
 def measures(rows: pd.DataFrame) -> str:

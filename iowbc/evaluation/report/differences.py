@@ -4,19 +4,23 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from iowbc.evaluation.report.aggregate import variants_of
+from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
 from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.evaluation.report.tables import ABSENT, Table
 from iowbc.evaluation.trials.errors import ERRORS
 
-PAIR = ["suite", "case", "mass", "impulse", "trial"]
-"""What two trials have in common that meet the same world and commands."""
+PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
+"""What two trials have in common that meet the same world and commands; the first training of a variant is compared
+with the first of the other, and so on."""
 
 
 def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
     """The trials of two variants side by side, with the suffixes `_variant` and `_reference`."""
     columns = [*PAIR, "survived", "succeeded", *ERRORS]
+    trials = with_trainings(trials)
+    places = trials.groupby("variant")[TRAINING].transform(lambda seeds: pd.factorize(seeds)[0])
+    trials = trials.assign(training=places)
     own, other = (trials.loc[trials["variant"] == name, columns] for name in (variant, reference))
     return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"), validate="one_to_one")
 

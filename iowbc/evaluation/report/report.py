@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import aggregate, suites_of
+from iowbc.evaluation.report.aggregate import TRAINING, aggregate, suites_of, with_trainings
+from iowbc.evaluation.report.beside_paper import paper_table
 from iowbc.evaluation.report.differences import difference_table
 from iowbc.evaluation.report.error_tables import NO_LABELS, error_table, moving_table, slug
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, write_figure
+from iowbc.evaluation.report.interquartile import interquartile_table
 from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
 from iowbc.evaluation.report.tables import Table, write_table
 
@@ -18,7 +20,8 @@ def write_report(
 ) -> pd.DataFrame:
     """Write `tables/` and `figures/` under `folder`; returns the summary, one row for each variant, suite and mass.
 
-    trials: the long table of `trials.parquet`, one or several of them concatenated.
+    trials: the long table of `trials.parquet`, one or several of them concatenated; `training_seed` tells the trainings
+    of a variant apart.
     capacity_rate: success rate that a mass must reach to count as carried.
     labels: `eval.label` of each variant that goes by another name here, to find the paper's numbers for it.
     """
@@ -45,6 +48,8 @@ def report_tables(
     swept, kinds = suites_of(summary, "lifting", "pushing"), set(summary["kind"])
     walked = set(summary.loc[summary["still_E_v_moving"].notna(), "suite"])
     tables = [error_table(summary, suite, labels) for suite in swept]
+    beside = paper_table(summary, labels)
+    tables += [] if beside is None else [beside]
     tables += [moving_table(summary, suite) for suite in swept if suite in walked]
     tables += [error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")]
     if "heavy" in kinds:
@@ -55,5 +60,6 @@ def report_tables(
         tables.append(push_table(summary, capacity_rate))
     if (summary["survived"] > 0).any():
         tables.append(joint_table(summary))
-    differences = difference_table(trials)
-    return tables if differences is None else [*tables, differences]
+    several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1
+    together = [difference_table(trials), interquartile_table(trials)] if several else []
+    return [*tables, *(table for table in together if table is not None)]

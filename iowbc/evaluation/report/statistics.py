@@ -50,6 +50,18 @@ def determination_interval(
     return float(low), float(high)
 
 
+def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of the middle half of the last axis (..., n); of fewer than four values their mean."""
+    return np.asarray(stats.trim_mean(values, 0.25, axis=-1), np.float64)
+
+
+def percentile_interval(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Bootstrap interval from a statistic's values over resamples (n,), which may be infinite."""
+    ends = [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]
+    low, high = np.quantile(values, ends, method="nearest")
+    return float(low), float(high)
+
+
 def root_mean_square(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:
     """Of the errors, in the unit of the values."""
     return float(np.sqrt(np.mean(np.square(true - inferred))))

@@ -1,0 +1,47 @@
+"""What stands behind a comparison: how long each policy was trained, with which seed, and what is still missing."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from iowbc.evaluation.report.tables import Table
+    from iowbc.report.runs import Group, Run
+
+NOT_TRAINED = "not evaluated yet"
+TRAININGS = ("teacher", "distill")
+"""Stages that train."""
+
+
+def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> "Table":
+    """A row for each run; `missing`: recipes that belong to the comparison and have not run."""
+    import pandas as pd
+
+    from iowbc.evaluation.report.tables import ABSENT, Table
+
+    rows: list[tuple[str, ...]] = []
+    numbers: list[dict[str, object]] = []
+    for group in groups:
+        for run, seed in zip(group.runs, group.seeds, strict=True):
+            steps = {stage: steps_of(run, stage) for stage in TRAININGS}
+            told = [ABSENT if count is None else f"{count:,}" for count in steps.values()]
+            label = str(run.recipe["eval"]["label"])
+            rows.append((run.label, label, seed, *told))
+            numbers.append({"recipe": run.label, "algorithm": label, "seed": seed, **steps})
+    rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(TRAININGS))) for name in missing]
+    head = ("Recipe", "Algorithm", "Seed", "Steps of PPO", "Steps of distillation")
+    return Table("trainings", _caption(numbers, missing), head, head, tuple(rows), pd.DataFrame(numbers))
+
+
+def steps_of(run: "Run", stage: str) -> int | None:
+    """Environment steps of a stage that trains; None where the run has no such stage."""
+    if stage not in run.recipe.get("stages", ()):
+        return None
+    made = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
+    return int(made[stage]["steps"])
+
+
+def _caption(numbers: Sequence[dict[str, object]], missing: Sequence[str]) -> str:
+    budgets = {row["teacher"] for row in numbers}
+    told = "all with the same budget of PPO" if len(budgets) == 1 else "not all with the same budget of PPO"
+    lacking = f" Missing: {', '.join(missing)}." if missing else ""
+    return f"What was trained, {told}.{lacking}"

@@ -1,0 +1,76 @@
+"""Every cell of the paper's Tables II and III: ours, the paper's, and the ratio."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from iowbc.evaluation.paper import TABLES, VARIANTS, reported
+from iowbc.evaluation.report.aggregate import suites_of
+from iowbc.evaluation.report.captions import rolling_resistance
+from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, NO_LABELS, NUMBERS
+from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
+from iowbc.evaluation.trials.errors import ERRORS
+
+CELL = "{} / {} = {}"
+"""Ours, the paper's, and ours in parts of it."""
+
+
+def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
+    """The masses of the paper's tables that were played, for each of its variants; None where there are none.
+
+    labels: the paper's name of variants that go by another one here.
+    """
+    rows, numbers, counted = [], [], []
+    for suite in suites_of(summary, *NUMBERS):
+        chosen = summary[summary["suite"] == suite]
+        kind = str(chosen["kind"].iloc[0])
+        for variant, own in chosen.groupby("variant", sort=False):
+            label = labels.get(str(variant), str(variant))
+            if label not in VARIANTS:
+                continue
+            at_most, of = 0, 0
+            for mass in TABLES[kind]:
+                for _, row in own[own["mass"] == mass].iterrows():
+                    paper = reported(kind, mass, label)
+                    theirs = [np.nan] * len(ERRORS) if paper is None or paper == "absent" else list(paper)
+                    ours = [float(row[name]) for name in ERRORS]
+                    survived = f"{row['survived']}/{row['trials']}"
+                    cells = [_cell(*pair) for pair in zip(ours, theirs, strict=True)]
+                    rows.append((f"{NUMBERS[kind]}, {suite}", str(variant), f"{mass:g} kg", survived, *cells))
+                    numbers += _numbers(suite, str(variant), mass, ours, theirs)
+                    at_most += sum(one <= other for one, other in zip(ours, theirs, strict=True))
+                    of += int(np.isfinite(theirs).sum())
+            counted += [f"{variant} in {suite} {at_most} of {of}"] if of else []
+    if not rows:
+        return None
+    columns = ("Table", "Algorithm", "Mass", "Survived")
+    return Table(
+        "paper",
+        "Tables II and III cell by cell: ours / the paper's = ratio, means over surviving trials; the paper's are for "
+        f"its own commands. {FAILS}: no trial survived. Cells with a number of the paper's in which ours is at most as "
+        f"large: {', '.join(counted)}. In simulation{_resistance(summary)}.",
+        (*columns, *HEADS.values()),
+        (*columns, *LATEX_HEADS.values()),
+        tuple(rows),
+        pd.DataFrame(numbers),
+    )
+
+
+def _resistance(summary: pd.DataFrame) -> str:
+    pushes = summary[summary["kind"] == "pushing"]
+    return "" if pushes.empty else f", {rolling_resistance(pushes)}"
+
+
+def _cell(ours: float, theirs: float) -> str:
+    told = [FAILS if np.isnan(value) else f"{value:.3f}" for value in (ours, theirs)]
+    ratio = ours / theirs
+    return CELL.format(*told, ABSENT if np.isnan(ratio) else f"{ratio:.2f}")
+
+
+def _numbers(suite: str, variant: str, mass: float, ours: list[float], theirs: list[float]) -> list[dict[str, object]]:
+    return [
+        {"suite": suite, "variant": variant, "mass": mass, "error": name, "ours": own, "paper": other}
+        | {"ratio": own / other}
+        for name, own, other in zip(ERRORS, ours, theirs, strict=True)
+    ]
