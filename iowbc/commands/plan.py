@@ -8,6 +8,7 @@ from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.request import Request, prepared, recipes
+from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned
 from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Step
@@ -20,18 +21,32 @@ REASON_INDENT = 4
 
 
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
-    """Print what would run, and why; of a recipe of recipes for each of them."""
+    """Print what would run, and why; of a recipe of recipes a table of what would run of each."""
     loaded = recipes(request)
     planners = [prepared(one, request, registry)[0] for one in loaded]
     if as_json:
         names = [one.recipe.name for one in loaded]
-        planned = [[_data(step) for step in planner.plan()] for planner in planners]
-        print_json(console, [{"recipe": name, "stages": steps} for name, steps in zip(names, planned, strict=True)])
-        return
-    for one, planner in zip(loaded, planners, strict=True):
-        if len(loaded) > 1:
-            console.print(f"{one.recipe.name}:", highlight=False)
-        _print(planner.plan(), console)
+        steps = [[_data(step) for step in planner.plan()] for planner in planners]
+        print_json(console, [{"recipe": name, "stages": own} for name, own in zip(names, steps, strict=True)])
+    elif len(loaded) == 1:
+        _print(planners[0].plan(), console)
+    else:
+        _print_several(planned(planners), request, console)
+
+
+def _print_several(found: Planned, request: Request, console: Console) -> None:
+    """A row for each recipe, what the signs mean, and all together."""
+    console.print(plan_table(found, "recipe"))
+    steps = [stage.step for own in found.values() for stage in own if not stage.shared_with]
+    rates = sorted({step.rate_of for step in steps if not step.cached and step.roughly is not None})
+    if rates:
+        console.print(f"~ at the rate of {', '.join(rates)}, from which it differs", highlight=False)
+    console.print(in_all(found, "recipes"), highlight=False, soft_wrap=True)
+    changing = [name for name, own in found.items() if not all(stage.step.cached for stage in own)]
+    if changing:
+        text = f"`iowbc plan {changing[-1]}` says why; so for {', '.join(changing[:-1])}" if changing[:-1] else ""
+        text = text or f"`iowbc plan {changing[0]}` says why"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _print(steps: Sequence[Step], console: Console) -> None:
@@ -43,14 +58,15 @@ def _print(steps: Sequence[Step], console: Console) -> None:
             console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
-    known = [step.expected for step in missing if step.expected is not None]
+    known = [step.guess for step in missing if step.guess is not None]
+    sure = "about" if all(step.roughly is None for step in missing) else "roughly"
     if not missing:
         console.print("all stages are cached", highlight=False)
     elif not known:
         console.print(f"{count}; how long that takes is not known", highlight=False)
     else:
         rest = len(missing) - len(known)
-        parts = [f"about {duration(sum(known))}"]
+        parts = [f"{sure} {duration(sum(known))}"]
         parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
         console.print(f"{count}: {', and '.join(parts)}", highlight=False)
 
@@ -62,6 +78,8 @@ def _planned(step: Step) -> Text:
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if published else "cached", "cyan"), (key, "dim"))
     takes = "" if step.expected is None else f", about {duration(step.expected)}"
+    if step.expected is None and step.roughly is not None:
+        takes = f", roughly {duration(step.roughly)} at the rate of {step.rate_of}"
     return Text.assemble(("run", "bold yellow"), takes)
 
 
@@ -80,4 +98,5 @@ def _data(step: Step) -> dict[str, Any]:
         "reasons": step.reasons,
         "notes": step.notes,
         "expected_seconds": None if step.cached else step.expected,
+        "roughly_seconds": None if step.cached else step.roughly,
     }

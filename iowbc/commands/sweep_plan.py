@@ -1,4 +1,4 @@
-"""What a sweep would run: each stage counted once, however many points share it."""
+"""What a sweep, or a recipe of recipes, would run: each stage counted once, however many recipes share it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ class PlannedStage:
 
     step: Step
     shared_with: str
-    """The earlier point that makes it; empty where this one does, or where it is cached."""
+    """The earlier recipe that makes it; empty where this one does, or where it is cached."""
 
 
 Planned = Mapping[str, Sequence[PlannedStage]]
-"""The stages of each point, by its name."""
+"""The stages of each recipe, by its name."""
 
 
 def planned(planners: Sequence[Planner]) -> Planned:
-    """The stages of each point, as things stand; nothing is changed."""
+    """The stages of each recipe, as things stand; nothing is changed."""
     makers: dict[str, str] = {}
     found: dict[str, list[PlannedStage]] = {}
     for planner in planners:
@@ -56,21 +56,22 @@ def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
     return data_digest(ingredients)
 
 
-def in_all(found: Planned) -> str:
-    """How much there is to do, in a sentence."""
+def in_all(found: Planned, what: str = "points") -> str:
+    """How much there is to do, in a sentence; `what`: the recipes' part in it."""
     stages = [stage for own in found.values() for stage in own]
     made = [stage.step for stage in stages if not stage.step.cached and not stage.shared_with]
     shared = sum(bool(stage.shared_with) for stage in stages)
     cached = sum(stage.step.cached for stage in stages)
-    head = f"{len(found)} points: {len(made)} stages would run, {shared} are shared, {cached} cached"
-    known = [step.expected for step in made if step.expected is not None]
+    head = f"{len(found)} {what}: {len(made)} stages would run, {shared} are shared, {cached} cached"
+    known = [step.guess for step in made if step.guess is not None]
     rest = len(made) - len(known)
     if not made:
-        return f"{len(found)} points: all stages are cached"
+        return f"{len(found)} {what}: all stages are cached"
     if not known:
         return f"{head}; how long that takes is not known"
     unknown = f", and {rest} of unknown length" if rest else ""
-    return f"{head}; about {duration(sum(known))} one after another{unknown}"
+    sure = "about" if all(step.roughly is None for step in made) else "roughly"
+    return f"{head}; {sure} {duration(sum(known))} one after another{unknown}"
 
 
 def print_plan(sweep: Sweep, found: Planned, console: Console, as_json: bool = False) -> None:
@@ -78,23 +79,30 @@ def print_plan(sweep: Sweep, found: Planned, console: Console, as_json: bool = F
     if as_json:
         print_json(console, {"sweep": sweep.name, "points": [_data(sweep, name, own) for name, own in found.items()]})
         return
+    console.print(plan_table(found, "point"))
+    console.print(in_all(found), highlight=False)
+
+
+def plan_table(found: Planned, what: str) -> Table:
+    """A row for each recipe, a column for each stage; `what` stands above the recipes' names."""
     names = list(dict.fromkeys(stage.step.stage.name for own in found.values() for stage in own))
     table = Table(box=None, padding=(0, 1))
-    for head in ("point", *names):
+    for head in (what, *names):
         table.add_column(head, no_wrap=True, overflow="ellipsis")
-    for point, own in found.items():
+    for recipe, own in found.items():
         cells = {stage.step.stage.name: _cell(stage) for stage in own}
-        table.add_row(point, *(cells.get(name, "") for name in names))
-    console.print(table)
-    console.print(in_all(found), highlight=False)
+        table.add_row(recipe, *(cells.get(name, "") for name in names))
+    return table
 
 
 def _cell(stage: PlannedStage) -> Text | str:
     if stage.step.cached:
-        return Text("cached", style="cyan")
+        published = stage.step.artifact is not None and stage.step.artifact.published
+        return Text("published" if published else "cached", style="cyan")
     if stage.shared_with:
         return Text("shared", style="dim")
-    return Text(f"run {duration(stage.step.expected)}".strip(), style="bold yellow")
+    sign = "~" if stage.step.expected is None and stage.step.roughly is not None else ""
+    return Text(f"run {sign}{duration(stage.step.guess)}".strip(), style="bold yellow")
 
 
 def _data(sweep: Sweep, name: str, own: Sequence[PlannedStage]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, fol
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.recipe.recipe import SEEDS
 from iowbc.recipe.section import deciding
 
 NOT_WHOLE = "its published artifact leaves out large files"
@@ -48,6 +49,11 @@ class Step:
     """What is wrong with the stored artifact with this key."""
     expected: float | None = None
     """Time that it takes at the rate of a stored artifact or of its last attempt [s]; None where no rate is known."""
+    roughly: float | None = None
+    """Where no rate is known: time at the rate of the stored artifact that differs least, though it differs in more
+    than seed and counts [s]."""
+    rate_of: str = ""
+    """Recipe whose artifact that rate is of."""
     code: Mapping[str, str] = field(default_factory=dict)
     predecessor: Artifact | None = None
     """The stored artifact that it would go on from."""
@@ -56,6 +62,11 @@ class Step:
     def cached(self) -> bool:
         """True where the stored artifact is used as it is."""
         return not self.reasons
+
+    @property
+    def guess(self) -> float | None:
+        """The expected time, or what comes nearest to one [s]."""
+        return self.roughly if self.expected is None else self.expected
 
 
 class Planner:
@@ -103,7 +114,7 @@ class Planner:
             inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
             step = self.decide(stage, inputs)
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
-            steps[stage.name] = replace(step, expected=None) if unknown else step
+            steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
             for name in self.reads(stage):
                 made = steps[name].artifact
@@ -130,10 +141,21 @@ class Planner:
             "robot": self.robot_digest,
         }
         former = self._closest(stage.name, ingredients)
-        expected = None if former is None else _reckoned(stage, former, ingredients)
+        expected, roughly = (None, None) if former is None else _reckoned(stage, former, ingredients)
+        rate_of = "" if former is None else former.manifest.recipe
         if unknown:
             reasons = self._reasons(ingredients, former, unknown)
-            return Step(stage, None, None, None, tuple(reasons), expected=expected, code=code)
+            return Step(
+                stage,
+                None,
+                None,
+                None,
+                tuple(reasons),
+                expected=expected,
+                roughly=roughly,
+                rate_of=rate_of,
+                code=code,
+            )
         key = data_digest(ingredients)
         artifact, damage = _checked(self.store.find, stage.name, key)
         notes: list[str] = []
@@ -167,7 +189,20 @@ class Planner:
             if predecessor is not None:
                 notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
                 expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)
-        return Step(stage, key, ingredients, artifact, tuple(found), tuple(notes), damage, expected, code, predecessor)
+        return Step(
+            stage,
+            key,
+            ingredients,
+            artifact,
+            tuple(found),
+            tuple(notes),
+            damage,
+            expected,
+            roughly,
+            rate_of,
+            code,
+            predecessor,
+        )
 
     def _predecessor(self, stage: Stage, ingredients: Mapping[str, Any]) -> Artifact | None:
         """The whole artifact of a stage that differs in nothing but an earlier end, the latest of several."""
@@ -261,20 +296,22 @@ def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) 
     return artifact, ""
 
 
-def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> float | None:
-    """The time that a stage takes at the rate of a stored artifact [s]; None where more differs than seed and counts.
+def _reckoned(
+    stage: Stage, former: Artifact, ingredients: Mapping[str, Any]
+) -> tuple[float, None] | tuple[None, float]:
+    """The time that a stage takes at the rate of a stored artifact [s]: known, or roughly where more differs than seed
+    and counts.
 
     It is proportional to each of the stage's counts.
     """
     old, seconds = former.ingredients, former.manifest.seconds
-    if old.get("version") != ingredients["version"]:
-        return None
+    alike = old.get("version") == ingredients["version"]
     for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
         if path in stage.counts and MISSING not in (before, after) and before:
             seconds *= after / before
-        elif path != "seed":
-            return None
-    return seconds
+        elif path not in SEEDS:
+            alike = False
+    return (seconds, None) if alike else (None, seconds)
 
 
 def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:

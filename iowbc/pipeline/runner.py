@@ -214,7 +214,7 @@ class Runner:
             "version": step.stage.version,
             "key": step.key,
             "recipe": self.loaded.recipe.name,
-            "seconds": workspace.seconds,
+            "seconds": workspace.seconds + (step.predecessor.manifest.seconds if step.predecessor else 0.0),
             "attempts": workspace.attempts,
             "workers": workers,
             "host": host(),

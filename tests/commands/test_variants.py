@@ -3,8 +3,13 @@
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
+from made_up_trials import trials_of
+
+from iowbc.commands.compare import report_together
 from iowbc.commands.compared import film_of, record
+from iowbc.commands.named import Named
 from iowbc.commands.swept import points_of
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -20,8 +25,14 @@ def write_study(folder: Path) -> None:
 def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Command) -> None:
     write_study(folder)
     planned = command("plan", "both.yaml").stdout
-    assert planned.index("first:") < planned.index("all stages are cached") < planned.index("third:")
-    assert "2 stages would run" in planned  # eval for its trials, export for its name
+    rows = [line.split() for line in planned.splitlines()]
+    assert rows[0] == ["recipe", "rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+    assert rows[1] == ["first", *["cached"] * 6]
+    assert rows[2][:6] == ["third", *["cached"] * 4, "run"]
+    assert rows[2][6].replace(".", "").isdigit(), "eval has more trials: its rate is known"
+    assert rows[2][9].startswith("~"), "export has another name: its time is like that of the other"
+    assert "2 recipes: 2 stages would run, 0 are shared, 10 cached; roughly " in planned
+    assert "`iowbc plan third` says why" in planned
     done = command("run", "both.yaml")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count(": runs - ") == 2
@@ -54,6 +65,54 @@ def test_a_wrong_variant_is_named_before_any_runs(folder: Path, command: Command
     done = command("run", "both.yaml")
     assert done.returncode == 2
     assert "third.yaml:2:8: key 'eval.trails' = 3" in done.stderr
+
+
+def test_a_part_of_the_variants_is_compared_and_the_rest_named(folder: Path, command: Command) -> None:
+    write_study(folder)
+    done = command("compare", "both.yaml")
+    assert done.returncode == 0, done.stderr
+    assert "not compared, for their eval has not run: first, third; `iowbc plan both.yaml` says how long" in done.stdout
+    assert (folder / "runs" / "compare" / "both" / "metrics.md").is_file()
+
+
+def test_a_second_training_shares_the_reference_generator(folder: Path, command: Command) -> None:
+    (folder / "again.yaml").write_text("extends: first.yaml\nteacher: {seed: 7}\ndistill: {seed: 7}\n")
+    planned = command("plan", "again.yaml").stdout
+    assert "rg-fit      cached" in planned
+    assert "teacher.seed (again.yaml:2:11): (absent) -> 7" in planned
+
+
+def evaluated(folder: Path, name: str, label: str, error: float, seed: int | None, steps: int) -> Named:
+    """A run whose trials have these errors."""
+    artifact = SimpleNamespace(folder=folder / name, recipe={"eval": {"success": {"capacity_rate": 0.8}}}, metrics={})
+    artifact.folder.mkdir()
+    trials_of(label, "lifting", {0.0: 5, 4.0: 5}, error=error).to_parquet(artifact.folder / "trials.parquet")
+    teacher = {"steps": steps} if seed is None else {"steps": steps, "seed": seed}
+    recipe = {"name": name, "seed": 3, "stages": ["teacher", "eval"], "teacher": teacher, "eval": {"label": label}}
+    return Named(name, {"eval": artifact}, recipe)
+
+
+def test_trainings_that_differ_in_their_seeds_alone_are_one_variant(tmp_path: Path) -> None:
+    runs = [
+        evaluated(tmp_path, "full", "IO-WBC", 0.1, None, 4096),
+        evaluated(tmp_path, "again", "IO-WBC", 0.2, 7, 4096),
+        evaluated(tmp_path, "longer", "IO-WBC", 0.4, None, 8192),
+    ]
+    report_together(runs, tmp_path, ["never"])
+    tables = tmp_path / "tables"
+    lifting = (tables / "lifting.md").read_text()
+    assert "| 0 kg | full | 0.350 ± " in lifting, "of ten trials; the label belongs to another recipe as well"
+    assert "(full: 2 trainings)" in lifting
+    assert "| longer | 0.600 ± " in lifting
+    assert "| full, seed 7 | 1 | 10 | 100 % " in (tables / "interquartile.md").read_text()
+    trainings = (tables / "trainings.md").read_text()
+    assert "not all with the same budget of PPO. Missing: never." in trainings
+    assert trainings.splitlines()[4:] == [
+        "| full | IO-WBC | 3 | 4,096 | – |",
+        "| again | IO-WBC | 7 | 4,096 | – |",
+        "| longer | IO-WBC | 3 | 8,192 | – |",
+        "| never | not evaluated yet | – | – | – |",
+    ]
 
 
 def test_the_film_of_a_comparison_is_found_by_its_runs_in_any_order(tmp_path: Path) -> None:

@@ -28,8 +28,9 @@ def test_a_greater_number_goes_on_from_the_finished_artifact(workplace: Workplac
     assert not step.cached
     assert step.predecessor == first
     assert f"extends {first.manifest.key[:8]}, which ends earlier" in step.notes
-    workplace.run("teacher.steps=8192")
+    second = workplace.run("teacher.steps=8192")["teacher"]
     assert told == [None, first.folder]
+    assert second.manifest.seconds > first.manifest.seconds, "the time from nothing, by which another one is reckoned"
 
 
 def test_of_several_it_goes_on_from_the_latest_that_is_whole(workplace: Workplace) -> None:

@@ -188,6 +188,15 @@ def test_what_is_left_of_an_interrupted_stage_is_reckoned_from_its_own_rate(work
     assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.record["seconds"])
 
 
+def test_where_more_differs_the_time_of_what_differs_least_is_told_as_rough(workplace: Workplace) -> None:
+    made = {name: artifact.manifest.seconds for name, artifact in workplace.run().items()}
+    step = workplace.plan("name=other", "teacher.steps=40960", "teacher.gamma=0.9")["teacher"]
+    assert step.roughly == step.guess == pytest.approx(10 * made["teacher"])
+    assert step.rate_of == "small"
+    assert workplace.plan("teacher.seed=9")["teacher"].roughly is None, "a seed changes no time"
+    assert workplace.plan("teacher.seed=9")["teacher"].expected == made["teacher"]
+
+
 def test_no_time_is_promised_for_other_values_nor_behind_them(workplace: Workplace) -> None:
     workplace.run()
     steps = workplace.plan("teacher.gamma=0.9")
