@@ -1,6 +1,6 @@
 # make test   sets everything up, then lint, types and tests
 # make run    sets everything up, then the quickstart recipe
-# make measure   makes the tables of the README anew
+# make measure   makes the figures of the README anew, those of published artifacts from their trials
 # make chaos   disturbs runs 240 times and counts what is lost (docs/reliability.md)
 # make chaos-nodes   kills nodes of a Ray cluster ten times over a run and a sweep (docs/cluster.md)
 # make docs   builds the documentation's site into build/site, to be opened without a network
@@ -36,7 +36,10 @@ run: setup
 
 measure: run
 	$(BIN)/iowbc show quickstart
-	$(BIN)/iowbc run recipes/full.yaml --until rg-fit
+	$(BIN)/iowbc run recipes/full.yaml
+	$(BIN)/iowbc show full
+	$(BIN)/iowbc run recipes/teacher.yaml
+	$(BIN)/iowbc run recipes/probe.yaml
 	$(BIN)/iowbc bench rg
 	$(BIN)/iowbc bench sim
 	$(BIN)/iowbc bench train

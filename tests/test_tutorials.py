@@ -1,5 +1,6 @@
 """The tutorials, as a reader follows them, at the smallest size."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -110,3 +111,27 @@ def test_the_documentations_files_are_yaml_that_recipes_can_be(place: Path) -> N
         write(page, place)
     for path in (place / "recipes").glob("*.yaml"):
         assert isinstance(yaml.safe_load(path.read_text()), dict), path
+
+
+def test_one_command_makes_every_figure_of_the_readme_anew() -> None:
+    makefile, readme = ((ROOT / name).read_text(encoding="utf-8") for name in ("Makefile", "README.md"))
+    made = makefile.partition("\nmeasure: run\n")[2].partition("\n\n")[0]
+    figures = readme.partition("## The simulation")[2]
+    benchmarks = set(re.findall(r"`(?:iowbc )?bench (\w+)", figures))
+    recipes = {*re.findall(r"`iowbc run (recipes/\w+\.yaml)", figures), *re.findall(r"`(recipes/probe\.yaml)", readme)}
+    assert {"sim", "train"} <= benchmarks
+    assert {"recipes/full.yaml", "recipes/teacher.yaml", "recipes/probe.yaml"} <= recipes
+    asked = [line.split("iowbc ")[1] for line in made.splitlines()]
+    assert {f"bench {name}" for name in benchmarks} | {f"run {recipe}" for recipe in recipes} <= set(asked)
+
+
+def test_every_page_stands_in_the_sites_contents_once() -> None:
+    def pages(entries: list[object]) -> list[str]:
+        found = []
+        for entry in entries:
+            below = next(iter(entry.values())) if isinstance(entry, dict) else entry
+            found += [below] if isinstance(below, str) else pages(below)
+        return found
+
+    contents = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
+    assert sorted(pages(contents)) == sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
