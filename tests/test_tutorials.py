@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -126,8 +127,8 @@ def test_one_command_makes_every_figure_of_the_readme_anew() -> None:
 
 
 def test_every_page_stands_in_the_sites_contents_once() -> None:
-    def pages(entries: list[object]) -> list[str]:
-        found = []
+    def pages(entries: list[Any]) -> list[str]:
+        found: list[str] = []
         for entry in entries:
             below = next(iter(entry.values())) if isinstance(entry, dict) else entry
             found += [below] if isinstance(below, str) else pages(below)
