@@ -14,6 +14,7 @@ from iowbc.pipeline.store.runs import read_yaml
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.reading.writing import as_yaml
+from iowbc.recipe.simulation.simulation import Simulation
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -169,6 +170,16 @@ def test_a_recipe_changes_what_it_extends_key_by_key(tmp_path: Path) -> None:
     assert found.place("teacher.steps") == f"{tmp_path}/mine.yaml:3:3"
     assert found.place("teacher.gamma") == f"{tmp_path}/base.yaml:4:3"
     assert found.place("teacher.clip") == "default"
+
+
+def test_a_section_that_is_off_by_default_may_hold_any_part_of_its_keys(tmp_path: Path) -> None:
+    file = tmp_path / "one.yaml"
+    file.write_text("eval: {simulation: {partner: {share: {probability: 0.5}}}}\n")
+    world = load_recipe(file).recipe.eval.simulation
+    usual = Simulation()
+    assert world is not None
+    assert world.partner.share == usual.partner.share.model_copy(update={"probability": 0.5})
+    assert world.model_dump(exclude={"partner"}) == usual.model_dump(exclude={"partner"})
 
 
 def test_an_error_in_an_inherited_file_names_that_file(tmp_path: Path) -> None:

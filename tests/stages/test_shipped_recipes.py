@@ -89,7 +89,11 @@ def test_a_variant_is_evaluated_in_the_world_where_iowbc_was_trained(name: str) 
 def test_the_papers_recipe_compares_them() -> None:
     study = load_study(RECIPES / "paper.yaml")
     assert study is not None
-    assert tuple(variant.recipe.eval.label for variant in study.variants) == VARIANTS_OF_THE_PAPER
+    assert tuple(dict.fromkeys(variant.recipe.eval.label for variant in study.variants)) == VARIANTS_OF_THE_PAPER
+
+
+def test_a_second_training_differs_in_its_seeds_alone() -> None:
+    assert differences(recipe("full_seed_1"), recipe("full")) - NAMES == {"teacher.seed", "distill.seed"}
 
 
 def test_without_distillation_the_policy_is_the_students_own_network() -> None:

@@ -19,11 +19,12 @@ LARGEST_NUMBER = 1e12
 
 
 def validate(tree: Located) -> Recipe:
-    """The recipe that a tree describes, laid upon the defaults: a section may hold any part of its keys.
+    """The recipe that a tree describes, laid upon the defaults: a section may hold any part of its keys, one that is
+    off by default, too.
 
     Raises `RecipeError` with all problems.
     """
-    whole = merged(_defaults(), tree)
+    whole = merged(_defaults(), _opened(tree, _defaults()))
     try:
         recipe = Recipe.model_validate(plain(whole))
     except ValidationError as error:
@@ -48,6 +49,32 @@ def validate(tree: Located) -> Recipe:
 def _defaults() -> Located:
     """What a recipe says that says nothing; only its name has to be given."""
     return located(Recipe(name="default").model_dump(mode="json", exclude={"name"}), "default")
+
+
+def _opened(tree: Located, base: Located, path: tuple[str, ...] = ()) -> Located:
+    """The tree with each section that is off by default laid upon that section's own defaults."""
+    if not isinstance(tree.value, dict):
+        return tree
+    if base.value is None:
+        return merged(_of_its_own(path), tree)
+    if not isinstance(base.value, dict):
+        return tree
+    known = base.value
+    entries = {
+        name: _opened(entry, known[name], (*path, name)) if name in known else entry
+        for name, entry in tree.value.items()
+    }
+    return Located(entries, tree.place)
+
+
+def _of_its_own(path: Sequence[str]) -> Located:
+    """Defaults of the section at a path, if it has one for every key."""
+    for model in models_at(path):
+        try:
+            return located(model().model_dump(mode="json"), "default")
+        except ValidationError:
+            continue
+    return Located(None, "default")
 
 
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
