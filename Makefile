@@ -43,6 +43,7 @@ measure: run
 	$(BIN)/iowbc bench rg
 	$(BIN)/iowbc bench sim
 	$(BIN)/iowbc bench train
+	$(BIN)/iowbc bench control full
 
 docs: setup
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
