@@ -8,6 +8,8 @@ from scipy import stats
 
 CONFIDENCE = 0.95
 """Of every interval in tables and figures."""
+ENDS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
+"""Quantiles between which that part lies."""
 RESAMPLES = 2000
 """Of a bootstrap."""
 
@@ -46,7 +48,7 @@ def determination_interval(
     values = 1.0 - error[spread > 0] / spread[spread > 0]
     if not len(values):
         return math.nan, math.nan
-    low, high = np.quantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    low, high = np.quantile(values, ENDS)
     return float(low), float(high)
 
 
@@ -57,8 +59,7 @@ def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def percentile_interval(values: NDArray[np.float64]) -> tuple[float, float]:
     """Bootstrap interval from a statistic's values over resamples (n,), which may be infinite."""
-    ends = [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]
-    low, high = np.quantile(values, ends, method="nearest")
+    low, high = np.quantile(values, ENDS, method="nearest")
     return float(low), float(high)
 
 
