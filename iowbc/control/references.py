@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Mask, as_slice
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.gravity import ArmGravity
@@ -42,7 +42,7 @@ class ReferenceLayer:
         self.default_arms = robot.default_position[robot.interaction]
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
-        self.waist, self._waist_pitch = robot.waist, robot.waist_pitch
+        self.waist, self._waist_pitch = as_slice(robot.waist), as_slice(robot.waist_pitch)
         self._stride = Stride.of(robot, references.gait)
 
     def clamp(self, command: Array) -> Array:

@@ -30,7 +30,8 @@ RECIPE = "recipe.json"
 ROBOT = "robot"
 """Folder with the robot's description inside the exported folder."""
 GENERATOR = "rg"
-"""Folder with the reference generator: its feasible map clamps commands; its network is in the graph already."""
+"""Folder with the reference generator: its feasible map clamps commands; its network, which is in the graph, too, gives
+the posture for which the arms' references are computed."""
 LARGEST_CONTRACT = 1_000_000
 """Bytes of the largest contract that is read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
@@ -257,6 +258,16 @@ def require_sealed(contract: Contract, folder: Path, *names: str) -> None:
     """Raises ContractBroken for files that are to be read and that the contract has no digest of."""
     if unsealed := [name for name in names if name not in contract.files]:
         raise ContractBroken(f"{folder / CONTRACT}: says nothing of {' and '.join(unsealed)}; export again")
+
+
+def generator_folder(contract: Contract, folder: Path) -> Path | None:
+    """The reference generator's folder in an exported one, if it was exported with a generator. Raises ContractBroken
+    for a part of it that the contract has no digest of."""
+    parts = [f"{GENERATOR}/{name}" for name in GENERATOR_FILES]
+    if contract.files.keys().isdisjoint(parts):
+        return None
+    require_sealed(contract, folder, *parts)
+    return folder / GENERATOR
 
 
 def read_contract(folder: Path | str) -> Contract:

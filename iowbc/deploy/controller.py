@@ -4,7 +4,6 @@ controller = Controller.load("exported")
 targets = controller.step(Measured(...), command)     # every 1 / controller.frequency seconds
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -13,10 +12,9 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Mask, as_slice
 from iowbc.control import gait
-from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
-from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
+from iowbc.control.command import COMMAND, HEIGHT, YAW_RATE, approach, rate_limits
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import (
@@ -25,6 +23,7 @@ from iowbc.deploy.contract import (
     ROBOT,
     Contract,
     exported_folder,
+    generator_folder,
     read_contract,
     readable,
     require_sealed,
@@ -35,7 +34,8 @@ from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
 
-Generator = Callable[[Array, Array], Array]
+SAME_POSTURE = 1e-4
+"""How far the generator in the graph may be from that beside it [rad]: sums that are rounded in another order."""
 
 
 @dataclass(frozen=True)
@@ -80,19 +80,6 @@ class Loop:
     """H_t, as the graph returned it, float32."""
 
 
-class GraphReferences(ReferenceLayer):
-    """The reference layer whose generator is the one inside the graph."""
-
-    def __init__(self, robot: Robot, contract: Contract, feasible: FeasibleMap | None, generator: Generator) -> None:
-        super().__init__(robot, contract.references, None)
-        self.feasible = feasible
-        self._generator = generator
-
-    def support(self, arms: Array, command: Array) -> Array:
-        """θ_S_ref without the gait prior, (n, 15) [rad]."""
-        return self._generator(arms, command)
-
-
 class Controller:
     """The exported policy with its arm kinematics and gait clock, for n robots at once."""
 
@@ -101,13 +88,13 @@ class Controller:
         contract: Contract,
         robot: Robot,
         session: onnxruntime.InferenceSession,
-        feasible: FeasibleMap | None,
+        references: ReferenceLayer,
         robots: int,
     ) -> None:
         self.contract, self.robot, self.robots = contract, robot, robots
         self.frequency = contract.control_frequency
-        self._session = session
-        self._references = GraphReferences(robot, contract, feasible, self._support_reference)
+        self._session, self._references = session, references
+        self._support, self._interaction = as_slice(robot.support), as_slice(robot.interaction)
         self._largest_step = rate_limits(contract.commands.rates) / self.frequency
         self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
         self._blank = {port.name: np.zeros((robots, *port.shape), np.float32) for port in contract.inputs}
@@ -152,12 +139,12 @@ class Controller:
             found = {port.name: tuple(port.shape[1:]) for port in session.get_inputs()}
         if found != (said := {port.name: port.shape for port in contract.inputs}):
             raise ContractBroken(f"{folder / GRAPH}: inputs are {found}, the contract says {said}; export again")
-        map_file = f"{GENERATOR}/{FEASIBLE}"
-        with readable(folder / map_file):
-            feasible = FeasibleMap.load(folder / map_file) if map_file in contract.files else None
+        generator = generator_folder(contract, folder)
+        with readable(folder / GENERATOR):
+            references = ReferenceLayer(robot, contract.references, generator)
         with readable(folder / GRAPH):
-            controller = cls(contract, robot, session, feasible, robots)
-            outputs = run(session, controller._blank)
+            controller = cls(contract, robot, session, references, robots)
+            outputs, posture = controller._at_rest()
         made = {name: value.shape[1:] for name, value in outputs.items()}
         if made != (said := {port.name: port.shape for port in contract.outputs}):
             raise ContractBroken(f"{folder / GRAPH}: outputs are {made}, the contract says {said}; export again")
@@ -165,6 +152,11 @@ class Controller:
         if broken:
             raise ContractBroken(
                 f"{folder / GRAPH}: {', '.join(broken)} not finite: the weights are no numbers; export again"
+            )
+        if not (apart := float(np.abs(outputs["support_reference"] - posture).max())) <= SAME_POSTURE:
+            raise ContractBroken(
+                f"{folder / GRAPH}: its reference generator is {apart:.1e} rad away from the one in "
+                f"{folder / GENERATOR}; export again"
             )
         return controller
 
@@ -188,7 +180,7 @@ class Controller:
         wanted = np.asarray(command, np.float64)
         if wanted.ndim == 1:
             wanted = np.tile(wanted, (self.robots, 1))
-        self._check("command", wanted, self._loop.command.shape)
+        self._checked("command", wanted, self._loop.command.shape)
         given = self._given(measured)
         loop = self._advanced(wanted, limit_rates)
         heading = np.where(loop.starts, given["heading"][:, 0], loop.heading_reference)
@@ -207,10 +199,8 @@ class Controller:
         )
         outputs = run(self._session, inputs)
         position = np.empty((self.robots, len(self.contract.joints)))
-        position[:, self.robot.support] = outputs["support_target"]
-        position[:, self.robot.interaction] = self._references.arm_target(
-            loop.arms, loop.posture, loop.command, self._load
-        )
+        position[:, self._support] = outputs["support_target"]
+        position[:, self._interaction] = self._references.arm_target(loop.arms, loop.posture, loop.command, self._load)
         passed, held = self._guard.passed(position, loop.starts, given["joint_position"].astype(np.float64))
         whole: Mask = np.asarray(np.isfinite(outputs["history_next"]).all(axis=(1, 2)))
         self._loop = replace(
@@ -225,10 +215,11 @@ class Controller:
 
     def _given(self, measured: Measured) -> Values:
         """The measured inputs of the graph, checked."""
-        names = [field.name for field in fields(measured) if field.name in self._blank]
-        for name in names:
-            self._check(name, getattr(measured, name), self._blank[name].shape)
-        return self._as_inputs(**{name: getattr(measured, name) for name in names})
+        return {
+            field.name: self._checked(field.name, getattr(measured, field.name), self._blank[field.name].shape)
+            for field in fields(measured)
+            if field.name in self._blank
+        }
 
     def _advanced(self, wanted: Array, limit_rates: bool) -> Loop:
         """Command, references and gait clock of this step; robots that start are settled in their grasp."""
@@ -237,7 +228,9 @@ class Controller:
         limited = approach(loop.command, wanted, self._largest_step) if limit_rates else wanted
         command = self._references.clamp(np.where(starts[:, None], wanted, limited))
         moving = gait.wants_to_move(command, settings)
-        arms, posture = self._references.advance(loop.arms, loop.posture, command, self._grasp, dt)
+        arms, posture = loop.arms, loop.posture
+        if not starts.all():
+            arms, posture = self._references.advance(arms, posture, command, self._grasp, dt)
         phase, stepping = gait.advance(loop.phase, loop.stepping, moving, settings, dt)
         action = loop.action
         if starts.any():
@@ -249,25 +242,32 @@ class Controller:
             action = np.where(starts[:, None], np.float32(0.0), action)
         return replace(loop, command=command, arms=arms, posture=posture, phase=phase, stepping=stepping, action=action)
 
-    def _support_reference(self, arms: Array, command: Array) -> Array:
-        """θ_S_ref at rest, without the gait prior, from the generator inside the graph, (n, 15) [rad]."""
+    def _at_rest(self) -> tuple[Values, Array]:
+        """Outputs of the graph in the default posture, and what its θ_S_ref should be there, (n, support joints) [rad].
+
+        Raises whatever onnxruntime raises where the graph does not run.
+        """
+        command = np.zeros((self.robots, len(COMMAND)))
+        command[:, HEIGHT] = self.robot.default_height
+        arms = np.tile(self.robot.default_position[self.robot.interaction], (self.robots, 1))
         outputs = run(self._session, self._blank | self._as_inputs(command=command, arm_reference=arms))
-        return np.asarray(outputs["support_reference"], np.float64)
+        return outputs, self._references.support(arms, command)
 
     @staticmethod
     def _as_inputs(**values: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
         return {name: np.array(value, np.float32) for name, value in values.items()}
 
     @staticmethod
-    def _check(name: str, value: Array | None, shape: tuple[int, ...]) -> None:
+    def _checked(name: str, value: Array | None, shape: tuple[int, ...]) -> NDArray[np.float32]:
         if value is None:
             raise ValueError(f"{name}: this policy needs it, with shape {shape}; got nothing")
         if np.shape(value) != shape:
             raise ValueError(f"{name}: expected shape {shape}, got {np.shape(value)}")
         with np.errstate(over="ignore"):
-            finite = np.isfinite(np.asarray(value, np.float32)).all()
-        if not finite:
+            given = np.array(value, np.float32)
+        if not np.isfinite(given).all():
             raise ValueError(f"{name}: not finite: {value}")
+        return given
 
 
 def base_grasp(grasps: Grasps, scene: str) -> tuple[float, float, float]:

@@ -31,7 +31,15 @@ class TargetGuard:
         finite: Mask = np.asarray(np.isfinite(targets).all(axis=1))
         away = np.abs(np.where(finite[:, None], targets, last) - last) - self._reach * (1 + self._steps)[:, None]
         held: Mask = ~finite | (~starts & np.asarray((away > 0.0).any(axis=1)))
-        for robot in np.flatnonzero(held & (starts | (self._steps == 0))):
+        if held.any():
+            self._tell(held & (starts | (self._steps == 0)), finite, away)
+        self._steps = np.where(held, np.where(starts, 1, self._steps + 1), 0)
+        self._last = np.where(held[:, None], last, targets)
+        return self._last.copy(), held
+
+    def _tell(self, which: Mask, finite: Mask, away: Array) -> None:
+        """Log why robots hold their targets from now on."""
+        for robot in np.flatnonzero(which):
             joint = int(np.argmax(away[robot]))
             jump = f"the target of joint {joint} jumps by {away[robot, joint] + self._reach[joint]:.2f} rad"
             LOG.warning(
@@ -39,6 +47,3 @@ class TargetGuard:
                 robot,
                 jump if finite[robot] else "its targets are not finite",
             )
-        self._steps = np.where(held, np.where(starts, 1, self._steps + 1), 0)
-        self._last = np.where(held[:, None], last, targets)
-        return self._last.copy(), held

@@ -34,7 +34,8 @@ def step_seconds(folder: Path | str, steps: int) -> Array:
         command = given["command"][row].astype(np.float64)
         if row.start == 0:
             controller.reset()
-        start, used = time.perf_counter(), time.thread_time()
+        used, start = time.thread_time(), time.perf_counter()
         controller.step(measured, command)
-        taken[step] = time.perf_counter() - start, time.thread_time() - used
+        end = time.perf_counter()
+        taken[step] = end - start, time.thread_time() - used
     return taken

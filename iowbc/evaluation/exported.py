@@ -27,12 +27,9 @@ def exported_world(folder: Path) -> Specification:
         recipe = Recipe.model_validate_json(path.read_bytes())
     except ValidationError as error:
         raise ContractBroken(f"{path}: not a recipe of this version: {error}; export again") from error
-    parts = [f"{contract.GENERATOR}/{name}" for name in contract.GENERATOR_FILES]
-    generated = not said.files.keys().isdisjoint(parts)
-    if generated:
-        contract.require_sealed(said, folder, *parts)
+    generator = contract.generator_folder(said, folder)
     with contract.readable(folder):
-        return Specification(recipe, folder / contract.ROBOT, folder / contract.GENERATOR if generated else None)
+        return Specification(recipe, folder / contract.ROBOT, generator)
 
 
 class ExportedPolicy:

@@ -260,6 +260,36 @@ def test_targets_that_are_no_numbers_are_not_passed_on(
     assert np.isfinite(again.position).all()
 
 
+def test_a_step_runs_the_graph_once_the_first_one_too(
+    exported: Path, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller, graph, runs = Controller.load(exported), controller_module.run, []
+
+    def counted(session: Any, inputs: Any) -> Any:
+        runs.append(inputs)
+        return graph(session, inputs)
+
+    monkeypatch.setattr(controller_module, "run", counted)
+    controller.step(measured(robot), NOMINAL)
+    assert len(runs) == 1
+    controller.step(measured(robot), NOMINAL)
+    assert len(runs) == 2
+
+
+def test_a_robot_that_starts_leaves_the_others_on_their_way(exported: Path, robot: Robot) -> None:
+    both, alone = Controller.load(exported, robots=2), Controller.load(exported)
+    reach = NOMINAL + np.eye(11)[5] * 0.1
+    for controller, rows in ((both, 2), (alone, 1)):
+        controller.step(measured(robot, rows), NOMINAL)
+        controller.step(measured(robot, rows), reach)
+    both.reset(np.array([False, True]))
+    pair, one = both.step(measured(robot, 2), reach), alone.step(measured(robot), reach)
+    assert pair.position[0] == pytest.approx(one.position[0], abs=1e-6)
+    fresh = Controller.load(exported).step(measured(robot), reach)
+    assert pair.position[1] == pytest.approx(fresh.position[0], abs=1e-6)
+    assert np.abs(fresh.position - one.position).max() > 0.01
+
+
 def test_weights_that_are_no_numbers_are_refused(exported: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(exported, tmp_path / "weights")
     model = onnx.load(folder / GRAPH)

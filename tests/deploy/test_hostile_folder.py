@@ -3,6 +3,7 @@
 import io
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import onnx
 import pytest
 import yaml
 
+from iowbc.control.generator import ReferenceNetwork
 from iowbc.deploy.contract import CONTRACT, Contract, read_contract, seal
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
@@ -64,6 +66,9 @@ def sealed(exported: Path, place: Path, name: str, content: bytes) -> Path:
         ),
         ("rg/feasible.npz", b""),
         ("rg/feasible.npz", pickled()),
+        ("rg/rg.json", b"[]"),
+        ("rg/rg.json", b"{"),
+        ("rg/rg.safetensors", b""),
     ],
 )
 def test_a_part_that_is_not_what_its_name_says_is_named(
@@ -116,6 +121,14 @@ def test_a_graph_with_other_outputs_is_refused(exported: Path, tmp_path: Path) -
     model.graph.output.pop()
     folder = sealed(exported, tmp_path / "folder", "policy.onnx", model.SerializeToString())
     with pytest.raises(ContractBroken, match="outputs are"):
+        Controller.load(folder)
+
+
+def test_a_generator_other_than_the_graphs_own_is_refused(exported: Path, tmp_path: Path) -> None:
+    network = ReferenceNetwork.load(exported / "rg")
+    replace(network, output_mean=network.output_mean + np.float32(0.01)).save(tmp_path)
+    folder = sealed(exported, tmp_path / "folder", "rg/rg.safetensors", (tmp_path / "rg.safetensors").read_bytes())
+    with pytest.raises(ContractBroken, match=r"policy\.onnx: its reference generator is 1\.0e-02 rad away"):
         Controller.load(folder)
 
 
