@@ -70,14 +70,14 @@ def test_plain_lines_come_once_in_an_interval() -> None:
     assert stream.getvalue() == "teacher: runs\n"
 
 
-def drawn(width: int, stopping: str = "") -> str:
-    """The live table of a run whose teacher trains, as a terminal of this width shows it."""
+def drawn(width: int, stopping: str = "", total: float = 1.0) -> str:
+    """The live table of a run whose teacher has trained 0.4 of a total, as a terminal of this width shows it."""
     console = Console(file=io.StringIO(), force_terminal=True, width=width, record=True)
     display = LiveTable(console, lambda: stopping)
     views = [StageView("rg-dataset", state="cached", note="published"), StageView("teacher", state="runs")]
     views[1].began = time.monotonic() - 7500.0
     for step in range(1, 9):
-        views[1].progress(0.05 * step, 1.0, "12.3 s an episode, 5 % fall, level 1.23, KL 0.012, 4,500 steps/s")
+        views[1].progress(0.05 * step, total, "12.3 s an episode, 5 % fall, level 1.23, KL 0.012, 4,500 steps/s")
         views[1].measured("episode_seconds", step, 1.5 * step)
     display.begin(views)
     display.end()
@@ -103,6 +103,13 @@ def test_a_narrow_terminal_leaves_out_the_curve_then_the_notes() -> None:
     assert "episode_seconds" not in drawn(99)
     assert "an episode" in drawn(60)
     assert "an episode" not in drawn(59)
+
+
+def test_a_stage_whose_work_is_done_says_that_it_finishes() -> None:
+    row = next(line for line in drawn(80, total=0.4).splitlines() if line.startswith("teacher"))
+    assert "100 %" in row
+    assert "finishing" in row
+    assert "0.0 s" not in row
 
 
 def test_lines_that_are_said_scroll_by_above_the_live_table() -> None:

@@ -182,6 +182,20 @@ def test_a_section_that_is_off_by_default_may_hold_any_part_of_its_keys(tmp_path
     assert world.model_dump(exclude={"partner"}) == usual.model_dump(exclude={"partner"})
 
 
+def test_a_recipe_of_ones_own_extends_one_of_the_package_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shipped = load_recipe("quickstart").recipe.teacher.steps
+    for word in ("quickstart.yaml", "quickstart"):
+        assert load_recipe(write(tmp_path, f"extends: {word}\n")).recipe.teacher.steps == shipped
+    (text,) = problems(tmp_path, "extends: quikstart.yaml\n")
+    assert "recipes by name: alone, " in text
+    assert text.endswith("did you mean 'quickstart.yaml'?")
+    write(tmp_path, "teacher: {steps: 4096}\n", "quickstart.yaml")
+    assert load_recipe(write(tmp_path, "extends: quickstart.yaml\n")).recipe.teacher.steps == 4096
+
+
 def test_an_error_in_an_inherited_file_names_that_file(tmp_path: Path) -> None:
     write(tmp_path, "seed: none\n", "base.yaml")
     (text,) = problems(tmp_path, "extends: base.yaml\n")
@@ -209,7 +223,7 @@ def test_a_recipe_names_a_known_robot_and_the_command_line_any_folder(tmp_path: 
 
 def test_a_missing_file_lists_the_recipes_beside_it(tmp_path: Path) -> None:
     write(tmp_path, "seed: 1\n", "full.yaml")
-    with pytest.raises(RecipeError, match=r"no such file; recipes in .*: full.yaml; did you mean 'full.yaml'\?"):
+    with pytest.raises(RecipeError, match=r"no such file; recipes in .*: full.yaml; .*did you mean 'full.yaml'\?"):
         load_recipe(tmp_path / "ful.yaml")
 
 
@@ -221,8 +235,9 @@ def test_a_recipe_is_found_by_its_name_here_first_then_in_the_package(
     (tmp_path / "recipes").mkdir()
     write(tmp_path / "recipes", "seed: 77\n", "quickstart.yaml")
     assert load_recipe("quickstart").recipe.seed == 77
-    with pytest.raises(RecipeError, match=r"recipes by name: quickstart, .*did you mean 'quickstart'"):
+    with pytest.raises(RecipeError, match=r"^recipe quikstart: no .*by name: quickstart, .*did you mean 'quickstart'"):
         load_recipe("quikstart")
+    assert load_recipe("smoke.yaml").recipe.name == "smoke"
 
 
 def test_an_override_goes_before_the_file_and_is_its_own_place(tmp_path: Path) -> None:
@@ -242,6 +257,10 @@ def test_a_wrong_override_is_told_like_a_wrong_line(tmp_path: Path) -> None:
     assert text.startswith("--set teacher.step=5: key 'teacher.step' = 5: is not a key of 'teacher'")
     (text,) = problems(tmp_path, "seed: 1\n", "teacher.steps")
     assert "should read a.b.c=value" in text
+    (text,) = problems(tmp_path, "seed: 1\n", "task.reward.sync.height=2")
+    assert text.endswith("= 2: should be a section, with any of the keys weight, width")
+    (text,) = problems(tmp_path, "seed: 1\n", "seed=0..4")
+    assert text.endswith("'0..4': should be a valid integer; several values are for `iowbc sweep`")
     (text,) = problems(tmp_path, "stages: [teacher]\n", "stages.3=eval")
     assert text == "--set stages.3=eval: '3' is not an index of 'stages'; valid: 0 to 0"
 

@@ -99,7 +99,8 @@ def _row(view: StageView) -> tuple[Text | ProgressBar | str, ...]:
         return Text(view.name), state, "", "", duration(view.spent), "", ""
     bar = ProgressBar(total=1.0, completed=view.share, width=COLUMNS[""], pulse=not view.total)
     done = f"{100 * view.share:.0f} %" if view.total else ""
-    return Text(view.name), state, bar, done, duration(view.spent), duration(view.left), pace(view.rate)
+    left = "finishing" if view.share == 1.0 else duration(view.left)
+    return Text(view.name), state, bar, done, duration(view.spent), left, pace(view.rate)
 
 
 def _note(view: StageView) -> Text:

@@ -1,5 +1,6 @@
 """Where a recipe that is named on the command line lies."""
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,15 +9,22 @@ PACKAGE = Path(__file__).resolve().parents[2]
 
 
 def recipe_file(word: str | Path) -> Path:
-    """The file that a word means: the file itself, or, for a name without ending, the first recipe of that name.
+    """The file that a word means: the file itself, or, for a bare name with or without ending, the first of that name.
 
     Looked through are `./recipes`, the recipes of this checkout, and those of the installed package. A word that means
     nothing comes back as it is, for the reader to complain about.
     """
     path = Path(word)
-    if path.suffix in SUFFIXES or path.is_file() or path.name != str(word):
+    if path.is_file() or path.name != str(word):
         return path
-    return next((found for found in known_files() if found.stem == path.name), path)
+    return next((found for found in known_files() if path.name in (found.stem, found.name)), path)
+
+
+def extended_file(word: str, folder: Path) -> Path:
+    """The file that `extends` means in a recipe of a folder: one beside it, else what the word means anywhere."""
+    beside = Path(os.path.normpath(folder / word))
+    found = recipe_file(word)
+    return beside if beside.is_file() or not found.is_file() else found
 
 
 def known_files() -> Iterator[Path]:

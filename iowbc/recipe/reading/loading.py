@@ -9,7 +9,7 @@ from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.files import read_limited
 from iowbc.recipe.reading.beside import with_files
 from iowbc.recipe.reading.document import Located, leaves, merged, read_document
-from iowbc.recipe.reading.finding import SUFFIXES, known_files, recipe_file
+from iowbc.recipe.reading.finding import SUFFIXES, extended_file, known_files, recipe_file
 from iowbc.recipe.reading.overrides import overridden
 from iowbc.recipe.reading.validation import validate
 from iowbc.recipe.recipe import Recipe
@@ -90,8 +90,8 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
         return own
     if not isinstance(extends.value, str) or "\0" in extends.value:
         raise RecipeError([Problem(extends.place, "key 'extends': should be the name of one recipe file")])
-    parent = os.path.normpath(os.path.join(os.path.dirname(file), extends.value))
-    base = _resolve(parent, (*above, file), extends.place)
+    parent = extended_file(extends.value, Path(file).parent)
+    base = _resolve(os.fspath(parent), (*above, file), extends.place)
     inherited = {key: entry for key, entry in _mapping(base).items() if key not in OWN_KEYS}
     return merged(Located(inherited, base.place), own)
 
@@ -110,12 +110,19 @@ def read_text(file: str, place: str) -> str:
     except ValueError as error:
         raise RecipeError([Problem(place, f"recipe {error}")]) from None
     except OSError as error:
-        folder = Path(file).parent
-        known = sorted(str(found.name) for found in folder.glob("*.yaml")) if folder.is_dir() else []
-        listing = f"; recipes in {folder}: {', '.join(known)}" if known else ""
-        if Path(file).suffix not in SUFFIXES:
-            known = list(dict.fromkeys(found.stem for found in known_files()))
-            listing = f"; recipes by name: {', '.join(known)}" if known else ""
         reason = "no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")
-        text = f"recipe {file[-LONGEST_PATH:]}: {reason}{listing}{nearest(Path(file).name, known)}"
-        raise RecipeError([Problem(place, text)]) from None
+        named, text = f"recipe {file[-LONGEST_PATH:]}", f"{reason}{_listed(Path(file))}"
+        asked_for = place == f"{file}:1:1"
+        raise RecipeError([Problem(named, text) if asked_for else Problem(place, f"{named}: {text}")]) from None
+
+
+def _listed(missing: Path) -> str:
+    """What there is instead: the files beside it, where one with an ending was asked for, and recipes by name."""
+    folder, with_ending = missing.parent, missing.suffix in SUFFIXES
+    beside = sorted(found.name for found in folder.glob("*.yaml")) if with_ending and folder.is_dir() else []
+    elsewhere = list(dict.fromkeys(found.name for found in known_files() if found.parent != folder))
+    names = [Path(name).stem for name in elsewhere]
+    parts = [f"recipes in {folder}: {', '.join(beside)}"] if beside else []
+    parts += [f"recipes by name: {', '.join(names)}"] if names else []
+    choices = [*beside, *elsewhere] if with_ending else names
+    return "".join(f"; {part}" for part in parts) + nearest(missing.name, choices)

@@ -17,6 +17,9 @@ from iowbc.recipe.section import Named, Unfitting
 LARGEST_NUMBER = 1e12
 """No quantity, size or count of a recipe is larger."""
 
+SEVERAL = re.compile(r"[^,],[^,]|\d\.\.\d")
+"""What reads as more than one value: `1,2` or `0..4`."""
+
 
 def validate(tree: Located) -> Recipe:
     """The recipe that a tree describes, laid upon the defaults: a section may hold any part of its keys, one that is
@@ -124,6 +127,13 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
         text = f"is not a key {where}; valid: {', '.join(known) or 'none'}{hint}"
         return found.place, f"key '{'.'.join(path)}' = {shown(plain(found))}", text
     text = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
+    if error["type"] == "model_type":
+        known = sorted({name for model in models_at(path) for name in model.model_fields})
+        text = f"should be a section, with any of the keys {', '.join(known)}"
+    if error["type"].endswith("_parsing"):
+        text = text.split(",")[0]
+    if found.place.startswith("--set ") and isinstance(found.value, str) and SEVERAL.search(found.value):
+        text += "; several values are for `iowbc sweep`"
     if error["type"] == "string_type" and isinstance(found.value, (int, float)):
         text = "should be text; in quotes, a word that reads as a number is"
     if error["type"] in ("literal_error", "enum") and isinstance(found.value, str):
