@@ -1,6 +1,7 @@
 """`iowbc status`: what runs, what was left unfinished, and what the recipes have."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +87,7 @@ def _data(store: Store) -> dict[str, Any]:
             "stage": record.get("stage"),
             "recipe": record.get("recipe"),
             "key": folder.name,
-            "holder": holder(store.runs, folder.name),
+            "holder": asdict(who) if (who := holder(store.runs, folder.name)) else None,
             **{name: record.get(name) for name in ("done", "total", "seconds", "attempts", "updated", "note")},
         }
         for folder, record in unfinished(store.runs)

@@ -66,8 +66,12 @@ def test_status_tells_a_running_stage_from_a_stopped_one(workplace: Workplace) -
     command = workplace.start("run", "small.yaml", behaviour=SLOW)
     until(lambda: workplace.checkpoint("teacher") > 2)
     assert f"runs, process {command.process.pid}" in workplace.command("status").output
+    (told,) = json.loads(workplace.command("status", "--json").output)["unfinished"]
+    assert (told["stage"], told["holder"]["pid"]) == ("teacher", command.process.pid)
     command.signal(signal.SIGKILL)
     command.finish()
+    (told,) = json.loads(workplace.command("status", "--json").output)["unfinished"]
+    assert told["holder"] is None
     status = workplace.command("status").output
     assert "stopped" in status
     assert "teacher" in status
