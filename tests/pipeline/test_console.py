@@ -97,9 +97,14 @@ def test_the_live_table_keeps_every_stage_state_and_time_at_any_width(width: int
     assert lines[-1].startswith("teacher: 12.3 s an episode, 5 % fall")
 
 
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_a_typed_ctrl_c_that_the_terminal_echoes_fits_behind_every_line(width: int) -> None:
+    assert max(map(len, drawn(width).splitlines())) <= width - len("^C")
+
+
 def test_a_narrow_terminal_leaves_out_the_curve_then_the_notes() -> None:
     assert "▁▂▃▄▅▆▇█ episode_seconds 12" in drawn(120)
-    assert "▁▂▄▅▆█ episode_seconds 12" in drawn(100)
+    assert "▁▃▆█ episode_seconds 12" in drawn(100)
     assert "episode_seconds" not in drawn(99)
     assert "an episode" in drawn(60)
     assert "an episode" not in drawn(59)

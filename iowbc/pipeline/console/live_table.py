@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from rich.console import Console, Group
+from rich.constrain import Constrain
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
@@ -18,6 +19,8 @@ COLUMNS = {"stage": 10, "state": 7, "": 14, "done": 5, "spent": 11, "left": 11, 
 """Heads and widths of what is always shown: 74 characters with the spaces between them."""
 WITH_CURVES, WITH_NOTES = 100, 60
 """Narrower terminals [characters] show no curves, and yet narrower ones no notes."""
+ECHO = 2
+"""Characters that a terminal writes behind the last line where Ctrl-C is typed: `^C`."""
 REFRESH_RATE = 2.0
 """Redraws a second; each takes a moment from the stage."""
 STYLES = {
@@ -73,17 +76,18 @@ class LiveTable:
         """Nothing more comes."""
         self._live.stop()
 
-    def _drawn(self) -> Group:
+    def _drawn(self) -> Constrain:
         width = self.console.width
         notes = [_note(view) for view in self._views if view.note] if width >= WITH_NOTES else []
         stopping = self._stopping()
-        return Group(self._table(width), *notes, *([Text(stopping, style="magenta")] if stopping else []))
+        below = [Text(stopping, style="magenta")] if stopping else []
+        return Constrain(Group(self._table(width), *notes, *below), width - ECHO)
 
     def _table(self, width: int) -> Table:
         table = Table(box=None, padding=(0, 1, 0, 0), expand=False)
         for name, characters in COLUMNS.items():
             table.add_column(name, width=characters, no_wrap=True, overflow="ellipsis")
-        room = width - sum(COLUMNS.values()) - len(COLUMNS) - 1
+        room = width - ECHO - sum(COLUMNS.values()) - len(COLUMNS) - 1
         if width >= WITH_CURVES:
             table.add_column("curve", width=room, no_wrap=True, overflow="ellipsis")
         for view in self._views:
