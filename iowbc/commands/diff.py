@@ -1,10 +1,11 @@
 """`iowbc diff A B`: how two recipes or two artifacts differ in recipe, keys, versions and metrics."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
@@ -19,7 +20,9 @@ from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.planner import changed_code
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.recipe import Recipe
 
 ABSENT = "(absent)"
 """In place of a value that one of the two has not."""
@@ -92,19 +95,29 @@ def difference_lines(a: Named, b: Named) -> list[str]:
 
 def differences_of(a: Named, b: Named) -> Iterator[Difference]:
     """How two recipes or artifacts differ."""
-    yield from _changes("", "", a.recipe or {}, b.recipe or {})
+    yield from _changes("", "", _today(a.recipe), _today(b.recipe))
     yield from _stages(a, b)
 
 
 def _either(store: Store, word: str) -> Named:
-    """A recipe file counts as it is now; its artifacts are those that it used last."""
-    if Path(word).suffix in (".yaml", ".yml") and Path(word).is_file():
-        resolved = load_recipe(word).recipe.model_dump(mode="json")
-        try:
-            return Named(word, named(store, resolved["name"]).artifacts, resolved)
-        except UsageError:
-            return Named(word, {}, resolved)
-    return named(store, word)
+    """A recipe file counts as it is now, and so does one by its name that has not run; its artifacts are those that it
+    used last."""
+    file = recipe_file(word)
+    try:
+        found, as_file = named(store, word), file.is_file() and Path(word).suffix in SUFFIXES
+    except UsageError:
+        if not file.is_file():
+            raise
+        found, as_file = Named(word, {}), True
+    return replace(found, recipe=load_recipe(file).recipe.model_dump(mode="json")) if as_file else found
+
+
+def _today(recipe: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """A resolved recipe with the defaults of fields that came after it was written; as it is where that fails."""
+    try:
+        return {} if recipe is None else Recipe.model_validate(recipe).model_dump(mode="json")
+    except ValidationError:
+        return recipe or {}
 
 
 def _stages(a: Named, b: Named) -> Iterator[Difference]:

@@ -10,6 +10,7 @@ from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
+from iowbc.commands.results import POLICIES
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
@@ -20,8 +21,6 @@ from iowbc.pipeline.store.store import Store
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
 
-POLICIES = ("export", "distill", "teacher")
-"""Stages that leave a policy, the one to prefer first."""
 CONTRACT = "contract.json"
 """Every exported folder has one."""
 

@@ -10,10 +10,12 @@ from rich.console import Console
 from rich.text import Text
 
 from iowbc.commands.drawn_table import drawn, read_table
-from iowbc.pipeline.console.wording import figure
+from iowbc.commands.named import last_used
+from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
 
 HEADLINES: Mapping[str, tuple[str, ...]] = {
     "rg-dataset": ("samples", "kept", "crosscheck_p90"),
@@ -29,6 +31,8 @@ METRICS_SHOWN = 3
 TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "trainings", "probe")
 """Tables that are drawn; the others are named."""
 EXPORTED = "policy.onnx"
+POLICIES = ("export", "distill", "teacher")
+"""Stages that leave a policy, the one to prefer first."""
 
 
 def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console, word: str) -> None:
@@ -72,10 +76,21 @@ def described(artifacts: Mapping[str, Artifact]) -> str:
 
 
 def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
-    """What a user would type next: to see the robot, where there is a policy, and to read about the run."""
+    """What a user would type next: to see the robot, where there is a policy, and to read about the run.
+
+    What a run with overrides made goes by its key: the recipe's name stands for what it has without any.
+    """
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
-    seen = ["iowbc", "play", word] if {"teacher", "distill", "export"} & artifacts.keys() else ["iowbc", "show", word]
-    return [shlex.join([*words, *elsewhere]) for words in (seen, ["iowbc", "report", recipe])]
+    own = last_used(Store(runs), recipe)
+    others = {
+        stage: artifact.manifest.key[:KEY_LENGTH]
+        for stage, artifact in artifacts.items()
+        if stage not in own or own[stage].manifest.key != artifact.manifest.key
+    }
+    policy = next((stage for stage in POLICIES if stage in artifacts), None)
+    seen = [["iowbc", "play", others.get(policy, word)]] if policy else [] if others else [["iowbc", "show", word]]
+    read = ["iowbc", "show", [*others.values()][-1]] if others else ["iowbc", "report", recipe]
+    return [shlex.join([*words, *elsewhere]) for words in (*seen, read)]
 
 
 def _print_tables(folder: Path, console: Console) -> None:

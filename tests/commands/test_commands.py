@@ -131,6 +131,14 @@ def test_diff_names_fields_keys_and_metrics(folder: Path, command: Command, key:
     assert command("diff", "first", "first").stdout == "no difference\n"
     (folder / "third.yaml").write_text("extends: first.yaml\nseed: 8\n")
     assert "seed: 3 -> 8" in command("diff", "first", "third.yaml").stdout
+    assert (
+        "teacher.seed: None -> 1" in command("diff", "first", "full_seed_1").stdout
+    )  # a recipe by its name, which has not run
+    path = folder / "runs" / "recipes" / "first.json"
+    record = json.loads(path.read_text())
+    del record["recipe"]["distill"]["seed"]  # as written before there was such a field
+    path.write_text(json.dumps(record))
+    assert "distill.seed" not in command("diff", "first", "second").stdout
 
 
 def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves(

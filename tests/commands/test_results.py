@@ -9,7 +9,7 @@ from rich.console import Console
 
 from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.named import last_used
-from iowbc.commands.results import headline, print_results
+from iowbc.commands.results import headline, next_commands, print_results
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
@@ -86,3 +86,14 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
         ["iowbc", "report", "first"],
     ]
     assert len(lines) < 35
+
+
+def test_what_a_run_with_overrides_made_goes_by_its_key(folder: Path) -> None:
+    runs = Runs(folder / "runs")
+    other = last_used(Store(runs), "second")  # another teacher, from which the same student comes
+    key = other["teacher"].manifest.key[:12]
+    for stages, played in ((("teacher", "distill"), "first.yaml"), (("teacher",), key)):
+        made = {stage: other[stage] for stage in stages}
+        play, show = next_commands(runs, "first", made, "first.yaml")
+        assert play.split()[:3] == ["iowbc", "play", played]
+        assert show.split()[:3] == ["iowbc", "show", key]
