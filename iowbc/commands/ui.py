@@ -49,6 +49,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     command = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(port), "--workers", "1"]
     command += ["--backend-store-uri", uri, "--artifacts-destination", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
+    environment.setdefault("PYTHONWARNINGS", "ignore")  # of MLflow's own code, which a user can do nothing about
     with subprocess.Popen(command, env=environment) as server:
         try:
             return server.wait()

@@ -92,6 +92,7 @@ def answers_and_ends(tmp_path: Path, environment: Mapping[str, str]) -> None:
             assert answer.read() == b"a table"
         server.send_signal(signal.SIGTERM)
         assert server.wait(timeout=30) == 130
+    assert "Warning" not in (tmp_path / "log.txt").read_text()
     assert not (tmp_path / "mlflow.db").exists()
     with socket.socket() as probe:
         assert probe.connect_ex(("127.0.0.1", port)) != 0
