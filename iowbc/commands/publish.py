@@ -18,17 +18,22 @@ def publish_recipe(request: Request, registry: Mapping[str, Stage], console: Con
 
     Code that changed since an artifact was made is no obstacle, and is said.
     """
-    steps = [step for loaded in recipes(request) for step in prepared(loaded, request, registry)[0].plan()]
+    planners = [prepared(loaded, request, registry)[0] for loaded in recipes(request)]
+    steps = [step for planner in planners for step in planner.plan()]
     missing = [step.stage.name for step in steps if not step.cached]
     if missing:
         raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command([])}")
     require_writable_runs(request.runs)
-    steps = list({step.key: step for step in steps}.values())
-    for step in steps:
-        assert step.artifact is not None
-        copy = step.artifact if step.artifact.published else publish(request.runs, step.artifact)
+    notes = {step.key: step.notes for step in steps}
+    started = [
+        artifact for planner in planners for stage in planner.stages for artifact in planner.start(stage).values()
+    ]
+    made = [step.artifact for step in steps if step.artifact is not None]
+    for key, artifact in {artifact.manifest.key: artifact for artifact in (*made, *started)}.items():
+        copy = artifact if artifact.published else publish(request.runs, artifact)
         left_out = ", ".join(copy.manifest.omitted)
-        notes = [f"without {left_out}"] if left_out else []
-        text = "; ".join([f"{step.stage.name}: {shown_path(copy.folder)} ({size(copy.size)})", *notes, *step.notes])
+        without = [f"without {left_out}"] if left_out else []
+        what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({size(copy.size)})"
+        text = "; ".join([what, *without, *notes.get(key, ())])
         console.print(text, markup=False, highlight=False, soft_wrap=True)
     console.print(f"{size(published_size(request.runs))} are published in all", highlight=False)

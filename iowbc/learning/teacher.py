@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
+from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
 from iowbc.learning.best import Best
@@ -143,6 +144,21 @@ class TeacherTraining:
             "counters": np.array([model.num_timesteps, model._n_updates]),
             "learning_rate": np.array([model.learning_rate]),
         }
+
+    def begin(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Starts from what another training had learnt when it was `arrays`, with its step size where that may move.
+
+        Raises StageFailed where its networks are of another shape.
+        """
+        returns = {"normalization/discounted": self.model.normalization.discounted}
+        try:
+            self._learn_again({**arrays, **returns})
+        except (RuntimeError, KeyError) as error:
+            names = "teacher.hidden, activation, symmetry, value_only and history"
+            raise StageFailed(f"teacher.start: that teacher's networks are other ones; {names} say which") from error
+        if self.settings.desired_kl is not None:
+            self.model.learning_rate = float(np.clip(arrays["learning_rate"][0], *self.settings.learning_rate_range))
+        self.best = Best(self.settings.check, self._learnt())
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `arrays`, on a training made from the same recipe."""

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.nested import MISSING, differences, nested
-from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.stage import START, Stage
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
@@ -105,6 +106,8 @@ class Planner:
         problems = [(path, text) for stage in chosen for path, text in stage.problems(self.loaded.recipe)]
         if problems:
             raise RecipeError([Problem(self.loaded.place(path), f"key '{path}': {text}") for path, text in problems])
+        for stage in chosen:
+            self.start(stage)
         return chosen
 
     def plan(self) -> list[Step]:
@@ -112,7 +115,7 @@ class Planner:
         steps: dict[str, Step] = {}
         for stage in self.stages:
             inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
-            step = self.decide(stage, inputs)
+            step = self.decide(stage, {**inputs, **self.start(stage)})
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
@@ -121,6 +124,36 @@ class Planner:
                 if not steps[stage.name].cached and steps[name].cached and made is not None and not made.whole:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         return list(steps.values())
+
+    def start(self, stage: Stage) -> dict[str, Artifact]:
+        """The artifact that a stage begins from, by its name among the inputs; empty where the recipe names none.
+
+        Raises `RecipeError` for one that is not stored, or damaged.
+        """
+        prefix = None if stage.starts_from is None else attrgetter(stage.starts_from)(self.loaded.recipe)
+        if prefix is None:
+            return {}
+        found = [one for one in self.store.artifacts(stage.name) if one.manifest.key.startswith(prefix)]
+        if len(found) != 1:
+            keys = ", ".join(one.manifest.key[:12] for one in found) or "none"
+            raise self._wrong_start(stage, f"should begin one key of {stage.name}, begins {keys}; `iowbc ls` has them")
+        try:
+            found[0].verify()
+        except Damaged as error:
+            raise self._wrong_start(stage, f"is damaged: {error}") from None
+        return {START: found[0]}
+
+    def _require_beginning(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> None:
+        """Raises `RecipeError` where what a stage begins from was published without the files that it takes."""
+        start = inputs.get(START)
+        lacking = [] if start is None else [name for name in stage.extends_from if name in start.manifest.omitted]
+        if lacking:
+            raise self._wrong_start(stage, f"was published without {', '.join(lacking)}; make it here, or take another")
+
+    def _wrong_start(self, stage: Stage, text: str) -> RecipeError:
+        path = stage.starts_from or ""
+        value = shown(attrgetter(path)(self.loaded.recipe))
+        return RecipeError([Problem(self.loaded.place(path), f"key '{path}' = {value}: {text}")])
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
         """Names of the stages whose artifacts a stage reads."""
@@ -183,6 +216,7 @@ class Planner:
             notes.extend(self._looks(stage, artifact))
         predecessor = None
         if found:
+            self._require_beginning(stage, inputs)
             notes.extend(self._checkpoint(stage, key))
             expected = self._rest(stage, key, expected)
             predecessor = None if stage.name in self.options.force else self._predecessor(stage, ingredients)

@@ -127,8 +127,12 @@ class Runner:
                     workspace.remove()
 
     def _decide(self, stage: Stage, whole: bool) -> Step:
-        inputs = {name: self.artifacts[name] for name in self.planner.reads(stage)}
-        return self.planner.decide(stage, inputs, whole=whole)
+        return self.planner.decide(stage, self._inputs(stage), whole=whole)
+
+    def _inputs(self, stage: Stage) -> dict[str, Artifact]:
+        """What a stage reads, by name."""
+        read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
+        return {**read, **self.planner.start(stage)}
 
     def _reused(self, step: Step, artifact: Artifact, view: StageView) -> Artifact:
         notes = ("published", *step.notes) if artifact.published else step.notes
@@ -170,7 +174,7 @@ class Runner:
             recipe=self.loaded.recipe,
             key=key,
             robot=self.robot,
-            inputs={name: self.artifacts[name].folder for name in self.planner.reads(stage)},
+            inputs={name: artifact.folder for name, artifact in self._inputs(stage).items()},
             out=workspace.out,
             work=workspace.scratch,
             workers=workers,

@@ -3,10 +3,12 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import START, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, train
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from iowbc.evaluation.trials.quick import QuickEvaluation
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.task.specification import Specification
+    from iowbc.task.vector.vector_env import VectorEnv
 
 VIDEOS = "videos"
 """Folder of the films made while training."""
@@ -84,6 +87,8 @@ def run(job: Job) -> None:
             score=score,
             say=job.report.say,
         )
+        if START in job.inputs:
+            _begin(training, environments, job.inputs[START])
         look = None if films is None else partial(_film, job, training, films)
         curves = train(job, training, settings.checkpoint_every, _note, look)
         leave_extendable(job, training)
@@ -100,6 +105,19 @@ def run(job: Job) -> None:
     figures = curves.write_artifact(job.out, f"{recipe.name}: teacher", PANELS, terms)
     kept = {"best_score": training.best.score} if settings.check.every is not None else {}
     job.summarize(kept | figures)
+
+
+def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) -> None:
+    """Gives a training what another one ended with. Raises StageFailed where that sees or does something else."""
+    from safetensors.numpy import load_file
+
+    from iowbc.learning.storage import load_network
+
+    _, about = load_network(start)
+    if about["layout"] != environments.layout.describe():
+        raise StageFailed("teacher.start: that teacher observes something else; leave the observation as it was")
+    training.begin(load_file(start / STATE))
+    environments.set_curriculum(about["curriculum"])
 
 
 def _check(world: "Specification", workers: int) -> "QuickEvaluation":
@@ -163,5 +181,6 @@ STAGE = Stage(
     packages=("stages.teacher", "stages.training", "learning", "rollouts", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",
     extends_from=(STATE, TABLE),
+    starts_from="teacher.start",
     counts=("teacher.steps",),
 )

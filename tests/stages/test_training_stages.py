@@ -4,6 +4,7 @@ import dataclasses
 import json
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from stage_jobs import make_job
 from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
+from iowbc.errors import StageFailed
 from iowbc.learning.acting import StudentPolicy, load_policy
 from iowbc.learning.storage import load_network, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
+from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import distill, evaluate, export, teacher
 from iowbc.stages.inputs import leaves_student
@@ -58,6 +61,40 @@ def test_a_longer_training_goes_on_from_the_finished_one_as_if_it_had_never_stop
         paths = [tmp_path / which / "out" / name for which in ("unbroken", "extended")]
         assert paths[0].read_bytes() == paths[1].read_bytes(), name
     assert rows(tmp_path / "unbroken" / "work") == rows(tmp_path / "extended" / "work")
+
+
+def test_a_training_begins_with_what_another_one_has_learnt(trained: Path, tmp_path: Path) -> None:
+    before = load_file(trained / "teacher" / "out" / "state.safetensors")
+    still = small_recipe(
+        steps=ENVIRONMENTS * 16, learning_rate_range=[1e-12, 1e-12], learning_rate=1e-12, std_learning_rate=1e-12
+    )
+    job = make_job(tmp_path, still, inputs={"start": trained / "teacher" / "out"}, workers=0)
+    teacher.STAGE.run(job)
+    after = load_file(job.out / "state.safetensors")
+    assert after["counters"].tolist() == [64, 2], "its own steps and gradient steps"
+    weights = [name for name in before if name.startswith("policy/") and name.endswith("weight")]
+    assert weights
+    for name in weights:
+        np.testing.assert_allclose(after[name], before[name], rtol=1e-5, atol=1e-7, err_msg=name)
+    assert after["normalization/observation_count"] > before["normalization/observation_count"]
+
+
+@pytest.mark.parametrize(
+    ("task", "changes", "text"),
+    [
+        ({}, {"hidden": [16, 16]}, "networks are other ones"),
+        ({"observation": {"observe_object": False}}, {}, "observes something else"),
+    ],
+)
+def test_a_beginning_that_does_not_fit_is_refused(
+    trained: Path, tmp_path: Path, task: dict[str, Any], changes: dict[str, Any], text: str
+) -> None:
+    recipe = small_recipe(**changes)
+    other = recipe.model_dump(mode="json")
+    other["task"] |= task
+    job = make_job(tmp_path, Recipe.model_validate(other), inputs={"start": trained / "teacher" / "out"}, workers=0)
+    with pytest.raises(StageFailed, match=text):
+        teacher.STAGE.run(job)
 
 
 def test_a_training_is_filmed_at_its_parts_and_learns_the_same(trained: Path, tmp_path: Path) -> None:
