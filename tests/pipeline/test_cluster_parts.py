@@ -42,7 +42,8 @@ def test_a_node_fetches_a_folder_once_and_mends_a_damaged_copy(source: Folder) -
     first = placed(source, fetch, copy=True)
     assert first != Path(source.path)
     assert folder_digest(first) == source.digest
-    assert placed(replace(source, path="/elsewhere"), fetch, copy=False) == first
+    assert first.name == Path(source.path).name, "the name of an artifact's folder is its key"
+    assert placed(replace(source, path="/elsewhere/driver"), fetch, copy=False) == first
     assert len(fetched) == 1
     (first / "net.bin").write_bytes(b"no longer what it was")
     assert folder_digest(placed(source, fetch, copy=True)) == source.digest

@@ -43,12 +43,13 @@ def write_files(folder: Path, files: Files) -> None:
 def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path:
     """Where a folder lies on this machine: where the driver has it, if this machine sees it; else a copy of its own.
 
-    The copy stays for later stages. copy: take a copy in any case. Raises `Damaged` where what arrives differs.
+    The copy stays for later stages, under the folder's own name, which is the key of an artifact. copy: take a copy in
+    any case. Raises `Damaged` where what arrives differs.
     """
     there = Path(folder.path)
     if not copy and there.is_dir() and folder_digest(there) == folder.digest:
         return there
-    own = _cache() / folder.digest
+    own = _cache() / folder.digest / there.name
     if own.is_dir() and folder_digest(own) == folder.digest:
         return own
     shutil.rmtree(own, ignore_errors=True)
@@ -57,6 +58,7 @@ def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path
     if folder_digest(fresh) != folder.digest:
         shutil.rmtree(fresh)
         raise Damaged(f"{folder.path} differs from its digest after its way through Ray's object store")
+    own.parent.mkdir(exist_ok=True)
     try:
         os.rename(fresh, own)
     except OSError:  # another task of this machine was faster
