@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.text import Text
 
 from iowbc.commands.as_json import print_json
-from iowbc.commands.request import Request, prepared, recipes
+from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned
 from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
@@ -22,13 +22,13 @@ REASON_INDENT = 4
 
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a recipe of recipes a table of what would run of each."""
-    loaded = recipes(request)
-    planners = [prepared(one, request, registry)[0] for one in loaded]
+    asked = [prepared(one, request, registry)[0] for one in recipes(request)]
+    planners = list({each.loaded.file: each for planner in asked for each in in_order(planner)}.values())
     if as_json:
-        names = [one.recipe.name for one in loaded]
+        names = [planner.loaded.recipe.name for planner in planners]
         steps = [[_data(step) for step in planner.plan()] for planner in planners]
         print_json(console, [{"recipe": name, "stages": own} for name, own in zip(names, steps, strict=True)])
-    elif len(loaded) == 1:
+    elif len(planners) == 1:
         _print(planners[0].plan(), console)
     else:
         _print_several(planned(planners), request, console)

@@ -25,11 +25,10 @@ def publish_recipe(request: Request, registry: Mapping[str, Stage], console: Con
         raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command([])}")
     require_writable_runs(request.runs)
     notes = {step.key: step.notes for step in steps}
-    started = [
-        artifact for planner in planners for stage in planner.stages for artifact in planner.start(stage).values()
-    ]
-    made = [step.artifact for step in steps if step.artifact is not None]
-    for key, artifact in {artifact.manifest.key: artifact for artifact in (*made, *started)}.items():
+    made = [step.artifact for step in steps]
+    started = [found for planner in planners for stage in planner.stages for found in planner.start(stage).values()]
+    artifacts = {found.manifest.key: found for found in (*made, *started) if found is not None}
+    for key, artifact in artifacts.items():
         copy = artifact if artifact.published else publish(request.runs, artifact)
         left_out = ", ".join(copy.manifest.omitted)
         without = [f"without {left_out}"] if left_out else []

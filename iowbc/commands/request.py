@@ -74,3 +74,9 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
     check_against_robot(loaded, robot)
     return Planner(loaded, registry, Store(request.runs), robot, request.options), robot
+
+
+def in_order(planner: Planner) -> list[Planner]:
+    """What runs for a recipe: first those from whose artifacts it begins, where they are not stored, then itself."""
+    missing = [origin for origin in planner.origins.values() if not origin.plan()[-1].cached]
+    return [*(each for origin in missing for each in in_order(origin)), planner]

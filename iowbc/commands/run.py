@@ -8,7 +8,7 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare, film_together
 from iowbc.commands.engine import engine
-from iowbc.commands.request import Request, prepared, recipes
+from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.results import TABLES, described, print_results, shown_path
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
@@ -49,11 +49,13 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
             if cluster is not None and manner != "quiet":
                 console.print(cluster.text, highlight=False)
             for planner, robot in ready:
-                if len(ready) > 1 and manner != "quiet":
-                    console.print(f"{planner.loaded.recipe.name}:", highlight=False)
-                code = run_recipe(planner, robot, request, console, stop, manner, cluster=cluster)
-                if code != DONE:
-                    return code
+                order = in_order(planner)
+                for one in order:
+                    if (len(ready) > 1 or len(order) > 1) and manner != "quiet":
+                        console.print(f"{one.loaded.recipe.name}:", highlight=False)
+                    code = run_recipe(one, robot, request, console, stop, manner, cluster=cluster)
+                    if code != DONE:
+                        return code
     except KeyboardInterrupt:
         return INTERRUPTED
     if len(ready) > 1 and request.options.until is None and manner != "quiet":

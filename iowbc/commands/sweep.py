@@ -11,13 +11,13 @@ from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.engine import engine
 from iowbc.commands.named import Named, named
 from iowbc.commands.points import DONE, INTERRUPTED, STAGE_FAILED, Task, failure, run_processes, run_threads
-from iowbc.commands.request import Request, prepared
+from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.results import shown_path
 from iowbc.commands.run import run_recipe
 from iowbc.commands.sweep_plan import Planned, in_all, planned, print_plan
 from iowbc.commands.swept import record
 from iowbc.commands.training import require_training
-from iowbc.errors import Problem, RecipeError
+from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.console.board import Board, RunView
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
@@ -79,6 +79,18 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
     return found, points
 
 
+def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:
+    """Raises `UsageError` where points begin from what another recipe has not made yet: they would all wait for it."""
+    missing = [origin for one in points for origin in in_order(one.planner)[:-1]]
+    first = [
+        replace(asked, verb="run", word=str(origin.loaded.file), overrides=(), options=origin.options).command([])
+        for origin in missing
+    ]
+    if first:
+        lines = "\n  ".join(dict.fromkeys(first))
+        raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
+
+
 def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
     """Print what a sweep would run. Raises `RecipeError`."""
     found, points = ready(asked, registry)
@@ -86,11 +98,12 @@ def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Cons
 
 
 def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, quiet: bool = False) -> int:
-    """Run all points; returns the exit code. Raises `RecipeError`.
+    """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
 
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
     """
     found, points = ready(asked, registry)
+    _require_origins(asked.recipe, points)
     runs = asked.recipe.runs
     require_training("sweep")
     require_writable_runs(runs)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from rich.console import Console
@@ -52,6 +53,7 @@ def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
         "recipe": {path: slice_value(planner.deciding, path, step.stage) for path in step.stage.slice},
         "robot": planner.robot_digest,
         "inputs": {name: before[name] for name in planner.reads(step.stage)},
+        "start": step.stage.starts_from and attrgetter(step.stage.starts_from)(planner.loaded.recipe),
     }
     return data_digest(ingredients)
 

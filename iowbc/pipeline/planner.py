@@ -13,7 +13,8 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
-from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.recipe.reading.finding import SUFFIXES
+from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.recipe import SEEDS
 from iowbc.recipe.section import deciding
 
@@ -74,14 +75,28 @@ class Planner:
     """Decides, stage by stage, for one recipe on one store."""
 
     def __init__(
-        self, loaded: LoadedRecipe, registry: Mapping[str, Stage], store: Store, robot: Path, options: Options
+        self,
+        loaded: LoadedRecipe,
+        registry: Mapping[str, Stage],
+        store: Store,
+        robot: Path,
+        options: Options,
+        above: Sequence[Path] = (),
     ) -> None:
+        """`above`: files of the recipes that begin from this one."""
         self.loaded = loaded
         self.store = store
         self.options = options
+        self.robot = robot
         self.robot_digest = folder_digest(robot)
         self.deciding = deciding(loaded.recipe)
         self.stages = self._selected(registry)
+        itself = () if loaded.overrides else (loaded.file.resolve(),)
+        origins = {stage.name: self._origin(stage, registry, (*above, *itself)) for stage in self.stages}
+        self.origins = {name: origin for name, origin in origins.items() if origin is not None}
+        """By stage: the planner of the recipe whose artifact it begins from."""
+        for stage in self.stages:
+            self.start(stage)
 
     def _selected(self, registry: Mapping[str, Stage]) -> list[Stage]:
         """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
@@ -106,8 +121,6 @@ class Planner:
         problems = [(path, text) for stage in chosen for path, text in stage.problems(self.loaded.recipe)]
         if problems:
             raise RecipeError([Problem(self.loaded.place(path), f"key '{path}': {text}") for path, text in problems])
-        for stage in chosen:
-            self.start(stage)
         return chosen
 
     def plan(self) -> list[Step]:
@@ -125,15 +138,18 @@ class Planner:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         return list(steps.values())
 
-    def start(self, stage: Stage) -> dict[str, Artifact]:
+    def start(self, stage: Stage) -> dict[str, Artifact | None]:
         """The artifact that a stage begins from, by its name among the inputs; empty where the recipe names none.
 
-        Raises `RecipeError` for one that is not stored, or damaged.
+        None for one that another recipe has not made yet. Raises `RecipeError` for one that is not stored, or damaged.
         """
-        prefix = None if stage.starts_from is None else attrgetter(stage.starts_from)(self.loaded.recipe)
-        if prefix is None:
+        named = self._named_start(stage)
+        if named is None:
             return {}
-        found = [one for one in self.store.artifacts(stage.name) if one.manifest.key.startswith(prefix)]
+        if stage.name in self.origins:
+            step = self.origins[stage.name].plan()[-1]
+            return {START: step.artifact if step.cached else None}
+        found = [one for one in self.store.artifacts(stage.name) if one.manifest.key.startswith(named)]
         if len(found) != 1:
             keys = ", ".join(one.manifest.key[:12] for one in found) or "none"
             raise self._wrong_start(stage, f"should begin one key of {stage.name}, begins {keys}; `iowbc ls` has them")
@@ -142,6 +158,28 @@ class Planner:
         except Damaged as error:
             raise self._wrong_start(stage, f"is damaged: {error}") from None
         return {START: found[0]}
+
+    def _named_start(self, stage: Stage) -> str | None:
+        """What the recipe calls the artifact that a stage begins from."""
+        return None if stage.starts_from is None else attrgetter(stage.starts_from)(self.loaded.recipe)
+
+    def _origin(self, stage: Stage, registry: Mapping[str, Stage], above: Sequence[Path]) -> "Planner | None":
+        """The planner of the recipe whose artifact a stage begins from. Raises `RecipeError` where it cannot be it."""
+        named = self._named_start(stage)
+        if named is None or Path(named).suffix not in SUFFIXES:
+            return None
+        place = self.loaded.place(stage.starts_from or "")
+        beside = (self.loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])).parent / named
+        try:
+            loaded = load_recipe(beside if beside.is_file() else named)
+        except RecipeError as error:
+            raise self._wrong_start(stage, f"{error}") from None
+        if loaded.file.resolve() in above:
+            raise self._wrong_start(stage, "begins from itself in the end")
+        if loaded.recipe.robot != self.loaded.recipe.robot:
+            raise self._wrong_start(stage, f"is about another robot, {loaded.recipe.robot}")
+        options = replace(self.options, until=stage.name, force=frozenset())
+        return Planner(loaded, registry, self.store, self.robot, options, above)
 
     def _require_beginning(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> None:
         """Raises `RecipeError` where what a stage begins from was published without the files that it takes."""
@@ -152,8 +190,9 @@ class Planner:
 
     def _wrong_start(self, stage: Stage, text: str) -> RecipeError:
         path = stage.starts_from or ""
-        value = shown(attrgetter(path)(self.loaded.recipe))
-        return RecipeError([Problem(self.loaded.place(path), f"key '{path}' = {value}: {text}")])
+        return RecipeError(
+            [Problem(self.loaded.place(path), f"key '{path}' = {shown(self._named_start(stage))}: {text}")]
+        )
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
         """Names of the stages whose artifacts a stage reads."""
@@ -263,7 +302,12 @@ class Planner:
         """Cosmetic values of a stage that an artifact was made with otherwise: it is used, and looks as it did."""
         for path, old, new in differences(artifact.recipe, self.loaded.recipe.model_dump(mode="json")):
             of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
-            if of_stage and MISSING not in (old, new) and stage.name not in self.options.force:
+            if (
+                of_stage
+                and path != stage.starts_from
+                and MISSING not in (old, new)
+                and stage.name not in self.options.force
+            ):
                 yield f"{path} is {_shown(old)} in it; `--force {stage.name}` makes it with {_shown(new)}"
 
     def _attempt(self, stage: Stage, key: str) -> dict[str, Any]:

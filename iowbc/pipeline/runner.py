@@ -132,7 +132,12 @@ class Runner:
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
         """What a stage reads, by name."""
         read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
-        return {**read, **self.planner.start(stage)}
+        for name, artifact in self.planner.start(stage).items():
+            if artifact is None:
+                origin = self.planner.origins[stage.name].loaded.file
+                raise PipelineFailed(f"{stage.name} begins from that of {origin}; first `iowbc run {origin}`")
+            read[name] = artifact
+        return read
 
     def _reused(self, step: Step, artifact: Artifact, view: StageView) -> Artifact:
         notes = ("published", *step.notes) if artifact.published else step.notes

@@ -105,10 +105,14 @@ class Teacher(Section):
     seed: int | None = Field(default=None, ge=0, lt=2**32, json_schema_extra=LATER)
     """Seed of this training alone; the recipe's `seed` when empty. With another one here and in `distill`, a recipe is
     a second training of the same controller, on the same reference generator."""
-    start: str | None = Field(default=None, pattern="^[0-9a-f]{8,64}$", json_schema_extra=LATER)
-    """A trained teacher to begin from: eight or more first characters of its key, in quotes (`iowbc ls`). Its networks,
-    statistics, step size and curriculum are where this training begins, which counts its steps from zero. One thing
-    changed can so be tried in a tenth of the time; it is another experiment, and has another key."""
+    start: str | None = Field(
+        default=None, pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300, json_schema_extra=COSMETIC
+    )
+    """A trained teacher to begin from: that of another recipe, whose file is named as in `extends` and which runs
+    first where it has not, or a stored one by eight or more first characters of its key, in quotes (`iowbc ls`). Its
+    networks, statistics, step size and curriculum are where this training begins, which counts its steps from zero. One
+    thing changed can so be tried in a tenth of the time. What it began from is part of the key, not what it was called.
+    """
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 

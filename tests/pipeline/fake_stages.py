@@ -78,14 +78,19 @@ def counting(name: str) -> Callable[[Job], None]:
 
 
 def stage(
-    name: str, reads: tuple[str, ...], slice: tuple[str, ...], version: int = 1, counts: tuple[str, ...] = ()
+    name: str,
+    reads: tuple[str, ...],
+    slice: tuple[str, ...],
+    counts: tuple[str, ...] = (),
+    starts_from: str | None = None,
 ) -> Stage:
     """A counting stage that reads the others that its recipe has."""
 
     def known(recipe: Recipe) -> tuple[str, ...]:
         return tuple(read for read in reads if read in recipe.stages)
 
-    return Stage(name, version, slice, reads=known, run=counting(name), results=("result.json",), counts=counts)
+    run, results = counting(name), ("result.json",)
+    return Stage(name, 1, slice, reads=known, run=run, results=results, counts=counts, starts_from=starts_from)
 
 
 STAGES = {
@@ -93,7 +98,7 @@ STAGES = {
     for made in (
         stage("rg-dataset", (), ("seed", "rg")),
         stage("rg-fit", ("rg-dataset",), ("seed", "rg")),
-        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), counts=("teacher.steps",)),
+        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), ("teacher.steps",), "teacher.start"),
         stage("distill", ("rg-fit", "teacher"), ("distill",)),
         stage("eval", ("distill",), ("eval",), counts=("eval.trials",)),
         stage("export", ("distill",), ("name", "export")),

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from workplace import Workplace
+from workplace import RECIPE, Workplace
 
 from iowbc.errors import RecipeError
 from iowbc.pipeline.stage import START, Job
@@ -14,7 +14,7 @@ from iowbc.pipeline.store.publishing import publish
 
 @pytest.fixture
 def told(workplace: Workplace) -> list[Path | None]:
-    """Where the teacher's jobs are told to begin; the teacher takes `teacher.start`."""
+    """Where the teacher's jobs are told to begin."""
     found: list[Path | None] = []
     teacher = workplace.registry["teacher"]
 
@@ -23,7 +23,7 @@ def told(workplace: Workplace) -> list[Path | None]:
         teacher.run(job)
 
     workplace.registry["teacher"] = replace(
-        teacher, run=run, starts_from="teacher.start", extends="teacher.steps", extends_from=("started_at.json",)
+        teacher, run=run, extends="teacher.steps", extends_from=("started_at.json",)
     )
     return found
 
@@ -34,11 +34,12 @@ def test_it_begins_from_the_artifact_whose_key_the_recipe_gives(workplace: Workp
     step = workplace.plan(start, "teacher.gamma=0.9")["teacher"]
     assert not step.cached
     assert step.predecessor is None
-    assert f"teacher.start (--set {start}): (absent) -> '{first.manifest.key[:8]}'" in step.reasons
+    assert "start is read now" in step.reasons
     second = workplace.run(start, "teacher.gamma=0.9")["teacher"]
     assert told == [None, first.folder]
     assert second.ingredients["inputs"][START] == first.manifest.digest
-    assert workplace.plan(start, "teacher.gamma=0.9")["teacher"].cached
+    longer = f"teacher.start={first.manifest.key}"
+    assert workplace.plan(longer, "teacher.gamma=0.9")["teacher"].cached, "what it is called decides nothing"
     assert not workplace.plan("teacher.gamma=0.9")["teacher"].cached
 
 
@@ -78,3 +79,46 @@ def test_what_was_published_without_its_state_begins_nothing_but_is_known(
     assert workplace.plan(start)["teacher"].artifact == workplace.store.find_published("teacher", second.manifest.key)
     with pytest.raises(RecipeError, match=r"was published without started_at.json; make it here"):
         workplace.plan(start, "teacher.gamma=0.9")
+
+
+@pytest.fixture
+def second(workplace: Workplace) -> str:
+    """A recipe whose teacher begins from that of small.yaml."""
+    text = "extends: small.yaml\nteacher: {start: small.yaml, gamma: 0.9}\n"
+    (workplace.folder / "second.yaml").write_text(text)
+    return "second.yaml"
+
+
+def test_the_recipe_that_it_begins_from_runs_first_where_it_has_not(workplace: Workplace, second: str) -> None:
+    refused = workplace.command("sweep", second, "--until", "teacher", "--set", "seed=3..4")
+    assert refused.code == 2
+    assert "first\n  iowbc run small.yaml --until teacher\n" in refused.errors
+    planned = workplace.command("plan", second, "--until", "teacher")
+    assert planned.code == 0, planned.errors
+    assert [word in planned.output for word in ("small", "second")] == [True, True]
+    made = workplace.command("run", second, "--until", "teacher")
+    assert made.code == 0, made.errors
+    headings = [line for line in made.output.splitlines() if line in ("small:", "second:")]
+    assert headings == ["small:", "second:"]
+    assert "small" not in workplace.command("plan", second, "--until", "teacher").output
+    loaded = workplace.planner().plan()
+    assert [step.cached for step in loaded[:3]] == [True, True, True], "an ordinary run of the first recipe"
+
+
+def test_recipes_that_begin_from_each_other_are_refused(workplace: Workplace, second: str) -> None:
+    small = workplace.recipe.read_text()
+    workplace.recipe.write_text(small.replace("steps: 4096", "steps: 4096\n  start: second.yaml"))
+    with pytest.raises(RecipeError, match=r"second.yaml:2:11: key 'teacher.start' = 'small.yaml': begins from itself"):
+        workplace.plan()
+
+
+def test_what_overrides_change_may_begin_from_the_recipe_itself(workplace: Workplace) -> None:
+    first = workplace.run()["teacher"]
+    second = workplace.run("teacher.start=small.yaml", "teacher.gamma=0.9")["teacher"]
+    assert second.ingredients["inputs"][START] == first.manifest.digest
+
+
+def test_a_recipe_that_is_not_there_is_refused_with_its_place(workplace: Workplace) -> None:
+    workplace.recipe.write_text(RECIPE.replace("steps: 4096", "steps: 4096\n  start: secnd.yaml"))
+    with pytest.raises(RecipeError, match=r"small\.yaml:4:\d+: key 'teacher.start' = 'secnd\.yaml': .*no such file"):
+        workplace.plan()

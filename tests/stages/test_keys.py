@@ -43,6 +43,7 @@ COSMETIC = {
     "execution",
     "simulation.physics.divergences_kept",
     "teacher.check.films",
+    "teacher.start",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",
     "eval.label",
