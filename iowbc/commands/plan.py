@@ -23,7 +23,8 @@ REASON_INDENT = 4
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a recipe of recipes a table of what would run of each."""
     asked = [prepared(one, request, registry)[0] for one in recipes(request)]
-    planners = list({each.loaded.file: each for planner in asked for each in in_order(planner)}.values())
+    each = [one for planner in asked for one in in_order(planner)]
+    planners = list({(one.loaded.file, one.loaded.overrides): one for one in each}.values())
     if as_json:
         names = [planner.loaded.recipe.name for planner in planners]
         steps = [[_data(step) for step in planner.plan()] for planner in planners]

@@ -13,7 +13,7 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
-from iowbc.recipe.reading.finding import SUFFIXES
+from iowbc.recipe.reading.finding import SUFFIXES, extended_file
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.recipe import SEEDS
 from iowbc.recipe.section import deciding
@@ -169,9 +169,9 @@ class Planner:
         if named is None or Path(named).suffix not in SUFFIXES:
             return None
         place = self.loaded.place(stage.starts_from or "")
-        beside = (self.loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])).parent / named
+        said_in = self.loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])
         try:
-            loaded = load_recipe(beside if beside.is_file() else named)
+            loaded = load_recipe(extended_file(named, said_in.parent))
         except RecipeError as error:
             raise self._wrong_start(stage, f"{error}") from None
         if loaded.file.resolve() in above:

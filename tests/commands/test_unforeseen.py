@@ -91,6 +91,8 @@ def test_closed_output_breaks_nothing(tmp_path: Path) -> None:
         (["plan", "/dev/zero"], "is no regular file"),
         (["plan", "null.yaml"], "key 'extends'"),
         (["plan", "long.yaml"], "File name too long"),
+        (["plan", "a" * 300], "File name too long"),
+        (["plan", "first.yaml", "--set", "teacher.start=" + "a" * 290 + ".yaml"], "File name too long"),
         (["plan", "climbing.yaml"], "a recipe names a folder under robots/"),
     ],
 )

@@ -1,5 +1,6 @@
 """A stage that begins from an artifact which another recipe made."""
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -113,6 +114,9 @@ def test_recipes_that_begin_from_each_other_are_refused(workplace: Workplace, se
 
 
 def test_what_overrides_change_may_begin_from_the_recipe_itself(workplace: Workplace) -> None:
+    words = ("small.yaml", "--set", "teacher.start=small.yaml", "--set", "teacher.gamma=0.9", "--json")
+    planned = json.loads(workplace.command("plan", *words).output)
+    assert [one["recipe"] for one in planned] == ["small", "small"]
     first = workplace.run()["teacher"]
     second = workplace.run("teacher.start=small.yaml", "teacher.gamma=0.9")["teacher"]
     assert second.ingredients["inputs"][START] == first.manifest.digest

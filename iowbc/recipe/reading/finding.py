@@ -15,16 +15,17 @@ def recipe_file(word: str | Path) -> Path:
     nothing comes back as it is, for the reader to complain about.
     """
     path = Path(word)
-    if path.is_file() or path.name != str(word):
+    if os.path.isfile(path) or path.name != str(word):
         return path
     return next((found for found in known_files() if path.name in (found.stem, found.name)), path)
 
 
 def extended_file(word: str, folder: Path) -> Path:
-    """The file that `extends` means in a recipe of a folder: one beside it, else what the word means anywhere."""
+    """The file that `extends` or `teacher.start` means in a recipe of a folder: one beside it, else what the word means
+    anywhere."""
     beside = Path(os.path.normpath(folder / word))
     found = recipe_file(word)
-    return beside if beside.is_file() or not found.is_file() else found
+    return beside if os.path.isfile(beside) or not os.path.isfile(found) else found
 
 
 def known_files() -> Iterator[Path]:
