@@ -1,5 +1,6 @@
 """`iowbc diff A B`: how two recipes or two artifacts differ in recipe, keys, versions and metrics."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,8 +17,8 @@ from iowbc.commands.named import Named, named
 from iowbc.commands.tables import hanging
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
+from iowbc.pipeline.ingredients import changed_code
 from iowbc.pipeline.nested import MISSING, differences, nested
-from iowbc.pipeline.planner import changed_code
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
@@ -103,10 +104,11 @@ def _either(store: Store, word: str) -> Named:
     """A recipe file counts as it is now, and so does one by its name that has not run; its artifacts are those that it
     used last."""
     file = recipe_file(word)
+    there = os.path.isfile(file)
     try:
-        found, as_file = named(store, word), file.is_file() and Path(word).suffix in SUFFIXES
+        found, as_file = named(store, word), there and Path(word).suffix in SUFFIXES
     except UsageError:
-        if not file.is_file():
+        if not there:
             raise
         found, as_file = Named(word, {}), True
     return replace(found, recipe=load_recipe(file).recipe.model_dump(mode="json")) if as_file else found

@@ -1,5 +1,6 @@
 """`iowbc export WHAT --web DIR`: an exported controller as a static web page."""
 
+import os
 from pathlib import Path
 
 from rich.console import Console
@@ -39,7 +40,7 @@ def export_page(store: Store, console: Console, word: str, folder: Path) -> None
 
 def exported_folder(store: Store, word: str) -> Path:
     """The exported folder that a word names: a folder, a recipe, `RECIPE/export` or a key. Raises `UsageError`."""
-    if (Path(word) / CONTRACT).is_file():
+    if os.path.isfile(Path(word, CONTRACT)):
         return Path(word)
     found = named(store, word).usable
     if "export" not in found:

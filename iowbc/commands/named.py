@@ -1,5 +1,6 @@
 """What a user calls an artifact or a recipe, and what is meant."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -105,7 +106,7 @@ def _recipe(store: Store, word: str, name: str, recipes: list[str]) -> Named:
 
 def _name_in(file: Path) -> str:
     """The name that a recipe file gives, else that of the file."""
-    return load_recipe(file).recipe.name if file.is_file() else file.stem.lower()
+    return load_recipe(file).recipe.name if os.path.isfile(file) else file.stem.lower()
 
 
 def _published(store: Store) -> dict[str, dict[str, Artifact]]:

@@ -1,5 +1,6 @@
 """What `iowbc play` plays: a recipe's policy, one artifact, or an exported folder."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,7 +50,7 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
     that its recipe has not."""
     from iowbc.evaluation.play import exported_source
 
-    if (Path(word) / CONTRACT).is_file():
+    if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
     training = in_training(store, word, stage)
     if training is not None:

@@ -11,7 +11,8 @@ from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.planner import Planner, Step, slice_value
+from iowbc.pipeline.ingredients import deciding_slices
+from iowbc.pipeline.planner import Planner, Step
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.reading.sweep import Sweep
 
@@ -50,7 +51,7 @@ def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
         return step.key
     ingredients = {
         "stage": step.stage.name,
-        "recipe": {path: slice_value(planner.deciding, path, step.stage) for path in step.stage.slice},
+        "recipe": deciding_slices(planner.deciding, step.stage),
         "robot": planner.robot_digest,
         "inputs": {name: before[name] for name in planner.reads(step.stage)},
         "start": step.stage.starts_from and attrgetter(step.stage.starts_from)(planner.loaded.recipe),

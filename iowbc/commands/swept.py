@@ -1,6 +1,7 @@
 """What a sweep or a recipe of recipes consists of, so that other commands know them by their names."""
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -41,5 +42,5 @@ def points_of(store: Store, words: Sequence[str]) -> list[str]:
 
 def members_of(word: str) -> tuple[str, ...]:
     """Names of the recipes that a recipe of recipes names; of anything else none. Raises `RecipeError`."""
-    study = load_study(word) if recipe_file(word).is_file() else None
+    study = load_study(word) if os.path.isfile(recipe_file(word)) else None
     return () if study is None else tuple(variant.recipe.name for variant in study.variants)

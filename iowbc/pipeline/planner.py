@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
+from iowbc.pipeline.ingredients import changed_code, deciding_slices, slice_value, stage_code
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import START, Stage
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.digests import PACKAGE, code_digests, data_digest, folder_digest
+from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.reading.finding import SUFFIXES, extended_file
@@ -96,7 +97,8 @@ class Planner:
         self.origins = {name: origin for name, origin in origins.items() if origin is not None}
         """By stage: the planner of the recipe whose artifact it begins from."""
         for stage in self.stages:
-            self.start(stage)
+            if stage.name not in self.origins:
+                self.start(stage)
 
     def _selected(self, registry: Mapping[str, Stage]) -> list[Stage]:
         """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
@@ -208,7 +210,7 @@ class Planner:
         ingredients = {
             "stage": stage.name,
             "version": stage.version,
-            "recipe": {path: slice_value(self.deciding, path, stage) for path in stage.slice},
+            "recipe": deciding_slices(self.deciding, stage),
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
@@ -392,29 +394,5 @@ def _reckoned(
     return (seconds, None) if alike else (None, seconds)
 
 
-def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
-    """Names of the subpackages and modules whose code differs."""
-    return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
-
-
-def stage_code(stage: Stage) -> dict[str, str]:
-    """Digests of a stage's own module and of the parts of the package that it declares."""
-    module = stage.run.__module__.removeprefix("iowbc.")
-    own = {module} if module != stage.run.__module__ else set()
-    return code_digests(PACKAGE, own | set(stage.packages))
-
-
 def _shown(value: Any) -> str:
     return "(absent)" if value is MISSING else shown(value)
-
-
-def slice_value(values: Mapping[str, Any], path: str, stage: Stage) -> Any:
-    """The part at a dotted path of what decides a recipe's results."""
-    if path.split(".")[0] in ("execution", "stages"):
-        raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
-    value: Any = values
-    for part in path.split("."):
-        if not isinstance(value, Mapping) or part not in value:
-            raise ValueError(f"stage {stage.name}: its slice names '{path}', which decides nothing in a recipe")
-        value = value[part]
-    return value

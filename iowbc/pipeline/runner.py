@@ -10,8 +10,9 @@ from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
+from iowbc.pipeline.ingredients import changed_code
 from iowbc.pipeline.machine import host, versions
-from iowbc.pipeline.planner import Planner, Step, changed_code
+from iowbc.pipeline.planner import Planner, Step
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.artifact import Artifact, seal

@@ -106,10 +106,10 @@ class Stage:
     """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
     differs in nothing but a smaller one, as if it had never stopped."""
     extends_from: tuple[str, ...] = ()
-    """Files of that artifact that it goes on from; where a published one lacks any, it begins anew."""
+    """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
     starts_from: str | None = None
-    """Dotted recipe path of the beginning of a key, or of nothing: an artifact of this stage, made by whatever recipe,
-    which is then read as `START`. It needs the files `extends_from`, too."""
+    """Dotted recipe path of another recipe's file, the beginning of a key, or nothing: an artifact of this stage, made
+    by whatever recipe, which is then read as `START`. It needs the files `extends_from`, too."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
     spreads: bool = False

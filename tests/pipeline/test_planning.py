@@ -10,6 +10,7 @@ from workplace import RECIPE, Workplace
 from iowbc.errors import RecipeError
 from iowbc.pipeline import planner as planning
 from iowbc.pipeline.console.wording import duration
+from iowbc.pipeline.ingredients import slice_value, stage_code
 from iowbc.pipeline.store.digests import canonical_json, code_digests, data_digest
 from iowbc.pipeline.store.workspace import Workspace
 
@@ -275,9 +276,9 @@ def test_the_stages_of_the_package_are_light_and_whole() -> None:
     assert tuple(STAGES) == PIPELINE
     values = deciding(Recipe(name="any"))
     for stage in STAGES.values():
-        assert planning.stage_code(stage)
+        assert stage_code(stage)
         for path in stage.slice:
-            assert planning.slice_value(values, path, stage) is not None or "." in path
+            assert slice_value(values, path, stage) is not None or "." in path
         for read in stage.reads(Recipe(name="any")):
             assert PIPELINE.index(read) < PIPELINE.index(stage.name)
     assert tuple(fake_stages.STAGES) == PIPELINE

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from iowbc.evaluation.paper import VARIANTS as VARIANTS_OF_THE_PAPER
-from iowbc.pipeline.planner import slice_value
+from iowbc.pipeline.ingredients import slice_value
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import Recipe
