@@ -12,6 +12,7 @@ from iowbc.pipeline import planner as planning
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.ingredients import slice_value, stage_code
 from iowbc.pipeline.store.digests import canonical_json, code_digests, data_digest
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.workspace import Workspace
 
 
@@ -187,6 +188,19 @@ def test_what_is_left_of_an_interrupted_stage_is_reckoned_from_its_own_rate(work
     workspace.progress(25, 100, "")
     workspace.write()
     assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.record["seconds"])
+
+
+def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_path: Path) -> None:
+    workspace = Workspace(Runs(tmp_path), "teacher", "key")
+    workspace.begin("small", False, {})
+    workspace.progress(25, 100, "at 25")
+    workspace.write()
+    again = Workspace(Runs(tmp_path), "teacher", "key")
+    assert again.begin("small", False, {})
+    record = again.record
+    assert (record["done"], record["total"], record["note"]) == (25, 100, "at 25")
+    again.begin("small", True, {})
+    assert "done" not in again.record, "a forced attempt begins anew"
 
 
 def test_where_more_differs_the_time_of_what_differs_least_is_told_as_rough(workplace: Workplace) -> None:

@@ -63,6 +63,7 @@ class Workspace:
             "seconds": float(earlier.get("seconds", 0.0)),
             "metric": str(earlier.get("metric", "")),
             "curve": earlier.get("curve", []),
+            **{name: earlier[name] for name in ("done", "total", "note") if name in earlier},
             "code": code,
             "command": command,
         }
