@@ -14,7 +14,7 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
-from iowbc.recipe.reading.finding import SUFFIXES, extended_file
+from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.recipe import SEEDS
 from iowbc.recipe.section import deciding
@@ -173,7 +173,7 @@ class Planner:
         place = self.loaded.place(stage.starts_from or "")
         said_in = self.loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])
         try:
-            loaded = load_recipe(extended_file(named, said_in.parent))
+            loaded = load_recipe(file_meant_in(said_in.parent, named))
         except RecipeError as error:
             raise self._wrong_start(stage, f"{error}") from None
         if loaded.file.resolve() in above:

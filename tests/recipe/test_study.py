@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from iowbc.errors import RecipeError
+from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
 
 
@@ -48,7 +49,22 @@ def test_what_is_wrong_is_named_with_its_place(folder: Path) -> None:
     assert r"'a\x00b' is no recipe's name" in refused(folder, 'variants: [full, "a\\0b"]\n')
     assert "paper.yaml:1:12: key 'variants': 3 is no recipe's name" in refused(folder, "variants: [3, full]\n")
     assert "full is the name of more than one" in refused(folder, "variants: [full, full]\n")
-    assert "recipe nothing: no such file" in refused(folder, "variants: [full, nothing]\n")
+
+
+def test_a_variant_that_is_missing_is_told_as_an_extended_recipe_is(folder: Path) -> None:
+    write(folder, "extends: quikstart.yaml\n", "mine.yaml")
+    text = refused(folder, "variants: [full, nothing, quikstart.yaml]\n")
+    first, second = text.splitlines()
+    assert first.startswith(f"{folder}/paper.yaml:1:18: recipe {folder}/nothing: no such file; recipes by name: ")
+    assert second.startswith(f"{folder}/paper.yaml:1:27: recipe {folder}/quikstart.yaml: no such file; recipes in ")
+    assert second.endswith("did you mean 'quickstart.yaml'?")
+    with pytest.raises(RecipeError) as caught:
+        load_study(write(folder, "variants: [full, mine]\n"))
+    assert str(caught.value).endswith(second.partition(": recipe ")[2])
+
+
+def test_what_a_recipe_extends_may_lie_beside_it_and_be_named_as_variants_are(folder: Path) -> None:
+    assert load_recipe(write(folder, "extends: wo_rg\n", "mine.yaml")).recipe.task.references.use_rg is False
 
 
 def test_a_file_whose_name_is_no_recipes_is_told_so(folder: Path) -> None:

@@ -20,12 +20,11 @@ def recipe_file(word: str | Path) -> Path:
     return next((found for found in known_files() if path.name in (found.stem, found.name)), path)
 
 
-def extended_file(word: str, folder: Path) -> Path:
-    """The file that `extends` or `teacher.start` means in a recipe of a folder: one beside it, else what the word means
-    anywhere."""
-    beside = Path(os.path.normpath(folder / word))
-    found = recipe_file(word)
-    return beside if os.path.isfile(beside) or not os.path.isfile(found) else found
+def file_meant_in(folder: Path, word: str) -> Path:
+    """The file that `extends`, `teacher.start` or one of `variants` means in a recipe of a folder: one beside it, with
+    or without ending, else what the word means anywhere."""
+    beside = [Path(os.path.normpath(folder / f"{word}{ending}")) for ending in ("", *SUFFIXES)]
+    return next((found for found in (*beside, recipe_file(word)) if os.path.isfile(found)), beside[0])
 
 
 def known_files() -> Iterator[Path]:

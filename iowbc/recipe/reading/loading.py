@@ -9,7 +9,7 @@ from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.files import read_limited
 from iowbc.recipe.reading.beside import with_files
 from iowbc.recipe.reading.document import Located, leaves, merged, read_document
-from iowbc.recipe.reading.finding import SUFFIXES, extended_file, known_files, recipe_file
+from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in, known_files, recipe_file
 from iowbc.recipe.reading.overrides import overridden
 from iowbc.recipe.reading.validation import validate
 from iowbc.recipe.recipe import Recipe
@@ -90,7 +90,7 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
         return own
     if not isinstance(extends.value, str) or "\0" in extends.value:
         raise RecipeError([Problem(extends.place, "key 'extends': should be the name of one recipe file")])
-    parent = extended_file(extends.value, Path(file).parent)
+    parent = file_meant_in(Path(file).parent, extends.value)
     base = _resolve(os.fspath(parent), (*above, file), extends.place)
     inherited = {key: entry for key, entry in _mapping(base).items() if key not in OWN_KEYS}
     return merged(Located(inherited, base.place), own)

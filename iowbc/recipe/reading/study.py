@@ -7,7 +7,7 @@ from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document
-from iowbc.recipe.reading.finding import recipe_file
+from iowbc.recipe.reading.finding import file_meant_in, recipe_file
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.recipe import NAME
 
@@ -70,7 +70,9 @@ def _files(variants: Located, file: Path, problems: list[Problem]) -> list[Path]
         if not isinstance(item.value, str) or not item.value or "\0" in item.value:
             problems.append(Problem(item.place, f"key 'variants': {shown(plain(item))} is no recipe's name or file"))
             continue
-        word = item.value if Path(item.value).suffix else f"{item.value}.yaml"
-        beside = file.parent / word
-        found.append(beside if beside.is_file() else recipe_file(item.value))
+        found.append(file_meant_in(file.parent, item.value))
+        try:
+            read_text(str(found[-1]), item.place)
+        except RecipeError as error:
+            problems.extend(error.problems)
     return found
