@@ -13,6 +13,7 @@ from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.named import last_used
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -35,8 +36,8 @@ POLICIES = ("export", "distill", "teacher")
 """Stages that leave a policy, the one to prefer first."""
 
 
-def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console, word: str) -> None:
-    """Print the results of a recipe's finished stages; `word` is what the user calls the recipe."""
+def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console) -> None:
+    """Print the results of a recipe's finished stages."""
     folders = {
         stage: named_folder(runs, recipe, stage, artifact.folder).absolute() for stage, artifact in artifacts.items()
     }
@@ -57,7 +58,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
             _line(console, f"controller  {shown_path(folder)}")
     if artifacts:
         _line(console, "next:")
-        for command in next_commands(runs, recipe, artifacts, word):
+        for command in next_commands(runs, recipe, artifacts):
             _line(console, f"  {command}")
 
 
@@ -75,20 +76,23 @@ def described(artifacts: Mapping[str, Artifact]) -> str:
     return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in chosen)
 
 
-def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], word: str) -> list[str]:
+def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) -> list[str]:
     """What a user would type next: to see the robot, where there is a policy, and to read about the run.
 
-    What a run with overrides made goes by its key: the recipe's name stands for what it has without any.
+    What a run with overrides made goes by its key, if they gave it no name of its own: the recipe's name stands for
+    what it has without any.
     """
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
-    own = last_used(Store(runs), recipe)
+    overrides = recall(runs, recipe).get("overrides", [])
+    lasting = not overrides or any(override.startswith("name=") for override in overrides)
+    own = last_used(Store(runs), recipe) if lasting else {}
     others = {
         stage: artifact.manifest.key[:KEY_LENGTH]
         for stage, artifact in artifacts.items()
         if stage not in own or own[stage].manifest.key != artifact.manifest.key
     }
     policy = next((stage for stage in POLICIES if stage in artifacts), None)
-    seen = [["iowbc", "play", others.get(policy, word)]] if policy else [] if others else [["iowbc", "show", word]]
+    seen = [["iowbc", "play", others.get(policy, recipe)]] if policy else [] if others else [["iowbc", "show", recipe]]
     read = ["iowbc", "show", [*others.values()][-1]] if others else ["iowbc", "report", recipe]
     return [shlex.join([*words, *elsewhere]) for words in (*seen, read)]
 

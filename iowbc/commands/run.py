@@ -133,7 +133,7 @@ def run_recipe(
     except KeyboardInterrupt:
         code, closing = INTERRUPTED, _resumption(request, runner)
     if code == DONE and runner is not None and manner != "quiet":
-        print_results(request.runs, loaded.recipe.name, runner.artifacts, console, request.word)
+        print_results(request.runs, loaded.recipe.name, runner.artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:

@@ -1,6 +1,9 @@
 """The end of a run: films first, a few metrics, tables that fit, and what to type next."""
 
 import io
+import json
+import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -73,7 +76,7 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
     films.mkdir()
     (films / "box.mp4").write_bytes(b"")
     (films.parent / "tables" / "lifting.md").write_text(LIFTING)
-    lines = shown(82, lambda console: print_results(runs, "first", artifacts, console, "first.yaml")).splitlines()
+    lines = shown(82, lambda console: print_results(runs, "first", artifacts, console)).splitlines()
     assert lines[0].startswith("film  ")
     assert lines[0].endswith("runs/first/eval/videos/box.mp4")
     metrics = [line.split() for line in lines[1:7]]
@@ -82,18 +85,38 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
     assert "Command tracking errors under lifting" in lines
     commands = lines[lines.index("next:") + 1 :]
     assert [command.split()[:3] for command in commands] == [
-        ["iowbc", "play", "first.yaml"],
+        ["iowbc", "play", "first"],
         ["iowbc", "report", "first"],
     ]
     assert len(lines) < 35
+
+
+def test_what_a_run_with_overrides_made_goes_by_its_key_in_a_new_store_too(
+    command: "Callable[..., subprocess.CompletedProcess[str]]", folder: Path
+) -> None:
+    lines = command("run", "first.yaml", "--set", "eval.trials=2", "--runs", "new").stdout.splitlines()
+    made = {path.parent.name: path.name for path in (folder / "new" / "store").glob("*/*")}
+    assert lines[lines.index("next:") + 1] == f"  iowbc play {made['export'][:12]} --runs new"
+    named = ("--set", "name=own", "--set", "eval.trials=2", "--runs", "new")
+    assert "  iowbc play own --runs new" in command("run", "first.yaml", *named).stdout.splitlines()
+
+
+def test_what_a_run_with_overrides_made_lies_under_a_short_path(
+    command: "Callable[..., subprocess.CompletedProcess[str]]", folder: Path
+) -> None:
+    text = command("run", "first.yaml", "--set", "eval.trials=2").stdout
+    (figures,) = [line.split()[1] for line in text.splitlines() if line.startswith("figures") and "eval-" in line]
+    assert len(figures) < 50
+    assert json.loads((folder / figures).with_name("result.json").read_text())["count"] == 3
+    assert not re.search("[0-9a-f]{64}", text)
 
 
 def test_what_a_run_with_overrides_made_goes_by_its_key(folder: Path) -> None:
     runs = Runs(folder / "runs")
     other = last_used(Store(runs), "second")  # another teacher, from which the same student comes
     key = other["teacher"].manifest.key[:12]
-    for stages, played in ((("teacher", "distill"), "first.yaml"), (("teacher",), key)):
+    for stages, played in ((("teacher", "distill"), "first"), (("teacher",), key)):
         made = {stage: other[stage] for stage in stages}
-        play, show = next_commands(runs, "first", made, "first.yaml")
+        play, show = next_commands(runs, "first", made)
         assert play.split()[:3] == ["iowbc", "play", played]
         assert show.split()[:3] == ["iowbc", "show", key]

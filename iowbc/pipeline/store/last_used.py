@@ -29,6 +29,8 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
         record["recipe"] = loaded.recipe.model_dump(mode="json")
         record["stages"][stage] = {"key": key, "time": time.time()}
         link(runs, loaded.recipe.name, stage, artifact.folder)
+    elif record["stages"].get(stage, {}).get("key") != key:
+        link(runs, loaded.recipe.name, stage, artifact.folder, with_overrides=True)
     record.setdefault("ever", {})[key] = time.time()
     write_whole(path, json.dumps(record, indent=1))
 
