@@ -54,11 +54,11 @@ def _described(store: Store, folder: Path, record: Mapping[str, Any]) -> InTrain
     share = f", {100 * float(record.get('done', 0.0)) / total:.0f} % done" if total else ""
     known = isinstance(recipe, dict) and isinstance(ingredients, dict)
     playable = record["stage"] == PLAYED and checkpoint.is_file() and known
-    then = f"this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else "this is a finished one"
+    then = f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else ""
     return InTraining(
         stage=str(record["stage"]),
         key=folder.name,
-        text=f"{record['stage']} of {record['recipe']} {state}{share}; {then}",
+        text=f"{record['stage']} of {record['recipe']} {state}{share}{then}",
         checkpoint=checkpoint,
         ingredients=ingredients if isinstance(ingredients, dict) else {},
         recipe=recipe if playable else None,

@@ -53,11 +53,18 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
     if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
     training = in_training(store, word, stage)
-    if training is not None:
+    if training is not None and training.recipe is not None:
         console.print(training.text, markup=False, highlight=False, soft_wrap=True)
-        if training.recipe is not None:
-            return _training_source(store, training, training.recipe)
-    artifact = playable(store, word, stage)
+        return _training_source(store, training, training.recipe)
+    try:
+        artifact = playable(store, word, stage)
+    except UsageError:
+        if training is None:
+            raise
+        text = "there is neither a checkpoint that can be played nor a finished one; `iowbc status` tells how far it is"
+        raise UsageError(f"{training.text}; {text}") from None
+    if training is not None:
+        console.print(f"{training.text}; this is a finished one", markup=False, highlight=False, soft_wrap=True)
     require_whole(store.runs, [artifact])
     if artifact.published:
         text = f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository"

@@ -1,6 +1,8 @@
 """Who plays a stage that is being trained is told so; a film says how far it is."""
 
 import io
+import os
+import time
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,8 @@ from rich.console import Console
 from iowbc.commands import filming
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import in_training
+from iowbc.commands.play import named_source
+from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
@@ -23,17 +27,27 @@ def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: P
     workspace.write()
     told = in_training(store, "first/teacher", None)
     assert told is not None
-    assert told.text == "teacher of first was interrupted, 42 % done; this is a finished one"
+    assert told.text == "teacher of first was interrupted, 42 % done"
     assert told.recipe is None
-    (workspace.scratch / "training.checkpoint").write_bytes(b"")
+    checkpoint = workspace.scratch / "training.checkpoint"
+    checkpoint.write_bytes(b"")
+    os.utime(checkpoint, 2 * (time.time() - 3600,))
     workspace.describe({"inputs": {}}, "name: first\n")
     playable = in_training(store, "first", "teacher")
     assert playable is not None
     assert playable.recipe == {"name": "first"}
-    assert playable.text.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 0.")
+    assert playable.text.startswith("teacher of first was interrupted, 42 % done; this is its checkpoint of 60 min ago")
     assert in_training(store, "first", None) is None
     assert in_training(store, "second/teacher", None) is None
     assert in_training(store, "first/distill", None) is None
+
+
+def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Path) -> None:
+    store, console = Store(Runs(folder / "runs")), Console(file=io.StringIO())
+    Workspace(store.runs, "teacher", "f" * 64).begin("third", False, {})
+    with pytest.raises(UsageError, match=r"^teacher of third was interrupted; there is neither a checkpoint that can"):
+        named_source(store, console, "third/teacher", None)
+    assert not console.file.getvalue()  # type: ignore[attr-defined]
 
 
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
