@@ -166,6 +166,15 @@ def test_what_shows_all_runs_comes_first(runs: list[Run], tmp_path: Path) -> Non
     assert re.findall(r"<figcaption>(.*?)</figcaption>", text[first:])[0] == "all runs: side_by_side.mp4"
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_wide_table_scrolls_by_itself_and_does_not_widen_the_page(
+    runs: list[Run], tmp_path: Path, count: int
+) -> None:
+    *before, _ = written(runs[:count], tmp_path).read_text().split("<table")
+    assert len(before) > count + 2
+    assert all(text.rstrip().endswith('<div class="wide">') for text in before)
+
+
 def written(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
     table, other = (f"*A caption.*\n\n| a | b |\n|---|---|\n| {cell} | <2> |\n" for cell in ("main", "folded"))
