@@ -37,10 +37,10 @@ class Stopwatch:
 
 
 class _Timed:
-    """MuJoCo's batch, which takes no attributes, with a method of its own."""
+    """MuJoCo's batch, which takes no attributes, with methods of its own."""
 
     def __init__(self, batch: Any) -> None:
-        self._batch, self.step = batch, batch.step
+        self._batch, self.step, self.forward = batch, batch.step, batch.forward
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._batch, name)
@@ -51,6 +51,7 @@ def watch_physics(batch: Any, watch: Stopwatch) -> None:
     for world in batch.simulation.worlds:
         world.batch = _Timed(world.batch)
         watch.watch(world.batch, "step", "physics")
+        watch.watch(world.batch, "forward", "physics")
 
 
 def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:

@@ -26,6 +26,12 @@ from iowbc.sim.timing import Timing
 POSITION = mujoco.mjtStage.mjSTAGE_POS.value
 VELOCITY = mujoco.mjtStage.mjSTAGE_VEL.value
 NOTHING = mujoco.mjtStage.mjSTAGE_NONE.value
+MOTION_ALONE = sum(
+    getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}").value for part in ("CONTACT", "CONSTRAINT", "SENSOR", "ACTUATION")
+)
+"""What MuJoCo leaves out where positions, velocities and inertia of the bodies are all that is wanted."""
+EVERY = slice(None)
+"""All simulations."""
 AT_LIMIT = 0.999
 """Part of the torque limit at which a motor counts as saturated."""
 PRESSED = 0.001
@@ -36,8 +42,8 @@ class World:
     """n simulations of one scene, and their place among all environments.
 
     One `mjData` for all of them, which stays in the processor's cache. To compute positions and velocities of the new
-    state once for the observation and once more in the next step costs less than an `mjData` per simulation, which
-    could keep them, but comes from memory every time.
+    state once for the observation, without contacts and constraints, and once more in the next step costs less than an
+    `mjData` per simulation, which could keep them, but comes from memory every time.
     """
 
     def __init__(self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing) -> None:
@@ -49,10 +55,15 @@ class World:
         self.layout = Layout.of(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1)
         self.fields = ModelFields(self.batch, self.layout, scene, timing)
+        self._flags = self.batch.expand("opt.disableflags")
+        self._whole = self._flags.copy()
+        self._light = self._whole | MOTION_ALONE
         bind = self.batch.bind
         self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
-        self._torque, self._external = bind("actuator_force"), bind("cfrc_ext")
+        self._last_torque, self._last_external = bind("actuator_force"), bind("cfrc_ext")
+        self._torque, self._external = self._last_torque.copy(), self._last_external.copy()
+        """Torques of the motors, and forces of the surroundings on each body, in the last physics step."""
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
         kept, count, history = timing.kept_targets, len(rows), bind("history")
@@ -109,6 +120,7 @@ class World:
         for values in self._memory.values():
             values[ids] = 0.0
         self.batch.forward(ids)
+        self._keep(ids)
         self._warnings[ids] = self._warning_counts[ids]
         self._mass_cache()
 
@@ -163,12 +175,27 @@ class World:
         if self.layout.object is not None:
             self._handle(given, self.layout.object)
         try:
-            self.batch.step(nstep=self.timing.substeps, stage=VELOCITY)
+            self.batch.step(nstep=self.timing.substeps)
         except SimulationError as error:
             diverged[error.ids] = True
+        self._keep()
         if self._rolling is not None:
             self._rolling.observe(given.wrench)
+        self._look()
         self._check(diverged)
+
+    def _keep(self, ids: Indices | slice = EVERY) -> None:
+        """Takes over the forces that MuJoCo computed last for some simulations."""
+        self._torque[ids] = self._last_torque[ids]
+        self._external[ids] = self._last_external[ids]
+
+    def _look(self) -> None:
+        """Computes positions, velocities and inertia of the new state."""
+        self._flags[:] = self._light
+        try:
+            self.batch.forward(stage=VELOCITY)
+        finally:
+            self._flags[:] = self._whole
 
     def _handle(self, given: Period, thing: int) -> None:
         """What acts on the object, and between it and the hands."""
@@ -190,15 +217,16 @@ class World:
     def _check(self, diverged: Mask) -> None:
         """Marks what warned, or moves too fast or not in numbers, and puts it back to the start of the period."""
         counts, fastest = self._warning_counts, self.physics.fastest
-        calm = self.qvel.max() < fastest and self.qvel.min() > -fastest
-        if calm and (counts == self._warnings).all() and not diverged.any():
+        speed = np.abs(self.qvel)
+        if speed.max() < fastest and (counts == self._warnings).all() and not diverged.any():
             return
         diverged |= (counts != self._warnings).any(axis=1)
-        diverged |= ~(np.abs(self.qvel).max(axis=1) < fastest)
+        diverged |= ~(speed.max(axis=1) < fastest)
         np.copyto(self._warnings, counts)
         ids = np.flatnonzero(diverged)
         self.batch.state[ids] = self.before[ids]
         self.batch.forward(ids)
+        self._keep(ids)
 
     def record(self, index: int) -> dict[str, Array]:
         """What a simulation was at the start of the last control period: its state row and its model's own fields."""
