@@ -15,6 +15,7 @@ Row = NDArray[np.float32]
 Source = TypeVar("Source")
 """What the parts of a row are computed from."""
 EVERY = slice(None)
+"""All environments."""
 
 
 @dataclass(frozen=True)
@@ -74,5 +75,9 @@ class Layout(Generic[Source]):
 
     def gather(self, source: Source, out: Row, which: NDArray[np.intp] | slice = EVERY) -> Row:
         """Fills rows (k, size) with the parts of some of the source's n environments."""
+        parts = [part.value(source) for part in self.parts]
+        if which is not EVERY:
+            parts = [values[which] for values in parts]
         rows = len(out)
-        return np.concatenate([part.value(source)[which].reshape(rows, -1) for part in self.parts], axis=1, out=out)
+        parts = [values if values.ndim == 2 else values.reshape(rows, -1) for values in parts]
+        return np.concatenate(parts, axis=1, out=out)

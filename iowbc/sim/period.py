@@ -28,7 +28,15 @@ class Period:
 
     def rows(self, place: slice | Indices) -> Self:
         """The inputs of some environments."""
-        return type(self)(**{field.name: getattr(self, field.name)[place] for field in fields(self)})
+        return type(self)(
+            target=self.target[place],
+            effort=self.effort[place],
+            wrench=self.wrench[place],
+            push=self.push[place],
+            resistance=self.resistance[place],
+            squeeze=self.squeeze[place],
+            slip_force=self.slip_force[place],
+        )
 
     def of(self, row: int) -> dict[str, Array]:
         """Those of one environment, by name."""

@@ -32,6 +32,8 @@ MOTION_ALONE = sum(
 """What MuJoCo leaves out where positions, velocities and inertia of the bodies are all that is wanted."""
 EVERY = slice(None)
 """All simulations."""
+FEET, HANDS, THING = slice(0, 2), slice(2, 4), 4
+"""Places of the bodies whose forces are kept."""
 AT_LIMIT = 0.999
 """Part of the torque limit at which a motor counts as saturated."""
 PRESSED = 0.001
@@ -62,8 +64,10 @@ class World:
         self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
         self._last_torque, self._last_external = bind("actuator_force"), bind("cfrc_ext")
-        self._torque, self._external = self._last_torque.copy(), self._last_external.copy()
-        """Torques of the motors, and forces of the surroundings on each body, in the last physics step."""
+        self._touched = _places(self.layout, self.model.nbody)
+        self._torque, self._external = self._last_torque.copy(), self._last_external[:, self._touched]
+        """Torques of the motors, torques and forces on `FEET`, `HANDS` and `THING` from what they touch, in the last
+        physics step."""
         self._body_position, self._body_quaternion, self._body_rotation = bind("xpos"), bind("xquat"), bind("xmat")
         self._inertia = bind("M")
         kept, count, history = timing.kept_targets, len(rows), bind("history")
@@ -187,7 +191,7 @@ class World:
     def _keep(self, ids: Indices | slice = EVERY) -> None:
         """Takes over the forces that MuJoCo computed last for some simulations."""
         self._torque[ids] = self._last_torque[ids]
-        self._external[ids] = self._last_external[ids]
+        self._external[ids] = self._last_external[ids].take(self._touched, axis=1)
 
     def _look(self) -> None:
         """Computes positions, velocities and inertia of the new state."""
@@ -275,7 +279,7 @@ class World:
         state.foot_position[place] = sole
         spatial = self._spatial_velocity[:, layout.feet]
         state.foot_velocity[place] = spatial[..., 3:] + rotations.cross(spatial[..., :3], sole - com[:, None])
-        force = self._external[:, layout.feet, 3:]
+        force = self._external[:, FEET, 3:]
         state.foot_force[place] = force
         state.foot_contact[place] = force[:, :, 2] > self.physics.contact_force
         velocity = self._robot_velocity()
@@ -289,8 +293,7 @@ class World:
 
         A foot that rolls over its edge does not slide: there its centre of pressure rests.
         """
-        feet = self.layout.feet
-        wrench, spatial = self._external[:, feet], self._spatial_velocity[:, feet]
+        wrench, spatial = self._external[:, FEET], self._spatial_velocity[:, self.layout.feet]
         torque, force = wrench[..., :3], wrench[..., 3:]
         loaded = force[..., 2] > self.physics.contact_force
         weight = np.where(loaded, force[..., 2], 1.0)
@@ -330,12 +333,12 @@ class World:
     def _gather_load(self, state: SimulationState, thing: int) -> None:
         """Forces of hands and of other links on the object: what neither hands nor partner and impulses exert."""
         place = self.place
-        grip = self._external[:, self.layout.hands, 3:]
+        grip = self._external[:, HANDS, 3:]
         state.grip_force[place] = grip
         hands = grip[:, 0] + grip[:, 1]
         if self.scene.kind == "lift":
             state.hand_weight_share[place] = hands[:, 2] / (-GRAVITY * self.fields.body_mass[:, thing])
-        hands += self._external[:, thing, 3:]
+        hands += self._external[:, THING, 3:]
         hands -= self._applied[:, thing, :3]
         state.link_object_force[place] = np.sqrt(np.vecdot(hands, hands))
 
@@ -368,3 +371,10 @@ class World:
         self._warnings[...] = values["warnings"]
         self.batch.forward(stage=VELOCITY)
         self._mass_cache()
+
+
+def _places(layout: Layout, bodies: int) -> Indices:
+    """Bodies whose forces are kept, in order; the object, where there is one, is the last."""
+    every = np.arange(bodies)
+    thing = every[:0] if layout.object is None else every[[layout.object]]
+    return np.concatenate([every[layout.feet], every[layout.hands], thing])

@@ -104,7 +104,7 @@ class Batch:
 
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]."""
-        return self.guidance.targets(self.memory, action)
+        return self.guidance.targets(self.memory, action.clip(-self._bound, self._bound))
 
     def reset(self, seeds: NDArray[np.uint64] | None = None) -> None:
         """Starts an episode in every environment; with `seeds` (n,) all that is random starts anew from them."""
@@ -125,7 +125,7 @@ class Batch:
         """One control step of every environment; those that end begin anew."""
         memory, simulation = self.memory, self.simulation
         action = self.buffers["action"].astype(np.float64).clip(-self._bound, self._bound)
-        simulation.target[:] = self.targets(action)
+        simulation.target[:] = self.guidance.targets(memory, action)
         simulation.feed[:, :3] = memory.command[:, VELOCITY]
         left, right = memory.command[:, OFFSET][:, 2::3].T
         simulation.feed[:, 3] = memory.command[:, HEIGHT] + 0.5 * (left + right)

@@ -45,7 +45,7 @@ class Guidance:
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._reach: Reach | None = None
         """Of the arms' references since the targets were made of them, until the next ones."""
-        self._joints, self._scale, self._bound = len(robot.joints), action_scale(robot, task.action), task.action.bound
+        self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)
 
     def start(self, which: Indices, memory: Memory, key: Keys) -> tuple[Array, Array]:
         """Begins new episodes with keys (k,): joints (k, joints) and pitch of the base (k,) to start in [rad]."""
@@ -82,9 +82,12 @@ class Guidance:
         memory.heading_reference += memory.command[:, YAW_RATE] * self._period
 
     def targets(self, memory: Memory, action: Array) -> Array:
-        """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref."""
+        """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref.
+
+        The action is within its bounds.
+        """
         target = np.empty((len(action), self._joints))
-        target[:, self._support] = memory.support + self._scale * action.clip(-self._bound, self._bound)
+        target[:, self._support] = memory.support + self._scale * action
         target[:, self._arms], self._reach = self.references.arm_target_and_reach(
             memory.arms, memory.posture, memory.command, self._load
         )

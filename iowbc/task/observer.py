@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from iowbc.arrays import Indices, as_slice
 from iowbc.control import gait
+from iowbc.control.layout import EVERY
 from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
@@ -13,9 +14,6 @@ from iowbc.task.layout import FullLayout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.privileged import Truth
-
-EVERY = slice(None)
-"""All environments."""
 
 
 class Observer:
