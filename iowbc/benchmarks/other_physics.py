@@ -59,6 +59,7 @@ def play(setup: Setup, periods: int, size: float = 1.0) -> Trajectories:
     watch = Stopwatch()
     watch_physics(batch, watch)
     batch.reset(np.arange(n, dtype=np.uint64) + np.uint64(setup.seed))
+    watch.spent["physics"] = 0.0
     joints, base, up = [], [], np.ones(n, np.bool_)
     for period in range(periods):
         batch.buffers["action"][:] = size * wander(period, n, batch.buffers["action"].shape[1])

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices, as_slice
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
+from iowbc.control.layout import EVERY
 from iowbc.robot.description import load_robot
 from iowbc.rollouts.pilots import Pilot
 from iowbc.rollouts.trajectories import Trajectories, roll
@@ -20,7 +21,7 @@ from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
-from iowbc.task.observer import EVERY, Observer
+from iowbc.task.observer import Observer
 from iowbc.task.planned_pushes import PlannedPushes
 from iowbc.task.record.divergences import keep_divergences
 from iowbc.task.record.recorder import count_endings, count_pushes, count_step, write_signals, write_trial_signals
