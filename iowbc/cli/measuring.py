@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iowbc.cli.options import BenchRecipe, BenchWorkers, RunsFolder, SceneName, runs_folder
+from iowbc.commands import completion
 
 if TYPE_CHECKING:
     from iowbc.recipe.recipe import Recipe
@@ -63,7 +64,12 @@ def bench_scale(
 
 
 def bench_control(
-    what: Annotated[str, typer.Argument(help="Folder of an export, or the recipe that made it.", metavar="WHAT")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            help="Folder of an export, or the recipe that made it.", metavar="WHAT", autocompletion=completion.ran
+        ),
+    ],
     steps: Annotated[int, typer.Option(help="Control steps to measure.", min=1)] = 5000,
 ) -> None:
     """Measure how long a control step of an exported controller takes on one thread, without torch or a simulator."""

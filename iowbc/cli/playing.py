@@ -10,7 +10,14 @@ from iowbc.commands import completion
 
 
 def play(
-    what: Annotated[str, typer.Argument(help="Recipe, RECIPE/STAGE, key, or the folder of an export.", metavar="WHAT")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            help="Recipe, RECIPE/STAGE, key, or the folder of an export.",
+            metavar="WHAT",
+            autocompletion=completion.artifacts,
+        ),
+    ],
     stage: Annotated[str | None, typer.Option(help="export, distill or teacher; the last one there is.")] = None,
     scene: SceneName = "lift",
     mass: Annotated[float, typer.Option(help="Mass of the object [kg]; 0 for none.", min=0.0)] = 4.0,

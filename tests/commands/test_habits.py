@@ -69,8 +69,12 @@ def test_a_shell_completes_recipes_artifacts_stages_and_paths(folder: Path, monk
     assert completion.paths("teacher.gam") == ["teacher.gamma="]
 
 
-def test_the_command_line_answers_a_shells_question(tmp_path: Path) -> None:
-    asked = {**os.environ, "_IOWBC_COMPLETE": "complete_bash", "COMP_WORDS": "iowbc run --until tea", "COMP_CWORD": "3"}
+@pytest.mark.parametrize(
+    ("line", "answer"), [("iowbc run --until tea", "teacher"), ("iowbc play second/tea", "second/teacher")]
+)
+def test_the_command_line_answers_a_shells_question(folder: Path, line: str, answer: str) -> None:
+    place = {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" ")), "IOWBC_RUNS": "runs"}
+    asked = {**os.environ, "_IOWBC_COMPLETE": "complete_bash", **place}
     words = [sys.executable, "-m", "iowbc"]
-    done = subprocess.run(words, env=asked, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == ["teacher"]
+    done = subprocess.run(words, env=asked, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == [answer]
