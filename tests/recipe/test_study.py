@@ -64,7 +64,8 @@ def test_a_variant_that_is_missing_is_told_as_an_extended_recipe_is(folder: Path
 
 
 def test_what_a_recipe_extends_may_lie_beside_it_and_be_named_as_variants_are(folder: Path) -> None:
-    assert load_recipe(write(folder, "extends: wo_rg\n", "mine.yaml")).recipe.task.references.use_rg is False
+    write(folder, "seed: 9\n", "wo_rg.yaml")  # a name that the package has, too
+    assert load_recipe(write(folder, "extends: wo_rg\n", "mine.yaml")).recipe.seed == 9
 
 
 def test_a_file_whose_name_is_no_recipes_is_told_so(folder: Path) -> None:
