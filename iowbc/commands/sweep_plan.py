@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands.as_json import print_json
+from iowbc.commands.tables import plain_table
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.ingredients import deciding_slices
 from iowbc.pipeline.planner import Planner, Step
@@ -87,11 +88,12 @@ def print_plan(sweep: Sweep, found: Planned, console: Console, as_json: bool = F
 
 
 def plan_table(found: Planned, what: str) -> Table:
-    """A row for each recipe, a column for each stage; `what` stands above the recipes' names."""
+    """A row for each recipe, a column for each stage; `what` stands above the recipes' names.
+
+    A stage that would run has the time that it takes, without a word, so that six stages fit on 80 characters.
+    """
     names = list(dict.fromkeys(stage.step.stage.name for own in found.values() for stage in own))
-    table = Table(box=None, padding=(0, 1))
-    for head in (what, *names):
-        table.add_column(head, no_wrap=True, overflow="ellipsis")
+    table = plain_table(what, *names)
     for recipe, own in found.items():
         cells = {stage.step.stage.name: _cell(stage) for stage in own}
         table.add_row(recipe, *(cells.get(name, "") for name in names))
@@ -105,7 +107,7 @@ def _cell(stage: PlannedStage) -> Text | str:
     if stage.shared_with:
         return Text("shared", style="dim")
     sign = "~" if stage.step.expected is None and stage.step.roughly is not None else ""
-    return Text(f"run {sign}{duration(stage.step.guess)}".strip(), style="bold yellow")
+    return Text(f"{sign}{duration(stage.step.guess)}" or "run", style="bold yellow")
 
 
 def _data(sweep: Sweep, name: str, own: Sequence[PlannedStage]) -> dict[str, Any]:

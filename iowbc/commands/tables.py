@@ -10,7 +10,7 @@ from rich.text import Text
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 
-FOLDED = ("metrics", "finished stages", "used by", "recipe", "why")
+FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why")
 """Columns whose text may go on in the next line."""
 NARROW = 100
 """Terminals of fewer characters than this leave out what `show` tells."""

@@ -5,14 +5,19 @@ import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from rich.console import Console
 
 from iowbc.commands.diff import diff
 from iowbc.commands.ls import list_artifacts
+from iowbc.commands.sweep_plan import PlannedStage, plan_table
 from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import figure
+from iowbc.pipeline.planner import Step
+from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
@@ -49,6 +54,27 @@ def test_a_list_of_artifacts_keeps_every_column_whole(folder: Path, width: int) 
         (row,) = [line for line in lines if artifact.manifest.key[:12] in line]
         assert row.startswith("teacher ")
         assert row.split()[2] in ("first", "second")
+
+
+@pytest.mark.parametrize("what", ["recipe", "point"])
+@pytest.mark.parametrize("name", ["full_seed_1", "quickstart-seed-0-use_rg-true-d06fd9"])
+def test_a_plan_of_several_recipes_keeps_names_and_times_whole(what: str, name: str) -> None:
+    stages = ("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export")
+    times = (0.5, 42.0, 7500.0, 7500.0, 600.0, None)
+    steps = [
+        Step(cast(Stage, SimpleNamespace(name=stage)), None, None, None, reasons=("new",), roughly=seconds)
+        for stage, seconds in zip(stages, times, strict=True)
+    ]
+    written = io.StringIO()
+    table = plan_table({name: [PlannedStage(step, "") for step in steps]}, what)
+    Console(file=written, width=WIDTH).print(table)
+    head, *rows = written.getvalue().splitlines()
+    assert all(len(line) <= WIDTH for line in (head, *rows))
+    assert head.split() == [what, *stages]
+    folded = "".join(row[: head.index(stages[0])].strip() for row in rows)
+    assert folded == name
+    assert rows[0][head.index(stages[0]) :].split("  ")[0].strip() == "~0.5 s"
+    assert all(time in rows[0] for time in ("~42 s", "~2 h 05 min", "~10 min", "run"))
 
 
 def test_what_does_not_fit_stands_further_to_the_right() -> None:
