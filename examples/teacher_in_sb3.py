@@ -30,5 +30,8 @@ def hold(policy: Path, environment: Environment) -> int:
 if __name__ == "__main__":
     word, runs = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else "runs"
     teacher, generator = open_artifact(word, runs), open_artifact(word.replace("/teacher", "/rg-fit"), runs)
+    policy = teacher.folder / "teacher_sb3.zip"
+    if not policy.is_file():
+        sys.exit(f"{word}: what is published has no teacher_sb3.zip; `iowbc run` with --until teacher trains one")
     world = Environment("lift", Recipe.model_validate(teacher.recipe), rg=generator.folder)
-    print(f"{word} held the box for {hold(teacher.folder / 'teacher_sb3.zip', world)} steps")
+    print(f"{word} held the box for {hold(policy, world)} steps")

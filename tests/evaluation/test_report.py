@@ -246,10 +246,20 @@ def test_rates_have_their_interval_and_what_was_not_pushed_to_its_limit_says_so(
     summary = aggregate(pd.concat([trials_of("IO-WBC", "lifting", {4.0: 5}), trials_of("WBC", "lifting", {4.0: 0})]))
     _, capacity, success = comparison(summary, 0.8).axes
     assert [text.get_text() for text in capacity.texts] == ["≥ 4", "< 4"]
-    assert [text.get_text() for text in success.texts] == ["100", "0"]
+    assert [text.get_text() for text in success.texts] == ["5/5", "0/5"], (
+        "above an interval a rate would be read as its height"
+    )
     whiskers = [each.lines[2][0] for each in success.containers if isinstance(each, ErrorbarContainer)]
     intervals = [each.get_segments()[0][:, 1] for each in whiskers]
     np.testing.assert_allclose(intervals, [[56.6, 100.0], [0.0, 43.4]], atol=0.1)
+
+
+def test_a_point_says_how_many_survived_where_not_all_did() -> None:
+    summary = aggregate(trials_of("IO-WBC", "lifting", {2.0: 5, 4.0: 1, 8.0: 0}))
+    figure = errors_against_mass(summary, "lifting")
+    for axes in (*figure.axes, comparison(summary, 0.8).axes[0]):
+        assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [("1/5", 4.0)]
+    assert figure.get_suptitle().startswith("Tracking errors against lifting mass, bars: 95 % intervals. In simulation")
 
 
 def test_every_point_and_bar_is_below_the_upper_edge_and_axes_begin_at_zero() -> None:

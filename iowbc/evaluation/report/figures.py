@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -30,8 +31,9 @@ LABELS = {
     "E_v": "$E_v$, velocity [m/s]",
     "E_psi": "$E_\\psi$, heading [rad]",
 }
-PAPER_NOTE = (
-    "hollow, dotted: the paper's numbers, for its own commands; grey: a robot that stands still; × none survived"
+NOTE = (
+    "means over the trials survived; at the upper edge: how many where not all survived, × none\n"
+    "hollow, dotted: the paper's numbers, for its own commands; grey: a robot that stands still"
 )
 STILL_COLOUR = "0.55"
 DPI = 150
@@ -44,7 +46,7 @@ SHIFT = 0.012
 HEADROOM = 0.15
 """Room above the highest point, in parts of its height."""
 FAILURE_SPACING = 0.035
-"""Distance of two variants' crosses, in heights of the panel."""
+"""Distance of two variants' crosses and counts of survivors, in heights of the panel."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
 """How intervals are drawn on bars."""
 
@@ -81,7 +83,7 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
                 masses, rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
             )
             _paper_curve(axes, kind, variant, ERRORS.index(name), colour, marker)
-            _mark_failures(axes, rows, variant, variants_of(summary))
+            _mark_survivors(axes, rows, variant, variants_of(summary))
         _still_line(axes, float(summary.loc[summary["suite"] == suite, f"still_{name}"].mean()))
         axes.set_ylabel(LABELS[name])
         _tidy(axes)
@@ -89,7 +91,8 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
         axes.set_xlabel(f"{kind} mass [kg]")
     _legend(figure, figure.axes[0])
     chosen = summary[summary["suite"] == suite]
-    figure.suptitle(f"Tracking errors against {kind} mass. {conditions(chosen)}\n{PAPER_NOTE}", fontsize=9)
+    heading = f"Tracking errors against {kind} mass, bars: 95 % intervals. {conditions(chosen)}"
+    figure.suptitle(f"{heading}\n{NOTE}", fontsize=9)
     return figure
 
 
@@ -111,7 +114,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     _success_panel(panels[-1], _heaviest(summary))
     _letter(panels)
     if sweeps:
-        figure.suptitle(PAPER_NOTE, fontsize=9)
+        figure.suptitle(NOTE, fontsize=9)
     _legend(figure, panels[0])
     return figure
 
@@ -149,7 +152,7 @@ def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
         colour, marker = style_of(variant, variants_of(summary))
         axes.plot(rows["mass"], rows["norm"], color=colour, marker=marker, markersize=5, label=variant)
         _paper_curve(axes, kind, variant, None, colour, marker)
-        _mark_failures(axes, rows, variant, variants_of(summary))
+        _mark_survivors(axes, rows, variant, variants_of(summary))
     axes.set_xlabel("mass [kg]")
     axes.set_ylabel("norm of the four errors [SI units]")
     _tidy(axes)
@@ -186,7 +189,8 @@ def _success_panel(axes: Axes, chosen: pd.DataFrame) -> None:
     for variant in variants_of(chosen):
         rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"]).reindex(names)
         rate, low, high = (100 * rows[name].to_numpy(float) for name in ("rate", "rate_low", "rate_high"))
-        texts = [f"{value:.0f}" for value in rate]
+        counts = zip(rows["succeeded"], rows["trials"], strict=True)
+        texts = ["" if np.isnan(trials) else f"{succeeded:.0f}/{trials:.0f}" for succeeded, trials in counts]
         groups[variant] = Bars(rate, texts, np.clip([rate - low, high - rate], 0.0, None))
     _bars(axes, groups, [f"{_broken(case)}\n{mass:g} kg" for case, mass in names])
     axes.set_ylabel("successful trials [%], 95 % interval")
@@ -209,7 +213,7 @@ def _bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:
         drawn = axes.bar(
             positions, bars.heights, width, yerr=bars.intervals, color=colour, label=variant, error_kw=WHISKERS
         )
-        axes.bar_label(drawn, bars.texts, fontsize=8)
+        axes.bar_label(drawn, bars.texts, padding=2, fontsize=8)
     axes.set_xticks(range(len(names)), names, fontsize=8)
     _from_zero(axes)
     axes.set_xlim(-0.6, len(names) - 0.4)
@@ -232,21 +236,23 @@ def _paper_curve(axes: Axes, suite: str, variant: str, error: int | None, colour
         axes.plot(masses, values, color=colour, marker=marker, markersize=5, linestyle=":", markerfacecolor="none")
 
 
-def _mark_failures(axes: Axes, rows: pd.DataFrame, variant: str, variants: list[str]) -> None:
-    """A cross at the panel's upper edge for each mass at which the variant never survived, one line a variant."""
-    failed = rows[rows["survived"] == 0]["mass"]
+def _mark_survivors(axes: Axes, rows: pd.DataFrame, variant: str, variants: list[str]) -> None:
+    """At the panel's upper edge, one line a variant: how many survived a mass where not all did, a cross for none."""
+    colour, transform = style_of(variant, variants)[0], axes.get_xaxis_transform()
     height = 0.98 - FAILURE_SPACING * variants.index(variant)
-    crosses = axes.plot(
-        failed,
-        [height] * len(failed),
-        "x",
-        color=style_of(variant, variants)[0],
-        transform=axes.get_xaxis_transform(),
-        clip_on=False,
-        markersize=6,
-    )
-    for cross in crosses:
-        cross.set_in_layout(False)
+    failed = rows[rows["survived"] == 0]["mass"]
+    marks: list[Artist] = [
+        *axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False, markersize=6)
+    ]
+    for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
+        text = f"{row.survived}/{row.trials}"
+        marks.append(
+            axes.text(
+                float(row.mass), height, text, color=colour, transform=transform, ha="center", va="center", fontsize=7
+            )
+        )
+    for mark in marks:
+        mark.set_in_layout(False)
 
 
 def _still_line(axes: Axes, value: float) -> None:

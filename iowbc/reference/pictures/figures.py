@@ -156,7 +156,7 @@ def _physics(path: Path, plan: SamplePlan, dataset: Dataset) -> None:
     figure, (left, middle, right) = _figure(1, 3, 11.0, 3.4)
     effort = plan.robot.effort[plan.robot.support]
     torque = np.abs(dataset.torque / effort).max(axis=1)
-    _histogram(left, torque, "largest torque over its limit", everything=True)
+    _histogram(left, torque, "largest torque [share of its limit]", everything=True)
     least = _limit(plan.recipe.gates.support_margin, "least that is kept", 1e2)
     _histogram(middle, 1e2 * dataset.margin, "support margin [cm]", least, everything=True)
     _histogram(right, 1e3 * (dataset.reached - dataset.command[:, 0]), "height error [mm]", everything=True)
