@@ -104,7 +104,10 @@ def _columns(folder: Path) -> dict[str, Values]:
 
 
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
-    """By suite that sweeps the mass, and by error: masses, means, and both ends of the interval."""
+    """By suite that sweeps the mass, and by error: masses, means, and both ends of the interval.
+
+    An error is no less than 0, nor is its interval; a mean over one trial has none, its ends are NaN.
+    """
     path = folder / "tables" / "summary.csv"
     if not path.is_file():
         return {}
@@ -120,8 +123,8 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
             continue
         found[suite] = {"rate": (mass, _numbers(own, "rate"), _numbers(own, "rate_low"), _numbers(own, "rate_high"))}
         for name in list(ERRORS)[1:]:
-            mean, half = _numbers(own, name), np.nan_to_num(_numbers(own, f"{name}_half"))
-            found[suite][name] = mass, mean, mean - half, mean + half
+            mean, half = _numbers(own, name), _numbers(own, f"{name}_half")
+            found[suite][name] = mass, mean, np.clip(mean - half, 0.0, None), mean + half
     return found
 
 
@@ -153,16 +156,20 @@ def _joined(curves: Sequence[tuple[Values, Values]]) -> tuple[Values, Values, Va
 def _band(
     label: str, place: int, across: Values, mean: Values, low: Values, high: Values, mode: str = "lines"
 ) -> list[dict[str, Any]]:
-    """A line, and behind it the band between two others where they differ."""
+    """A line, and behind it the band between two others where they differ; a gap of the band is left open."""
     colour = COLOURS[place % len(COLOURS)]
     shown = {"name": label, "legendgroup": label, "x": _plain(across)}
     traces: list[dict[str, Any]] = []
-    if not np.array_equal(low, high):
-        edge = {**shown, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
-        traces = [
-            {**edge, "y": _plain(low)},
-            {**edge, "y": _plain(high), "fill": "tonexty", "fillcolor": colour + BAND},
-        ]
+    known = np.isfinite(low) & np.isfinite(high)
+    if not np.array_equal(low[known], high[known]):
+        hidden = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+        ends = np.flatnonzero(np.diff(known)) + 1
+        for part in (part for part in np.split(np.arange(len(known)), ends) if known[part[0]]):
+            edge = {**shown, **hidden, "x": _plain(across[part])}
+            traces += [
+                {**edge, "y": _plain(low[part])},
+                {**edge, "y": _plain(high[part]), "fill": "tonexty", "fillcolor": colour + BAND},
+            ]
     return [*traces, {**shown, "y": _plain(mean), "mode": mode, "line": {"color": colour, "width": 2}}]
 
 

@@ -123,8 +123,24 @@ def test_errors_over_the_mass_have_their_intervals_and_gaps_where_nobody_survive
     panels = {panel.title: panel for panel in evaluation_panels(grouped(runs[:1]))}
     low, _, mean = panels["lifting: E_v [m/s]"].traces
     assert (mean["x"], mean["y"]) == ([0.0, 4.0], [1.0, None])
-    assert low["y"] == [0.99, None]
+    assert (low["x"], low["y"]) == ([0.0], [0.99])
     assert panels["lifting: success rate"].traces[2]["y"] == [1.0, 0.8]
+
+
+def test_a_mean_over_one_trial_has_no_band_and_no_interval_of_an_error_is_below_zero(runs: list[Run]) -> None:
+    rows = [(0, 0.1, 0.2), (1, 0.1, 0.05), (2, 0.3, ""), (3, 0.2, 0.1)]
+    (runs[0].artifacts["eval"].folder / "tables" / "summary.csv").write_text(
+        "suite,case,mass,E_v,E_v_half\n" + "".join(f"push,push,{mass},{mean},{half}\n" for mass, mean, half in rows)
+    )
+    panels = {panel.title: panel for panel in evaluation_panels(grouped(runs[:1]))}
+    *bands, mean_line = panels["push: E_v [m/s]"].traces
+    assert mean_line["y"] == [0.1, 0.1, 0.3, 0.2]
+    assert [(edge["x"], edge["y"]) for edge in bands] == [
+        ([0.0, 1.0], [0.0, 0.05]),
+        ([0.0, 1.0], [0.3, 0.15]),
+        ([3.0], [0.1]),
+        ([3.0], [0.3]),
+    ]
 
 
 def test_a_page_asks_no_network_and_no_content_ends_its_scripts(runs: list[Run], tmp_path: Path) -> None:
