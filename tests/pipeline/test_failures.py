@@ -39,7 +39,7 @@ def test_the_end_of_a_run_shows_metrics_tables_and_files(workplace: Workplace) -
     assert "eval        count 3" in lines
     assert "more tables  runs/small/eval/tables: counts.md" in lines
     assert "figures  runs/small/eval/figures (1)" in lines
-    assert lines[lines.index("next:") + 1 :][0] == "  iowbc play small.yaml"
+    assert lines[lines.index("next:") + 1 :][0] == "  iowbc play small"
 
 
 def test_progress_is_told_in_plain_lines_where_there_is_no_terminal(workplace: Workplace) -> None:
