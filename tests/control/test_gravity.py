@@ -58,14 +58,3 @@ def test_what_moves_on_a_hinge_of_its_own_is_no_burden(robot: Robot) -> None:
     hand = robot.tree.bodies[robot.wrist_bodies[0]]
     assert mass == pytest.approx(hand.mass)
     assert moment == pytest.approx(hand.mass * hand.centre)
-
-
-@pytest.mark.parametrize("load", [None, 3.0], ids=["empty", "laden"])
-def test_the_reach_beside_the_torques_is_that_of_the_arms_kinematics(robot: Robot, load: float | None) -> None:
-    joints = postures(robot)
-    arms, waist, down = joints[:, robot.interaction], joints[:, 12:15], np.tile([0.0, 0.0, -1.0], (ROWS, 1))
-    carried = None if load is None else np.full((ROWS, 1), load)
-    _, (wrist, jacobian) = ArmGravity(robot).torque_and_reach(arms, waist, down, carried)
-    expected_wrist, expected_jacobian = ArmKinematics(robot).forward(arms)
-    assert np.array_equal(wrist, expected_wrist)
-    assert np.array_equal(jacobian, expected_jacobian)
