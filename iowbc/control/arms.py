@@ -9,8 +9,6 @@ from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Body
 
 X, Y = 0, 1
-Reach = tuple[Array, Array]
-"""Wrist positions (n, 2, 3) [m] in the torso frame, and their Jacobian (n, 2, 3, joints of one)."""
 IDENTITY = np.eye(3)
 
 
@@ -21,12 +19,6 @@ def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
     """
     torso = robot.tree.mover(robot.torso).name
     return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
-
-
-def reach_of(vectors: Array) -> Reach:
-    """What `Chain.carry` made of the grip points, (3, joints of one + 1, 2, n)."""
-    rows = np.ascontiguousarray(vectors.transpose(3, 2, 0, 1))
-    return rows[..., -1], rows[..., :-1]
 
 
 class ArmKinematics:
@@ -46,23 +38,24 @@ class ArmKinematics:
         self._chain, self._waist = Chain(chains), Chain([waist])
         self._grip = robot.grip_offset.T[:, :, None]
 
-    def forward(self, arm_position: Array) -> Reach:
-        """Where the wrists are, and how they move with the joints, of arms (n, arm joints) [rad]."""
+    def forward(self, arm_position: Array) -> tuple[Array, Array]:
+        """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one)."""
         count, joints = len(arm_position), self._chain.length
         vectors = np.empty((3, joints + 1, 2, count))
         vectors[:, joints] = self._grip
         self._chain.carry(arm_position.reshape(count, 2, joints).transpose(2, 1, 0), vectors, joints)
-        return reach_of(vectors)
+        rows = np.ascontiguousarray(vectors.transpose(3, 2, 0, 1))
+        return rows[..., joints], rows[..., :joints]
 
-    def solve_step(self, arm_position: Array, target: Array, dt: float, reach: Reach | None = None) -> Array:
+    def solve_step(self, arm_position: Array, target: Array, dt: float) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
         `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
         next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to its
-        longest; kept to the joint ranges and the joint speed. `reach`: that of `arm_position`, where it is known.
+        longest; kept to the joint ranges and the joint speed.
         """
         count, settings = len(arm_position), self.settings
-        wrist, jacobian = reach or self.forward(arm_position)
+        wrist, jacobian = self.forward(arm_position)
         transposed = jacobian.swapaxes(-1, -2)
         error = target - wrist
         distance = np.sqrt(np.vecdot(error, error))

@@ -3,12 +3,10 @@
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.arms import Reach, arm_chains, reach_of
+from iowbc.control.arms import arm_chains
 from iowbc.control.chain import Chain, Weights
 from iowbc.robot.description import GRAVITY, Robot
 
-MASSES, GRIPS = slice(0, 2), slice(2, 4)
-"""Chains that carry the masses of both arms, and those that carry their grip points."""
 AXES = np.eye(3)[:, :, None, None]
 """The unit vectors side by side, as `Chain.carry` takes them."""
 
@@ -18,11 +16,9 @@ class ArmGravity:
 
     def __init__(self, robot: Robot) -> None:
         chains, waist = arm_chains(robot)
-        self._arms, self._waist = Chain([*chains, *chains]), Chain([waist])
-        """Both arms with their masses, and both once more with a unit mass at the grip point alone, for the reach."""
+        self._arms, self._waist = Chain(chains), Chain([waist])
         hinges = self._arms.length
-        self._moment, self._mass = np.zeros((hinges, 3, 4, 1)), np.zeros((hinges, 4, 1))
-        self._mass[:, GRIPS] = 1.0
+        self._moment, self._mass = np.zeros((hinges, 3, 2, 1)), np.zeros((hinges, 2, 1))
         for side, chain in enumerate(chains):
             for place, body in enumerate(body for body in chain if body.hinge is not None):
                 mass, moment = robot.tree.burden(body.name)
@@ -31,14 +27,7 @@ class ArmGravity:
         self._grip = robot.grip_offset.T[:, :, None]
 
     def torque(self, arms: Array, waist: Array, gravity: Array, load: Array | None = None) -> Array:
-        """As `torque_and_reach`, without the reach."""
-        return self.torque_and_reach(arms, waist, gravity, load)[0]
-
-    def torque_and_reach(
-        self, arms: Array, waist: Array, gravity: Array, load: Array | None = None
-    ) -> tuple[Array, Reach]:
-        """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch, and the
-        reach of the arms, which costs little beside them.
+        """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
 
         `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or referred to; `gravity` (n, 3): its
         direction in the base frame, (0, 0, -1) when upright; `load` (n, 2), or (n, 1) where it is the same on both:
@@ -48,20 +37,17 @@ class ArmGravity:
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
         """
         count, hinges = len(arms), self._arms.length
-        moments = np.empty((3, hinges + 1, 4, count))
-        moments[:, hinges, MASSES] = 0.0
-        moments[:, hinges, GRIPS] = self._grip
+        moments = np.empty((3, hinges + 1, 2, count))
         carried = self._mass
+        moments[:, hinges] = 0.0
         if load is not None:
-            moments[:, hinges, MASSES] = self._grip * load.T
-            carried = np.repeat(self._mass, count, axis=2)
-            carried[:, MASSES] += load.T
-        angle = np.empty((hinges, 2, 2, count))
-        angle[...] = arms.reshape(count, 2, hinges).transpose(2, 1, 0)[:, None]
-        self._arms.carry(angle.reshape(hinges, 4, count), moments, hinges, Weights(self._moment, carried))
+            moments[:, hinges] = self._grip * load.T
+            carried = carried + load.T
+        weights = Weights(self._moment, carried)
+        self._arms.carry(arms.reshape(count, 2, hinges).transpose(2, 1, 0), moments, hinges, weights)
         axes = np.zeros((3, 4, 1, count))
         axes[:, :3] = AXES
         self._waist.carry(waist.T[:, None], axes)
         down = np.einsum("xkn,nx->kn", axes[:, :3, 0], GRAVITY * gravity)
-        torque: Array = -np.einsum("xjsn,xn->nsj", moments[:, :hinges, MASSES], down)
-        return torque.reshape(count, -1), reach_of(moments[:, :, GRIPS])
+        torque: Array = -np.einsum("xjsn,xn->nsj", moments[:, :hinges], down)
+        return torque.reshape(count, -1)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iowbc.arrays import Array, Mask, as_slice
-from iowbc.control.arms import ArmKinematics, Reach
+from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.gravity import ArmGravity
 from iowbc.control.stride import Stride
@@ -76,11 +76,9 @@ class ReferenceLayer:
             arms, support = self.advance(arms, support, command, grasp, self._start.refining_time)
         return arms, support
 
-    def advance(
-        self, arms: Array, support: Array, command: Array, grasp: Array, dt: float, reach: Reach | None = None
-    ) -> tuple[Array, Array]:
-        """References one control period later; shapes as in `start`. `reach`: that of `arms`, where it is known."""
-        arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt, reach)
+    def advance(self, arms: Array, support: Array, command: Array, grasp: Array, dt: float) -> tuple[Array, Array]:
+        """References one control period later; shapes as in `start`."""
+        arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt)
         return arms, self.support(arms, command)
 
     def support(self, arms: Array, command: Array) -> Array:
@@ -119,19 +117,13 @@ class ReferenceLayer:
         return wrists
 
     def arm_target(self, arms: Array, support: Array, command: Array, load: Array) -> Array:
-        """As `arm_target_and_reach`, without the reach."""
-        return self.arm_target_and_reach(arms, support, command, load)[0]
-
-    def arm_target_and_reach(
-        self, arms: Array, support: Array, command: Array, load: Array
-    ) -> tuple[Array, Reach | None]:
         """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references and what balances the weight of
-        the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references. With them the
-        reach of the references, for `advance`, if it is known."""
+        the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references."""
         if self._gravity is None:
-            return arms, None
+            return arms
         pitch = self.pelvis_pitch(support, command)
         down = np.zeros((len(pitch), 3))
         down[:, 0], down[:, 2] = np.sin(pitch), -np.cos(pitch)
-        torque, reach = self._gravity.torque_and_reach(arms, support[:, self.waist], down, 0.5 * load[:, None])
-        return arms + torque * self._compliance, reach
+        torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None])
+        target: Array = arms + torque * self._compliance
+        return target

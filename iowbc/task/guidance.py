@@ -8,7 +8,6 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
-from iowbc.control.arms import Reach
 from iowbc.control.command import HEIGHT, YAW_RATE
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.robot.description import Robot
@@ -43,8 +42,6 @@ class Guidance:
         self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
-        self._reach: Reach | None = None
-        """Of the arms' references since the targets were made of them, until the next ones."""
         self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)
 
     def start(self, which: Indices, memory: Memory, key: Keys) -> tuple[Array, Array]:
@@ -70,10 +67,7 @@ class Guidance:
         moving = gait.wants_to_move(memory.command, settings)
         phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
         memory.phase[:], memory.stepping[:] = phase, stepping
-        arms, posture = self.references.advance(
-            memory.arms, memory.posture, memory.command, self._grasp, period, self._reach
-        )
-        self._reach = None
+        arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self._grasp, period)
         memory.arms[:], memory.posture[:] = arms, posture
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping)
 
@@ -88,9 +82,7 @@ class Guidance:
         """
         target = np.empty((len(action), self._joints))
         target[:, self._support] = memory.support + self._scale * action
-        target[:, self._arms], self._reach = self.references.arm_target_and_reach(
-            memory.arms, memory.posture, memory.command, self._load
-        )
+        target[:, self._arms] = self.references.arm_target(memory.arms, memory.posture, memory.command, self._load)
         return target
 
     def object_place(self, memory: Memory) -> Array:
