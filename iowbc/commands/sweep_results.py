@@ -46,12 +46,22 @@ def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
         runs = [_values(found[point.name], metrics) for point in group]
         means, halves = {}, {}
         for name in metrics:
-            values = np.array([run[name] for run in runs if math.isfinite(run.get(name, math.nan))], np.float64)
+            measured = {
+                _made_by(found[point.name], name): run[name]
+                for point, run in zip(group, runs, strict=True)
+                if name in run
+            }
+            values = np.array([value for value in measured.values() if math.isfinite(value)], np.float64)
             if len(values):
                 means[name], halves[name] = float(values.mean()), _half(values)
         label = ", ".join(f"{path.rpartition('.')[2]} {written(value)}" for path, value in own.items()) or sweep.name
         lines.append(Line(label, own, means, halves, runs))
     return Outcomes(settings, metrics, tuple(lines))
+
+
+def _made_by(run: Named, metric: str) -> str:
+    """The key of the artifact that a shown metric is of: points that share it measured once."""
+    return run.artifacts[metric.partition(" ")[0]].manifest.key
 
 
 def _half(values: NDArray[np.float64]) -> float:

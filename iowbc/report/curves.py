@@ -51,14 +51,18 @@ class Panel:
     title: str
     traces: list[dict[str, Any]] = field(default_factory=list)
     across: str = "million environment steps"
+    from_zero: bool = False
+    """Whether the upright axis begins at 0, so that heights compare."""
 
     @property
     def figure(self) -> dict[str, Any]:
         """What plotly draws; the page adds the colours of light and dark."""
-        return {
-            "data": self.traces,
-            "layout": {"title": {"text": self.title, "font": {"size": 14}}, "xaxis": {"title": {"text": self.across}}},
+        layout: dict[str, Any] = {
+            "title": {"text": self.title, "font": {"size": 14}},
+            "xaxis": {"title": {"text": self.across}},
+            "yaxis": {"rangemode": "tozero"} if self.from_zero else {},
         }
+        return {"data": self.traces, "layout": layout}
 
 
 def learning_panels(groups: Sequence[Group], stage: str) -> tuple[list[Panel], list[Panel]]:
@@ -88,7 +92,7 @@ def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
             for name, title in ERRORS.items():
                 curves = [sweep[name] for sweep in sweeps]
                 joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
-                panel = panels.setdefault((suite, name), Panel(f"{suite}: {title}", across="mass [kg]"))
+                panel = panels.setdefault((suite, name), Panel(f"{suite}: {title}", across="mass [kg]", from_zero=True))
                 panel.traces += _band(group.label, place, *joined, mode="lines+markers")
     return list(panels.values())
 

@@ -41,6 +41,14 @@ def test_points_share_stages_and_are_summed_up(workplace: Workplace) -> None:
     assert points[5]["stages"][0]["shared_with"] == points[4]["point"]
 
 
+def test_what_points_share_is_one_measurement_without_an_interval(workplace: Workplace) -> None:
+    grid = ("--set", "distill.seed=0,1", "--set", "teacher.steps=4096,8192")
+    done = workplace.command("sweep", "small.yaml", *grid, "--until", "teacher")
+    assert done.code == 0, done.errors
+    table = (workplace.folder / "runs" / "sweeps" / "small-seed-steps" / "table.md").read_text().splitlines()
+    assert table[4] == "| 4096 | 2 | 3 |"
+
+
 def test_a_point_that_fails_does_not_stop_the_others(workplace: Workplace) -> None:
     behaviour = {"teacher": {"fail": "it got lost", "seed": 1}}
     done = workplace.command("sweep", "small.yaml", "--set", "seed=0..2", behaviour=behaviour)

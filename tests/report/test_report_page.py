@@ -125,6 +125,7 @@ def test_errors_over_the_mass_have_their_intervals_and_gaps_where_nobody_survive
     assert (mean["x"], mean["y"]) == ([0.0, 4.0], [1.0, None])
     assert (low["x"], low["y"]) == ([0.0], [0.99])
     assert panels["lifting: success rate"].traces[2]["y"] == [1.0, 0.8]
+    assert {panel.figure["layout"]["yaxis"]["rangemode"] for panel in panels.values()} == {"tozero"}
 
 
 def test_a_mean_over_one_trial_has_no_band_and_no_interval_of_an_error_is_below_zero(runs: list[Run]) -> None:
