@@ -12,6 +12,7 @@ from iowbc.commands.as_json import print_json
 from iowbc.commands.compared import FILM, film_of, record
 from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
+from iowbc.commands.filming import Filming
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
 from iowbc.commands.swept import members_of, points_of
@@ -61,7 +62,8 @@ def compare(
     if len(tried) > 1 or (tried and members):
         trials = report_together(tried, output, missing)
     if film and len(tried) > 1:
-        _film(store, *_of_each_recipe(tried, trials), output / FILM)
+        with Filming(console, None if as_json else output / FILM) as filming:
+            _film(store, *_of_each_recipe(tried, trials), output / FILM, filming)
     elif film:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
     if as_json:
@@ -75,8 +77,15 @@ def compare(
     if missing:
         text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
         console.print(f"{text}that takes", markup=False, highlight=False, soft_wrap=True)
-    for path in sorted(output.rglob("*.*")):
-        console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
+    for text in _written(output):
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def _written(output: Path) -> list[str]:
+    """A line for each file of a comparison, and one for each folder in it."""
+    folders = {path: sum(1 for _ in path.rglob("*.*")) for path in sorted(output.iterdir()) if path.is_dir()}
+    files = [shown_path(path) for path in sorted(output.glob("*.*"))]
+    return [*files, *(f"{shown_path(path)}/ ({count} files)" for path, count in folders.items())]
 
 
 def metrics_table(found: Sequence[Named]) -> str:
@@ -153,7 +162,7 @@ def joined(store: Store, found: Sequence[Named]) -> Joined:
         return Joined(tables, {path.name: path.read_bytes() for path in media})
 
 
-def film_together(store: Store, words: Sequence[str], output: Path) -> Path | None:
+def film_together(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
     """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
 
     None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
@@ -165,7 +174,8 @@ def film_together(store: Store, words: Sequence[str], output: Path) -> Path | No
         return None
     newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)
     if not (film.is_file() and film.stat().st_mtime > newest):
-        _film(store, *_of_each_recipe(tried, _told_apart(tried, TRIALS)[0]), film)
+        with Filming(console, film) as filming:
+            _film(store, *_of_each_recipe(tried, _told_apart(tried, TRIALS)[0]), film, filming)
     return film
 
 
@@ -236,7 +246,7 @@ def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] 
     return trials
 
 
-def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]", path: Path) -> None:
+def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]", path: Path, filming: Filming) -> None:
     """Play one trial that all runs share again, with the policies that were evaluated, and film it."""
     from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
 
@@ -244,4 +254,4 @@ def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]",
     rows = common_trial(actors)
     if not rows:
         raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
-    film_side_by_side(actors, rows, path)
+    film_side_by_side(actors, rows, path, progress=filming)

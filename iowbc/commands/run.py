@@ -70,7 +70,7 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
     before = joined_text(output)
     compare(store, console, words, output)
     try:
-        film = film_together(store, words, output)
+        film = film_together(store, console, words, output)
     except (NoRenderer, UsageError) as reason:
         film = None
         console.print(f"no film: {reason}", markup=False, highlight=False, soft_wrap=True)

@@ -167,14 +167,20 @@ def film_trial(
     film: Film | Pictures,
     video: Video,
     interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
 ) -> Outcome:
-    """Play the trial in a row of `trials.parquet` again and film it.
+    """Play the trial in a row of `trials.parquet` again and film it; `progress` is told the time reached [s].
 
     Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
     """
     environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     try:
         with EpisodeFilm(environment, film, video, [film_title(row)]) as episode:
-            return play_in(environment, in_batch(policy, row), interrupted, look=episode.look)[0]
+
+            def look(seconds: float) -> None:
+                episode.look(seconds)
+                progress(seconds)
+
+            return play_in(environment, in_batch(policy, row), interrupted, look=look)[0]
     finally:
         environment.close()

@@ -46,16 +46,24 @@ def film_side_by_side(
     rows: Sequence["pd.Series[Any]"],
     path: Path,
     interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float, float], None] = lambda seconds, duration: None,
 ) -> None:
     """Play the trial in each actor's row again, and film them as tiles; who falls stays as he lay.
 
+    progress: told how much of all trials was played, and how long they may last together [s].
     Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
     """
     video = actors[0].world.recipe.eval.video
     with TemporaryDirectory() as folder:
         clips = [Pictures(Path(folder) / str(place)) for place in range(len(actors))]
+        duration, before = sum(float(row["duration"]) for row in rows), 0.0
         for actor, row, clip in zip(actors, rows, clips, strict=True):
-            film_trial(actor.world, actor.policy, row, clip, video, interrupted)
+
+            def further(seconds: float, before: float = before) -> None:
+                progress(before + seconds, duration)
+
+            film_trial(actor.world, actor.policy, row, clip, video, interrupted, further)
+            before += float(row["duration"])
         with Film(path, video.fps) as film:
             for frames in _together([clip.frames() for clip in clips]):
                 film.add(tiled(frames))

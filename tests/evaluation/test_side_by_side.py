@@ -59,7 +59,15 @@ def test_the_film_has_all_of_them(tmp_path: Path) -> None:
     world = Specification(recipe, robot_folder("g1"))
     actor = Actor(world, Still(), Protocol(world, Still(), work=tmp_path, workers=0).run())
     actors = [actor, actor, actor]
-    film_side_by_side(actors, common_trial(actors), tmp_path / "all.mp4")
+    told: list[tuple[float, float]] = []
+    film_side_by_side(
+        actors,
+        common_trial(actors),
+        tmp_path / "all.mp4",
+        progress=lambda seconds, duration: told.append((seconds, duration)),
+    )
+    assert [seconds for seconds, _ in told] == sorted(seconds for seconds, _ in told)
+    assert told[-1] == pytest.approx((0.9, 0.9), abs=0.05)
     reader = imageio_ffmpeg.read_frames(str(tmp_path / "all.mp4"))
     assert next(reader)["size"] == (192, 128)
     reader.close()
