@@ -12,15 +12,17 @@ from iowbc.robot.mjcf import Capsule
 
 
 class SelfCollision:
-    """All pairs of capsules whose bodies are neither the same, nor parent and child, nor excluded by the MJCF."""
+    """All pairs of capsules that are neither fixed to each other, nor a joint apart, nor excluded by the MJCF."""
 
     def __init__(self, robot: Robot, model: Any) -> None:
         self._model, self._geometry = model, pinocchio.GeometryModel()
         shapes = [(body, capsule) for body in robot.tree.bodies.values() for capsule in body.capsules]
         for body, capsule in shapes:
-            joint = 1 if body.hinge is None else model.getJointId(body.hinge.name)
+            frame = model.frames[model.getFrameId(body.name, pinocchio.FrameType.BODY)]
             placement, shape = _placed(capsule)
-            self._geometry.addGeometryObject(pinocchio.GeometryObject(capsule.name, joint, placement, shape))
+            self._geometry.addGeometryObject(
+                pinocchio.GeometryObject(capsule.name, frame.parentJoint, frame.placement * placement, shape)
+            )
         self.names = tuple(capsule.name for _, capsule in shapes)
         self.pairs = [
             (a, b)
@@ -50,6 +52,10 @@ def _placed(capsule: Capsule) -> tuple[Any, Any]:
 
 
 def _may_touch(robot: Robot, a: str, b: str) -> bool:
-    bodies = robot.tree.bodies
-    related = a == b or bodies[a].parent == b or bodies[b].parent == a
-    return not related and frozenset((a, b)) not in robot.tree.excluded
+    """Whether two bodies are checked for collision; what is fixed to a body is as near to others as that one."""
+    tree = robot.tree
+    movers = [tree.mover(name) for name in (a, b)]
+    inward = [None if body.parent is None else tree.mover(body.parent).name for body in movers]
+    names = [body.name for body in movers]
+    related = names[0] == names[1] or inward[0] == names[1] or inward[1] == names[0]
+    return not related and frozenset((a, b)) not in tree.excluded

@@ -72,10 +72,10 @@ class SupportModel:
         return q
 
     def rest(self, sample: Sample) -> Array:
-        """The posture that a label is drawn to, shape (22,): the default one, with the waist's part of the lean."""
+        """The posture that a label is drawn to, shape (22,): the default one, with the lean of a waist that pitches."""
         q = self.start()
         waist = self.robot.waist_pitch
-        lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / len(waist)
+        lean = q[7 + waist] + self.problem.waist_share * sample.command[1] / max(len(waist), 1)
         q[7 + waist] = np.clip(lean, self.lower[waist], self.upper[waist])
         return q
 

@@ -5,12 +5,16 @@ import numpy as np
 import pinocchio
 import pytest
 
+from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.self_collision import SelfCollision
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 
 
-def test_capsule_distances_are_mujocos(robot: Robot, support: SupportModel) -> None:
+@pytest.mark.parametrize("made", ["robot", "robot_of_23"])
+def test_capsule_distances_are_mujocos(made: str, recipe: ReferenceGenerator, request: pytest.FixtureRequest) -> None:
+    robot: Robot = request.getfixturevalue(made)
+    support = SupportModel(robot, recipe.problem)
     collision = SelfCollision(robot, support.full)
     model = mujoco.MjModel.from_xml_path(str(robot.mjcf))
     data = mujoco.MjData(model)
@@ -37,7 +41,22 @@ def test_neighbours_in_the_chain_are_not_checked(robot: Robot, support: SupportM
     assert frozenset(("left_elbow", "left_wrist_pitch")) not in names
 
 
-def test_the_default_posture_touches_nothing(robot: Robot, support: SupportModel) -> None:
+def test_what_is_fixed_to_a_link_is_as_near_to_others_as_the_link(
+    robot_of_23: Robot, recipe: ReferenceGenerator
+) -> None:
+    collision = SelfCollision(robot_of_23, SupportModel(robot_of_23, recipe.problem).full)
+    names = {frozenset((collision.names[a], collision.names[b])) for a, b in collision.pairs}
+    assert frozenset(("left_hand", "right_hand")) in names
+    assert frozenset(("left_elbow", "left_hand")) not in names
+    assert frozenset(("torso", "right_hand")) in names
+
+
+@pytest.mark.parametrize("made", ["robot", "robot_of_23"])
+def test_the_default_posture_touches_nothing(
+    made: str, recipe: ReferenceGenerator, request: pytest.FixtureRequest
+) -> None:
+    robot: Robot = request.getfixturevalue(made)
+    support = SupportModel(robot, recipe.problem)
     q = np.concatenate([[0, 0, 0, 0, 0, 0, 1], robot.default_position])
     pinocchio.forwardKinematics(support.full, support.full_data, q)
     clearance, _ = SelfCollision(robot, support.full).clearance(support.full_data)
