@@ -4,12 +4,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from pages import write
 
+PUBLISHED = sorted((Path(__file__).parents[2] / "runs" / "published" / "export").iterdir())
 
-def test_take_a_policy_home(exported: Path, tmp_path: Path) -> None:
+
+@pytest.mark.parametrize("policy", PUBLISHED, ids=lambda folder: folder.name[:8])
+def test_take_a_policy_home(policy: Path, tmp_path: Path) -> None:
     write("tutorials/policy.md", tmp_path)
-    words = [sys.executable, "-W", "error", "walk.py", str(exported)]
+    words = [sys.executable, "-W", "error", "walk.py", str(policy)]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "29 joints" in done.stdout
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "29 joints, held back: False" in done.stdout
