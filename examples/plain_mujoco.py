@@ -43,7 +43,9 @@ def stand(folder: Path, seconds: float = 5.0) -> float:
         given["restart"][0], target = 0.0, rest.copy()
         target[support] = found["support_target"][0]
         for _ in range(round(contract["physics_frequency"] / contract["control_frequency"])):
-            data.qfrc_applied[6:] = np.clip(kp * (target - data.qpos[7:]), -effort, effort)
+            torque = kp * (target - data.qpos[7:])
+            torque[arms] += data.qfrc_bias[6:][arms]  # their own weight, which Controller has in its targets
+            data.qfrc_applied[6:] = np.clip(torque, -effort, effort)
             mujoco.mj_step(model, data)
     return float(data.qpos[2])
 

@@ -1,5 +1,6 @@
-"""The tutorial that takes a policy home, with an exported folder and without what trains."""
+"""The tutorial that takes a policy home, with the controllers that come with the repository."""
 
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import pytest
 from pages import write
 
-PUBLISHED = sorted((Path(__file__).parents[2] / "runs" / "published" / "export").iterdir())
+ROOT = Path(__file__).parents[2]
+PUBLISHED = sorted((ROOT / "runs" / "published" / "export").iterdir())
 
 
 @pytest.mark.parametrize("policy", PUBLISHED, ids=lambda folder: folder.name[:8])
@@ -17,3 +19,9 @@ def test_take_a_policy_home(policy: Path, tmp_path: Path) -> None:
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert "29 joints, held back: False" in done.stdout
+
+
+@pytest.mark.parametrize("policy", PUBLISHED, ids=lambda folder: folder.name[:8])
+def test_it_stands_in_plain_mujoco(policy: Path) -> None:
+    stand = runpy.run_path(str(ROOT / "examples" / "plain_mujoco.py"))["stand"]
+    assert stand(policy) > 0.65
