@@ -176,11 +176,6 @@ def film_trial(
     environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     try:
         with EpisodeFilm(environment, film, video, [film_title(row)]) as episode:
-
-            def look(seconds: float) -> None:
-                episode.look(seconds)
-                progress(seconds)
-
-            return play_in(environment, in_batch(policy, row), interrupted, look=look)[0]
+            return play_in(environment, in_batch(policy, row), interrupted, progress, episode.look)[0]
     finally:
         environment.close()

@@ -64,6 +64,7 @@ def film_side_by_side(
 
             film_trial(actor.world, actor.policy, row, clip, video, interrupted, further)
             before += float(row["duration"])
+            progress(before, duration)
         with Film(path, video.fps) as film:
             for frames in _together([clip.frames() for clip in clips]):
                 film.add(tiled(frames))

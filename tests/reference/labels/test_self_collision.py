@@ -11,10 +11,14 @@ from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 
 
-@pytest.mark.parametrize("made", ["robot", "robot_of_23"])
-def test_capsule_distances_are_mujocos(made: str, recipe: ReferenceGenerator, request: pytest.FixtureRequest) -> None:
-    robot: Robot = request.getfixturevalue(made)
-    support = SupportModel(robot, recipe.problem)
+@pytest.fixture(params=["robot", "robot_of_23"])
+def either(request: pytest.FixtureRequest, recipe: ReferenceGenerator) -> SupportModel:
+    """That of a robot whose every body has a hinge, and of one with bodies that are fixed to others."""
+    return SupportModel(request.getfixturevalue(request.param), recipe.problem)
+
+
+def test_capsule_distances_are_mujocos(either: SupportModel) -> None:
+    robot, support = either.robot, either
     collision = SelfCollision(robot, support.full)
     model = mujoco.MjModel.from_xml_path(str(robot.mjcf))
     data = mujoco.MjData(model)
@@ -51,12 +55,8 @@ def test_what_is_fixed_to_a_link_is_as_near_to_others_as_the_link(
     assert frozenset(("torso", "right_hand")) in names
 
 
-@pytest.mark.parametrize("made", ["robot", "robot_of_23"])
-def test_the_default_posture_touches_nothing(
-    made: str, recipe: ReferenceGenerator, request: pytest.FixtureRequest
-) -> None:
-    robot: Robot = request.getfixturevalue(made)
-    support = SupportModel(robot, recipe.problem)
+def test_the_default_posture_touches_nothing(either: SupportModel) -> None:
+    robot, support = either.robot, either
     q = np.concatenate([[0, 0, 0, 0, 0, 0, 1], robot.default_position])
     pinocchio.forwardKinematics(support.full, support.full_data, q)
     clearance, _ = SelfCollision(robot, support.full).clearance(support.full_data)
