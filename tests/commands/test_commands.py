@@ -1,15 +1,14 @@
 """The commands answer fast, say what was meant, and end with the right exit code."""
 
 import json
-import os
 import shlex
-import statistics
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from processor_time import yardsticks
 from rich.console import Console
 
 from iowbc.commands.compare import compare
@@ -22,30 +21,19 @@ from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
+SMALL_STAGES = Path(__file__).parents[1] / "pipeline" / "fake_stages.py"
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 Key = Callable[[str, str], str]
 
 
-def processor_seconds(act: Callable[[], object]) -> float:
-    """What the processes that `act` runs take on a machine that does nothing else."""
-    before = os.times()
-    act()
-    after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
-
-
-def iowbc(*arguments: str) -> None:
-    subprocess.run([sys.executable, "-m", "iowbc", *arguments], capture_output=True, check=False)
-
-
 def test_help_answers_at_once() -> None:
-    assert statistics.median(processor_seconds(lambda: iowbc("--help")) for _ in range(5)) < 0.4
+    assert yardsticks("-m", "iowbc", "--help", pairs=5) < 1.5
 
 
 def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("teacher:\n  stebs: 3\n")
-    assert statistics.median(processor_seconds(lambda: iowbc("run", str(path))) for _ in range(3)) < 1.0
+    assert yardsticks("-m", "iowbc", "run", str(path)) < 8
 
 
 @pytest.mark.parametrize(
@@ -88,11 +76,11 @@ def test_wrong_usage_ends_with_2_and_a_reason(folder: Path, command: Command, ar
     assert "Traceback" not in done.stderr
 
 
-def test_a_finished_recipe_is_cached_and_fast(command: Command) -> None:
-    done: list[subprocess.CompletedProcess[str]] = []
-    assert processor_seconds(lambda: done.append(command("run", "first.yaml"))) < 3.0
-    assert done[0].returncode == 0
-    assert done[0].stdout.count(": cached") == 6
+def test_a_finished_recipe_is_cached_and_fast(folder: Path, command: Command) -> None:
+    done = command("run", "first.yaml")
+    assert done.returncode == 0
+    assert done.stdout.count(": cached") == 6
+    assert yardsticks(str(SMALL_STAGES), "run", "first.yaml", folder=folder) < 12
     assert "all stages are cached" in command("plan", "first.yaml").stdout
 
 
@@ -224,9 +212,7 @@ def test_schema_is_written_for_editors(folder: Path, command: Command) -> None:
 
 def test_the_output_may_be_cut_short(folder: Path) -> None:
     """`iowbc run ... | head -1` ends the reader, not the run."""
-    command = (
-        f"{sys.executable} {Path(__file__).parents[1] / 'pipeline' / 'fake_stages.py'} run first.yaml --set seed=9"
-    )
+    command = f"{sys.executable} {SMALL_STAGES} run first.yaml --set seed=9"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command} | head -1"], cwd=folder, capture_output=True, text=True, check=False
     )
