@@ -123,12 +123,24 @@ def plan(
         print_plan(request, STAGES, console(), as_json)
 
 
-def publish(recipe: RecipeFile, overrides: Overrides = None, until: Until = None, runs: RunsFolder = None) -> None:
+def publish(
+    recipe: RecipeFile,
+    overrides: Overrides = None,
+    until: Until = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="File to leave out, e.g. state.safetensors, which only a longer training needs; repeat for more.",
+            metavar="FILE",
+        ),
+    ] = None,
+    runs: RunsFolder = None,
+) -> None:
     """Put a recipe's finished artifacts into the repository (runs/published): a fresh clone starts from them."""
     from iowbc.commands.publish import publish_recipe
     from iowbc.stages.registry import STAGES
 
-    publish_recipe(request_of(recipe, overrides, until, None, None, "report", runs), STAGES, console())
+    publish_recipe(request_of(recipe, overrides, until, None, None, "report", runs), STAGES, console(), without or ())
 
 
 def request_of(

@@ -1,6 +1,6 @@
 """`iowbc publish`: put a recipe's finished artifacts into the repository, so that a fresh clone starts from them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from rich.console import Console
 
@@ -13,10 +13,13 @@ from iowbc.pipeline.store.publishing import publish, published_size
 from iowbc.pipeline.writability import require_writable_runs
 
 
-def publish_recipe(request: Request, registry: Mapping[str, Stage], console: Console) -> None:
-    """Copy what the recipe's stages have to `runs/published/` and verify it. Raises `UsageError` where one has not run.
+def publish_recipe(
+    request: Request, registry: Mapping[str, Stage], console: Console, without: Sequence[str] = ()
+) -> None:
+    """Copy what the recipe's stages have to `runs/published/`, but for the files named in `without`, and verify it.
 
-    Code that changed since an artifact was made is no obstacle, and is said.
+    Raises `UsageError` where a stage has not run, and where no artifact has a file of such a name. Code that changed
+    since an artifact was made is no obstacle, and is said.
     """
     planners = [prepared(loaded, request, registry)[0] for loaded in recipes(request)]
     steps = [step for planner in planners for step in planner.plan()]
@@ -28,11 +31,16 @@ def publish_recipe(request: Request, registry: Mapping[str, Stage], console: Con
     made = [step.artifact for step in steps]
     started = [found for planner in planners for stage in planner.stages for found in planner.start(stage).values()]
     artifacts = {found.manifest.key: found for found in (*made, *started) if found is not None}
+    names = {name for artifact in artifacts.values() for name in artifact.manifest.files}
+    for name in without:
+        if name not in names:
+            raise UsageError(f"--without {name}: no artifact has such a file; files: {', '.join(sorted(names))}")
     for key, artifact in artifacts.items():
-        copy = artifact if artifact.published else publish(request.runs, artifact)
+        to_leave_out = set(without) & set(artifact.manifest.files) - set(artifact.manifest.omitted)
+        copy = artifact if artifact.published and not to_leave_out else publish(request.runs, artifact, without)
         left_out = ", ".join(copy.manifest.omitted)
-        without = [f"without {left_out}"] if left_out else []
+        lacks = [f"without {left_out}"] if left_out else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({size(copy.size)})"
-        text = "; ".join([what, *without, *notes.get(key, ())])
+        text = "; ".join([what, *lacks, *notes.get(key, ())])
         console.print(text, markup=False, highlight=False, soft_wrap=True)
     console.print(f"{size(published_size(request.runs))} are published in all", highlight=False)

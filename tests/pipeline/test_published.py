@@ -113,6 +113,21 @@ def test_publishing_copies_verifies_and_refuses_what_has_not_run(workplace: Work
     assert "cached (published)" in workplace.command("plan", "small.yaml", "--until", "teacher").output
 
 
+def test_publishing_leaves_out_the_files_that_are_named(workplace: Workplace) -> None:
+    workplace.run()
+    unknown = workplace.command("publish", "small.yaml", "--without", "curve.png")
+    assert unknown.code == 2
+    assert "--without curve.png: no artifact has such a file; files: figures/curve.png, " in unknown.errors
+    assert not workplace.store.runs.published.exists()
+    assert workplace.command("publish", "small.yaml").code == 0
+    shutil.rmtree(workplace.store.runs.store)
+    assert list(workplace.store.runs.published.glob("*/*/figures/curve.png"))
+    done = workplace.command("publish", "small.yaml", "--without", "figures/curve.png")
+    assert done.output.count("; without figures/curve.png") == 6
+    assert not list(workplace.store.runs.published.glob("*/*/figures/curve.png"))
+    assert all(step.cached for step in workplace.plan().values())
+
+
 def test_a_repository_that_grows_too_large_is_refused(cloned: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
     assert publishing.published_size(cloned.store.runs) > 1000
     monkeypatch.setattr(publishing, "LARGEST_REPOSITORY", 1000)

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from collections.abc import Collection
 from pathlib import Path
 
 from iowbc.errors import UsageError
@@ -19,10 +20,10 @@ LARGEST_REPOSITORY = 60_000_000
 """All that may be published [bytes]: a clone must stay quick."""
 
 
-def publish(runs: Runs, artifact: Artifact) -> Artifact:
+def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Artifact:
     """Copy an artifact to `runs/published/` and verify the copy.
 
-    Files of other kinds, and large ones, are left out and named in the copy's manifest.
+    Files of other kinds, large ones, and those named in `without` are left out and named in the copy's manifest.
     """
     made = artifact.manifest
     target = runs.published / made.stage / made.key
@@ -31,7 +32,7 @@ def publish(runs: Runs, artifact: Artifact) -> Artifact:
     omitted = tuple(
         name
         for name, record in made.files.items()
-        if name in made.omitted or record.size > LARGEST_FILE or Path(name).suffix not in KINDS
+        if name in made.omitted or name in without or record.size > LARGEST_FILE or Path(name).suffix not in KINDS
     )
     for name in (*made.files, *BESIDE):
         if name not in omitted:
