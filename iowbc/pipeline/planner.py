@@ -320,8 +320,8 @@ class Planner:
     def _rest(self, stage: Stage, key: str, expected: float | None) -> float | None:
         """The time that is left where an earlier attempt has left something, at its own rate [s]."""
         record = self._attempt(stage, key)
-        done, total = float(record.get("done", 0.0)), float(record.get("total", 0.0))
-        return float(record["seconds"]) * max(0.0, total / done - 1.0) if done and total else expected
+        done, total, seconds = (float(record.get(name, 0.0)) for name in ("done", "total", "seconds"))
+        return seconds * max(0.0, total / done - 1.0) if done and total and seconds else expected
 
     def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
         """What an earlier attempt has left."""
@@ -329,7 +329,7 @@ class Planner:
         if record:
             total = float(record.get("total", 0.0))
             share = f", {100 * float(record.get('done', 0.0)) / total:.0f} %" if total else ""
-            yield f"goes on from attempt {record.get('attempts', 1)}{share}"
+            yield f"goes on from attempt {int(record['attempts']) or 1}{share}"
 
     def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
         """The stored artifact of a stage that differs least; of several this recipe's own, then the newest."""

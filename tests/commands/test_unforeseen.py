@@ -111,7 +111,18 @@ def test_what_an_attacker_would_type_is_refused(folder: Path, command: Command, 
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("text", ["[]", "3", '{"updated": "never"}', '{"code": 3}', "\x00"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[]",
+        "3",
+        "{}",
+        '{"updated": "never"}',
+        '{"code": 3}',
+        "\x00",
+        '{"forced": true, "done": 3, "total": 9, "sdconds": 2}',
+    ],
+)
 def test_a_progress_of_other_types_is_no_progress(
     folder: Path, command: Command, key: Callable[..., str], text: str
 ) -> None:

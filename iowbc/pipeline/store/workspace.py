@@ -117,14 +117,18 @@ class Workspace:
 
 
 def _record(root: Path) -> dict[str, Any]:
-    """What a work folder says of its stage; empty where that is missing or not what was written."""
+    """What a work folder says of its stage; empty where that is missing or not what was written.
+
+    A number that was not recorded, or whose name a flipped bit changed, is 0.
+    """
     found = read_json(root / PROGRESS)
-    if not isinstance(found, dict):
+    if not found or not isinstance(found, dict):
         return {}
     curve = found.get("curve", [])
     numbers = all(isinstance(found.get(name, 0.0), (int, float)) for name in NUMBERS)
     numbers &= isinstance(curve, list) and all(_is_point(point) for point in curve)
-    return found if numbers and isinstance(found.get("code", {}), dict) else {}
+    whole = numbers and isinstance(found.get("code", {}), dict)
+    return dict.fromkeys(NUMBERS, 0.0) | found if whole else {}
 
 
 def _is_point(point: Any) -> bool:
