@@ -13,7 +13,7 @@ from workplace import Workplace
 from iowbc.errors import Damaged, Interrupted, PipelineFailed
 from iowbc.pipeline.store.artifact import MANIFEST
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import Workspace
+from iowbc.pipeline.store.workspace import PROGRESS, Workspace
 
 
 def flip(path: Path) -> None:
@@ -152,3 +152,21 @@ def test_a_manifest_says_how_an_artifact_was_made(workplace: Workplace) -> None:
     manifest = json.loads((artifact.folder / MANIFEST).read_text())
     assert (manifest["workers"], manifest["attempts"], manifest["recipe"]) == (2, 1, "small")
     assert "python" in manifest["versions"]
+
+
+def test_no_flipped_bit_of_a_progress_stops_a_plan(workplace: Workplace) -> None:
+    stage = "rg-dataset"
+    workspace = Workspace(workplace.store.runs, stage, workplace.plan()[stage].key)
+    workspace.begin("small", True, {"pipeline": "1a2b"}, "iowbc run small.yaml")
+    workspace.drawn("count", [(1.0, 2.5), (2.0, 3.5)])
+    workspace.progress(3, 9, "counts")
+    workspace.write()
+    path = workspace.root / PROGRESS
+    whole = path.read_bytes()
+    planner = workplace.planner(force=frozenset({stage}))
+    assert planner.plan()[0].expected == pytest.approx(2 * json.loads(whole)["seconds"])
+    for place in range(len(whole)):
+        flipped = bytearray(whole)
+        flipped[place] ^= 1 << place % 8
+        path.write_bytes(flipped)
+        assert not planner.plan()[0].cached
