@@ -16,6 +16,7 @@ from iowbc.stages.registry import STAGES
 RECIPES = Path(__file__).parents[2] / "recipes"
 VARIANTS = {
     "wbc": {
+        "stages",
         "simulation.randomization.enabled",
         "simulation.partner.enabled",
         "simulation.impulses.enabled",
@@ -30,6 +31,7 @@ VARIANTS = {
         "eval.simulation",
     },
     "wo_rg": {
+        "stages",
         "task.references.use_rg",
         "task.reward.sync.support_reference.weight",
         "task.reward.sync.lateral_reference.weight",
