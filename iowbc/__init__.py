@@ -5,6 +5,7 @@ is imported here, not even `typing`: Ctrl-C is answered as soon as this file has
 """
 
 import os
+import sys
 from importlib import import_module
 
 TYPE_CHECKING = False
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from iowbc.task.vector.vector_env import VectorEnv
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
+for _folder in sys.path:  # glfw, which mujoco loads, else asks a Python of its own for its library's version
+    _library = f"{_folder}/glfw/{'wayland' if os.environ.get('XDG_SESSION_TYPE') == 'wayland' else 'x11'}/libglfw.so"
+    if os.path.isfile(_library):
+        os.environ.setdefault("PYGLFW_LIBRARY", _library)
 
 __version__ = "0.1.0"
 __all__ = [
