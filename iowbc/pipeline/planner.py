@@ -327,8 +327,7 @@ class Planner:
         """What an earlier attempt has left."""
         record = self._attempt(stage, key)
         if record:
-            total = float(record.get("total", 0.0))
-            share = f", {100 * float(record.get('done', 0.0)) / total:.0f} %" if total else ""
+            share = f", {100 * record['done'] / record['total']:.0f} %" if record["total"] else ""
             yield f"goes on from attempt {int(record['attempts']) or 1}{share}"
 
     def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:

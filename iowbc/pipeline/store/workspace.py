@@ -16,6 +16,8 @@ from iowbc.pipeline.store.runs import Runs, read_json
 PROGRESS = "progress.json"
 NUMBERS = ("attempts", "before", "seconds", "updated", "done", "total")
 """Entries of the progress that are numbers."""
+LARGEST = 1e18
+"""No entry is larger: neither steps nor seconds; infinity is none of them."""
 WRITE_INTERVAL = 1.0
 """Seconds between two records of the progress on disk."""
 
@@ -125,10 +127,15 @@ def _record(root: Path) -> dict[str, Any]:
     if not found or not isinstance(found, dict):
         return {}
     curve = found.get("curve", [])
-    numbers = all(isinstance(found.get(name, 0.0), (int, float)) for name in NUMBERS)
+    numbers = all(_is_number(found.get(name, 0.0)) for name in NUMBERS)
     numbers &= isinstance(curve, list) and all(_is_point(point) for point in curve)
     whole = numbers and isinstance(found.get("code", {}), dict)
     return dict.fromkeys(NUMBERS, 0.0) | found if whole else {}
+
+
+def _is_number(entry: Any) -> bool:
+    """Whether an entry is a number that can be counted with."""
+    return isinstance(entry, (int, float)) and abs(entry) < LARGEST
 
 
 def _is_point(point: Any) -> bool:
