@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from iowbc.pipeline.stage import Job
+from iowbc.pipeline.stage import Job, Member
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
 
@@ -40,6 +41,7 @@ class Backwards:
 
     def __init__(self) -> None:
         self.calls = 0
+        self.crews: list[int] = []
 
     def __call__(
         self, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
@@ -47,6 +49,37 @@ class Backwards:
         for place in reversed(range(len(calls))):
             self.calls += 1
             yield place, function(*calls[place], **folders)
+
+    def crew(
+        self, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+    ) -> "Remade":
+        self.crews.append(len(calls))
+        return Remade([partial(make, *own, **folders) for own in calls])
+
+
+class Remade:
+    """Stands for members on other machines that are lost all the time: before each request every one is made anew."""
+
+    def __init__(self, made: Sequence[Callable[[], Member]]) -> None:
+        self.made = made
+        self.states: list[Any] = [None for _ in made]
+        self.found: list[Any] = []
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True) -> None:
+        self.found = []
+        for index, (make, own) in enumerate(zip(self.made, arguments, strict=True)):
+            member = make()
+            if self.states[index] is not None:
+                member.restore(self.states[index])
+            self.found.append(member.ask(request, own))
+            if changes:
+                self.states[index] = member.state()
+
+    def answers(self) -> list[Any]:
+        return self.found
+
+    def close(self) -> None:
+        self.made = ()
 
 
 def make_job(

@@ -37,7 +37,8 @@ MAY_IMPORT = {
     "export": WORLD | {"task", "reference", "learning", "deploy"},
     "report": {"learning", "pipeline", "recipe", "errors"},
     "web": WORLD | {"task", "deploy", "evaluation"},
-    "stages": WORLD | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
+    "stages": WORLD
+    | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
     | {"live", "web"},

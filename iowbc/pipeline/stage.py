@@ -31,6 +31,40 @@ class Report(Protocol):
         """Let tracking have a file or folder of the stage while it runs; it may be told again."""
 
 
+class Member(Protocol):
+    """An object that works for a stage on another machine, and can be remade there or elsewhere."""
+
+    def ask(self, request: str, arguments: tuple[Any, ...]) -> Any:
+        """Do what is asked; the answer."""
+
+    def state(self) -> Any:
+        """Everything that the future depends on."""
+
+    def restore(self, state: Any) -> None:
+        """Inverse of `state`."""
+
+
+class Crew(Protocol):
+    """Members that are asked side by side. Who is lost is remade in the state after the last request."""
+
+    @property
+    def states(self) -> list[Any]:
+        """The state of each member after the last request that changed it."""
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True) -> None:
+        """Begin a request of every member, each with its own arguments. `changes`: whether it changes states."""
+
+    def answers(self) -> list[Any]:
+        """What the members answered, in order.
+
+        Raises WorkerFailed with what a member raised, and `Interrupted` where they wait for cores when the job is asked
+        to stop.
+        """
+
+    def close(self) -> None:
+        """End the members."""
+
+
 class Spread(Protocol):
     """Other machines that work for a stage."""
 
@@ -46,6 +80,10 @@ class Spread(Protocol):
 
         Raises `Interrupted` once the job is asked to stop.
         """
+
+    def crew(self, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]) -> Crew:
+        """Members of one core each on any machines, made by a function of a module from each of these arguments and
+        `folders`, as above."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +121,15 @@ def _none(recipe: Recipe) -> Iterator[tuple[str, str]]:
     return iter(())
 
 
+def _never(recipe: Recipe) -> bool:
+    return False
+
+
+def always(recipe: Recipe) -> bool:
+    """Whatever the recipe says."""
+    return True
+
+
 @dataclass(frozen=True)
 class Stage:
     """A step of the pipeline: what makes its key, and the function that does the work."""
@@ -112,5 +159,5 @@ class Stage:
     by whatever recipe, which is then read as `START`. It needs the files `extends_from`, too."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
-    spreads: bool = False
-    """Whether it leaves its heavy work to `Job.spread` where there is one."""
+    spreads: Callable[[Recipe], bool] = _never
+    """Whether it leaves its heavy work to `Job.spread` where there is one, for a given recipe."""

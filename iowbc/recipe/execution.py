@@ -19,6 +19,10 @@ class Execution(Section):
     """The Ray cluster: `local` (one of this machine alone, which ends with the run), `local:NODES` (the same of several
     nodes, which share the cores), `auto` (the one that `ray start` began here), `HOST:PORT`, or `ray://HOST:PORT`.
     `--address` goes before it."""
+    rollout_actors: int | None = Field(default=None, ge=1, le=1024)
+    """On Ray: actors of one core each, on whatever nodes, that make the rollouts of a training; at most as many as the
+    cluster has cores. When empty a training stays on one node with its worker processes, which is better where many
+    trainings run."""
     copy_files: bool = False
     """Whether nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
     that are slow. Where they do not see it they copy in any case."""

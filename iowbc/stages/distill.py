@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
-from iowbc.stages.training import train
+from iowbc.stages.training import rolls_elsewhere, train
 
 PANELS = (
     "kl",
@@ -39,18 +39,12 @@ def run(job: Job) -> None:
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
-    from iowbc.task.specification import Specification
-    from iowbc.task.vector.vector_env import VectorEnv
+    from iowbc.stages.environments import training_environments
 
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
     seed = recipe.seed if settings.seed is None else settings.seed
     teacher, about = load_teacher(job.inputs["teacher"])
-    environments = VectorEnv(
-        Specification(recipe, job.robot, job.inputs.get("rg-fit")),
-        num_envs=settings.environments,
-        workers=job.workers,
-        seed=seed + 1,
-    )
+    environments = training_environments(job, count=settings.environments, seed=seed + 1)
     try:
         environments.set_curriculum(about["curriculum"])
         layout = environments.layout
@@ -91,4 +85,5 @@ STAGE = Stage(
     results=("student.safetensors", "student.json"),
     packages=("stages.distill", "stages.training", "learning", "rollouts", *ENVIRONMENTS),
     counts=("distill.steps",),
+    spreads=rolls_elsewhere,
 )

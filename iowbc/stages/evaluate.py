@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import Job, Stage, always
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
 from iowbc.stages.spreading import play_everywhere
@@ -158,5 +158,5 @@ STAGE = Stage(
     results=("*.parquet",),
     packages=("stages.evaluate", "evaluation", "deploy", "learning", "rollouts", *ENVIRONMENTS),
     counts=("eval.trials",),
-    spreads=True,
+    spreads=always,
 )

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 
 from iowbc.errors import StageFailed
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import Job, Stage, always
 from iowbc.stages.spreading import label_everywhere
 
 LABELLED = "labelled.npz"
@@ -129,5 +129,5 @@ STAGE = Stage(
     results=("dataset.npz", LABELLED),
     packages=("reference", "control", "robot"),
     counts=("rg.sampling.samples",),
-    spreads=True,
+    spreads=always,
 )

@@ -1,23 +1,26 @@
-"""`iowbc bench scale`: labels and trials on one node of Ray and on two, and what its engine costs."""
+"""`iowbc bench scale`: labels, trials and rollouts on one node of Ray and on two, and what its engine costs."""
 
 import pickle
 import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 import torch
 
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.evaluation.trials.plan import Trial, planned_sweeps
 from iowbc.evaluation.trials.protocol import Batches
+from iowbc.learning.as_numpy import teacher_policy
 from iowbc.learning.networks import TeacherNetwork
-from iowbc.learning.storage import save_network
+from iowbc.learning.storage import load_teacher, save_network
 from iowbc.pipeline.cluster.cluster import Cluster, begun_here
 from iowbc.pipeline.cluster.folders import files_of
 from iowbc.pipeline.stage import Spread
@@ -25,9 +28,14 @@ from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.labelling import LabelTask
 from iowbc.robot.description import load_robot, robot_folder
+from iowbc.rollouts.blocks import block_size
+from iowbc.rollouts.pilots import Explorer
+from iowbc.stages.environments import Elsewhere
 from iowbc.stages.rg_dataset import CHUNK
 from iowbc.stages.spreading import SHARES, label_everywhere, play_everywhere
 from iowbc.task.layout import full_layout
+from iowbc.task.specification import Specification
+from iowbc.task.vector.vector_env import VectorEnv
 
 NODES = (1, 2)
 """Nodes of one core each, in turn."""
@@ -37,6 +45,10 @@ TRIALS = 16
 """Trials in a batch; each node plays `SHARES` batches."""
 DURATION = 3.0
 """Length of a trial [s]."""
+ENVIRONMENTS = 48
+"""Environments of a training for each node."""
+ROLLOUTS = 3
+"""Rollouts that are timed."""
 ROUNDS = 30
 """Pieces that do nothing, one after another, by which the engine is timed."""
 
@@ -80,8 +92,9 @@ class Pace:
         return self.count / self.used
 
 
+KINDS = ("labels", "trials", "rollouts")
 Turn = dict[int, dict[str, Pace]]
-"""Paces of `labels`, `trials` and `pieces` (that do nothing) by the number of nodes."""
+"""Paces of `KINDS` (rollouts in environment steps) and `pieces` (that do nothing) by the number of nodes."""
 
 
 def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], None] = print) -> dict[str, float]:
@@ -98,11 +111,12 @@ def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], N
             turn: Turn = {}
             for nodes in NODES:
                 with begun_here([1] * nodes, copy=True) as cluster:
-                    turn[nodes], figures["answer_bytes"] = _paces(cluster, world, nodes)
+                    turn[nodes], sizes = _paces(cluster, world, nodes)
+                    figures |= sizes
             measured.append(turn)
     say(f"{world.recipe.name}: nodes of one core, {turns} turns; a second, and a second of a core's time")
     say(f"{'':10}{'1 node':>10}{'2 nodes':>10}{'efficiency':>12}{'a core, 1':>12}{'a core, 2':>12}")
-    for name in ("labels", "trials"):
+    for name in KINDS:
         rates = [max(turn[nodes][name].rate for turn in measured) for nodes in NODES]
         cores = [max(turn[nodes][name].a_core for turn in measured) for nodes in NODES]
         efficiency = statistics.median(turn[2][name].rate / (2 * turn[1][name].rate) for turn in measured)
@@ -115,6 +129,8 @@ def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], N
     say(f"engine: {figures['piece_ms']:.1f} ms a piece; a trial takes {figures['trial_ms']:.0f} ms of a core")
     inputs, piece, answer = (figures[f"{name}_bytes"] for name in ("inputs", "piece", "answer"))
     say(f"bytes: {inputs:.0f} once to each node, {piece:.0f} to a piece of one trial, {answer:.0f} back from {TRIALS}")
+    down, up = figures["pilot_bytes"], figures["rollout_bytes"]
+    say(f"bytes an update: {down:.0f} to an actor of {ENVIRONMENTS} environments, {up:.0f} back")
     return figures
 
 
@@ -140,8 +156,8 @@ def _world(recipe: Recipe) -> Iterator[World]:
         yield World(recipe, folders, sweep.trials(sweep.sweep.masses[-1:]))
 
 
-def _paces(cluster: Cluster, world: World, nodes: int) -> tuple[dict[str, Pace], int]:
-    """How fast a cluster is, and the bytes that come back from a batch."""
+def _paces(cluster: Cluster, world: World, nodes: int) -> tuple[dict[str, Pace], dict[str, float]]:
+    """How fast a cluster is, and the bytes of what passes between its nodes."""
     spread = cluster.spread(world.folders.values())
 
     def played(batches: Batches) -> list[tuple[str, bytes]]:
@@ -159,7 +175,32 @@ def _paces(cluster: Cluster, world: World, nodes: int) -> tuple[dict[str, Pace],
         "trials": _timed(sum(map(len, batches.values())), lambda: answers.extend(played(batches))),
         "labels": _timed(SHARDS * nodes * CHUNK[world.recipe.rg.method], lambda: _label(spread, world, SHARDS * nodes)),
     }
-    return paces, max(len(content) for _, content in answers)
+    paces["rollouts"], sizes = _rolled(spread, world, nodes)
+    return paces, sizes | {"answer_bytes": max(len(content) for _, content in answers)}
+
+
+def _rolled(spread: Spread, world: World, nodes: int) -> tuple[Pace, dict[str, float]]:
+    """How fast a training's rollouts are made, one actor on each node; and the bytes of an update, of one actor."""
+    recipe, count = world.recipe, ENVIRONMENTS * nodes
+    specification = Specification(recipe, world.folders["robot"], world.folders["generator"])
+    policy = teacher_policy(load_teacher(world.folders["policy"])[0])
+    environments = VectorEnv(specification, num_envs=count, workers=partial(Elsewhere, spread, nodes), seed=0)
+    with closing(environments):
+        environments.reset()
+        steps, actions = recipe.teacher.rollout, environments.action_space.shape[0]
+        noise = np.random.default_rng(0).normal(0.0, recipe.teacher.initial_std, (steps, count, actions))
+        pilot = Explorer(policy, noise.astype(np.float32), block_size(count))
+        found = environments.roll(pilot, steps)
+        sizes = {
+            "pilot_bytes": len(pickle.dumps(pilot.part(*environments.workers.groups[0]))),
+            "rollout_bytes": len(pickle.dumps((found, environments.state()))) / nodes,
+        }
+        return _timed(ROLLOUTS * steps * count, lambda: _repeat(environments, pilot, steps)), sizes
+
+
+def _repeat(environments: VectorEnv, pilot: Explorer, steps: int) -> None:
+    for _ in range(ROLLOUTS):
+        environments.roll(pilot, steps)
 
 
 def _timed(count: int, work: Callable[[], None]) -> Pace:

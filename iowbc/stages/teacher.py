@@ -11,7 +11,7 @@ from iowbc.learning.curves import TABLE
 from iowbc.pipeline.stage import START, Job, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
-from iowbc.stages.training import STATE, leave_extendable, train
+from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
 
 if TYPE_CHECKING:
     from iowbc.evaluation.training_films import TrainingFilms
@@ -55,19 +55,15 @@ def run(job: Job) -> None:
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
     from iowbc.robot.description import load_robot
+    from iowbc.stages.environments import training_environments
     from iowbc.task.specification import Specification
-    from iowbc.task.vector.vector_env import VectorEnv
 
     recipe, settings = job.recipe, job.recipe.teacher
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
     with ExitStack() as open_ones:
-        environments = VectorEnv(
-            world,
-            num_envs=settings.environments,
-            workers=job.workers,
-            seed=seed,
-            divergences=job.work / "divergences",
+        environments = training_environments(
+            job, count=settings.environments, seed=seed, divergences=job.work / "divergences"
         )
         open_ones.enter_context(closing(environments))
         score, films = None, None
@@ -183,4 +179,5 @@ STAGE = Stage(
     extends_from=(STATE, TABLE),
     starts_from="teacher.start",
     counts=("teacher.steps",),
+    spreads=rolls_elsewhere,
 )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
+from iowbc.recipe.recipe import Recipe
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,6 +39,11 @@ STATE = "state.safetensors"
 """File of an artifact that a longer training goes on from, beside the table of its curves."""
 CURVES = "curves.jsonl"
 """Curves of a training that goes on."""
+
+
+def rolls_elsewhere(recipe: Recipe) -> bool:
+    """Whether a recipe wants the rollouts of a training made by other machines, where there are any."""
+    return recipe.execution.rollout_actors is not None
 
 
 def train(

@@ -1,6 +1,7 @@
 """Kills of nodes at random moments of a run, or of a sweep, on a Ray cluster of this machine: `make chaos-nodes`.
 
 python tests/chaos/nodes.py [--recipe recipes/smoke.yaml] [--kills 10] [--nodes 3] [--gap 20] [--seed 0] [--until STAGE]
+python tests/chaos/nodes.py --actors 3 --until distill
 python tests/chaos/nodes.py --vary seed=0..1 --until rg-fit --kills 10
 
 The recipe is run once undisturbed, with local processes. Then it runs on nodes of one core each, which keep to their
@@ -210,11 +211,13 @@ def main() -> int:
     parser.add_argument("--until", help="stage at which it ends")
     parser.add_argument("--kills", type=int, default=10)
     parser.add_argument("--nodes", type=int, default=3)
+    parser.add_argument("--actors", type=int, help="rollout actors of each training; without, it stays on one node")
     parser.add_argument("--gap", type=float, default=20.0, help="mean seconds between two kills")
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     words = ["sweep" if asked.vary else "run", str(asked.recipe), "--set", "execution.copy_files=true"]
     words += ["--set", "execution.tracking_patience=0"]
+    words += ["--set", f"execution.rollout_actors={asked.actors}"] if asked.actors else []
     words += ["--set", asked.vary] if asked.vary else []
     words += ["--until", asked.until] if asked.until else []
     record = RECORDS / f"nodes-{words[0]}-{asked.recipe.stem}-seed-{asked.seed}.jsonl"

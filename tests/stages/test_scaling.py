@@ -24,12 +24,16 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
     monkeypatch.setattr(scaling, "SHARES", 1)
     monkeypatch.setattr(scaling, "TRIALS", 2)
     monkeypatch.setattr(scaling, "DURATION", 0.1)
+    monkeypatch.setattr(scaling, "ENVIRONMENTS", 2)
+    monkeypatch.setattr(scaling, "ROLLOUTS", 1)
     lines: list[str] = []
     figures = scaling.main(turns=1, say=lines.append)
     assert begun == [1, 2]
     kinds = ("1", "2", "efficiency", "a_core_1", "a_core_2")
-    assert {f"{name}_{kind}" for name in ("labels", "trials") for kind in kinds} <= set(figures)
+    assert {f"{name}_{kind}" for name in ("labels", "trials", "rollouts") for kind in kinds} <= set(figures)
     assert all(value > 0 for value in figures.values())
     assert figures["trials_efficiency"] == pytest.approx(figures["trials_2"] / (2 * figures["trials_1"]))
     assert figures["answer_bytes"] < figures["inputs_bytes"]
+    assert figures["pilot_bytes"] < figures["rollout_bytes"]
     assert lines[2].startswith("labels ")
+    assert lines[4].startswith("rollouts ")

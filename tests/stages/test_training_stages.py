@@ -2,7 +2,10 @@
 
 import dataclasses
 import json
+import os
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +14,7 @@ import pytest
 import torch
 from safetensors.numpy import load_file
 from stable_baselines3 import PPO
-from stage_jobs import make_job
+from stage_jobs import Backwards, make_job
 from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
@@ -19,6 +22,7 @@ from iowbc.errors import StageFailed
 from iowbc.learning.acting import StudentPolicy, load_policy
 from iowbc.learning.storage import load_network, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
+from iowbc.recipe.execution import Execution
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import distill, evaluate, export, teacher
@@ -44,6 +48,35 @@ def test_a_teacher_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(
     resumed = stopped_and_resumed(teacher.STAGE, tmp_path, small_recipe())
     assert resumed.report.lines == ["resumed from its checkpoint at 64 of 128 steps"]  # type: ignore[attr-defined]
     for name in ("teacher.safetensors", "teacher.json"):
+        assert (tmp_path / "out" / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
+    assert rows(tmp_path / "work") == rows(trained / "teacher" / "work")
+
+
+def test_rollouts_by_other_machines_that_are_lost_all_the_time_change_nothing(trained: Path, tmp_path: Path) -> None:
+    asked = small_recipe().model_copy(update={"execution": Execution(rollout_actors=2)})
+    for stage in (teacher.STAGE, distill.STAGE):
+        assert stage.spreads(asked)
+        assert not stage.spreads(small_recipe())
+        inputs = {"teacher": trained / "teacher" / "out"} if stage is distill.STAGE else {}
+        job = make_job(tmp_path / stage.name, asked, inputs=inputs, workers=0)
+        elsewhere = Backwards()
+        stage.run(dataclasses.replace(job, spread=elsewhere))
+        assert elsewhere.crews == [2], "two groups, each by a member of its own"
+        for name in stage.results:
+            assert (job.out / name).read_bytes() == (trained / stage.name / "out" / name).read_bytes(), name
+        assert rows(job.work) == rows(trained / stage.name / "work")
+
+
+@pytest.mark.timeout(600)
+def test_an_actor_that_is_killed_on_ray_changes_nothing(trained: Path, tmp_path: Path) -> None:
+    pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
+    script = Path(__file__).with_name("lost_actor.py")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    run = subprocess.run(
+        [sys.executable, script, tmp_path], env=environment, capture_output=True, text=True, check=False
+    )
+    assert "2 actors, one of them killed" in run.stdout, run.stderr
+    for name in ("teacher.safetensors", "teacher.json", "state.safetensors"):
         assert (tmp_path / "out" / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
     assert rows(tmp_path / "work") == rows(trained / "teacher" / "work")
 

@@ -135,7 +135,8 @@ class Cluster:
             copy=self.copy,
         )
         scratch = (ray.put({name: content for name, content in files_of(job.work).items() if name != TOKEN}),)
-        cores = 0 if stage.spreads else order.workers  # one that only waits for its pieces must not keep them waiting
+        # One that only waits for its pieces must not keep them waiting.
+        cores = 0 if stage.spreads(job.recipe) else order.workers
         task = self._execute.options(num_cpus=cores, name=stage.name).remote(order, scratch, self._desk)
         self._begun[order.task] = told = False
         try:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from iowbc.errors import Damaged, Interrupted
+from iowbc.pipeline.cluster.crew import NodeCrew, Origin
 from iowbc.pipeline.cluster.folders import Folder, placed
 from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.stage import Member
 
 Result = TypeVar("Result")
 TRIES = 5
@@ -74,6 +76,13 @@ class NodeSpread:
         finally:
             for task in waiting:
                 ray.cancel(task, force=True)
+
+    def crew(
+        self, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+    ) -> NodeCrew:
+        """Members of one core each on the nodes; see `Spread`."""
+        own = {name: self._folders[path] for name, path in folders.items()}
+        return NodeCrew(Origin(self._driver, make, own, self._copy), calls, self._interrupted, self._say)
 
 
 def _called(

@@ -1,7 +1,7 @@
 """The vector environment: a stable-baselines3 `VecEnv` over worker processes with many environments each."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,14 +42,14 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         specification: Specification,
         *,
         num_envs: int,
-        workers: int,
+        workers: int | Callable[[Setup], Workers],
         seed: int,
         episodes: Sequence[Episode] | None = None,
         divergences: Path | None = None,
         patience: float = PATIENCE,
     ) -> None:
-        """`workers`: processes; 0 steps the environments in this one. `episodes`: one an environment, played anew after
-        every reset. `divergences`: folder for simulations that diverged.
+        """`workers`: processes; 0 steps the environments in this one; or who else steps them. `episodes`: one an
+        environment, played anew after every reset. `divergences`: folder for simulations that diverged.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
         raises, and StageFailed where episodes are drawn and a term of the reward in a user's file cannot be used.
@@ -61,7 +61,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             load_terms(recipe.task.reward)  # what is wrong with them is told here, before processes start
         self.layout = full_layout(recipe, load_robot(specification.robot))
         self._scenes = self.setup.scenes
-        self.workers: Workers = WorkerProcesses(self.setup, workers, patience) if workers else InProcess(self.setup)
+        self.workers = _workers(self.setup, workers, patience)
         self._buffers = self.workers.buffers
         self.signals: dict[str, Array] = {
             name.removeprefix("signal/"): values
@@ -233,3 +233,9 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def _call(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
         self.workers.ask(request, arguments)
         return self.workers.answers()
+
+
+def _workers(setup: Setup, asked: int | Callable[[Setup], Workers], patience: float) -> Workers:
+    if callable(asked):
+        return asked(setup)
+    return WorkerProcesses(setup, asked, patience) if asked else InProcess(setup)

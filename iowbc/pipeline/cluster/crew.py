@@ -1,0 +1,217 @@
+"""Objects that a stage holds on other nodes, one a core: asked side by side, remade where their node is lost."""
+
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from iowbc.errors import Interrupted, IowbcError, StageFailed, WorkerFailed
+from iowbc.pipeline.cluster.folders import Folder, placed
+from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.stage import Member
+
+TRIES = 5
+"""Times in a row that a member is remade whose node or worker is lost, before the stage counts as failed."""
+POLL = 0.2
+"""Seconds between two looks at the members."""
+PATIENCE = 600.0
+"""Seconds that a member has for a request; it takes a few. Whoever needs longer counts as lost."""
+CORE_PATIENCE = 15.0
+"""Seconds after which a member that is remade shares a core, for its own may have gone for good; and after which it is
+said that members wait for cores."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How the members of a crew are made."""
+
+    driver: Identity
+    make: Callable[..., Member]
+    folders: Mapping[str, Folder]
+    copy: bool
+
+
+class Holder:
+    """What Ray holds on a node: one member, made from these arguments."""
+
+    def __init__(self, origin: Origin, arguments: tuple[Any, ...]) -> None:
+        self._origin, self._arguments = origin, arguments
+        self._member: Member | None = None
+
+    def host(self) -> str:
+        """The node's name: it is here."""
+        return identity().host
+
+    def ask(self, state: Any, request: str, arguments: tuple[Any, ...], changes: bool) -> tuple[bool, Any, Any]:
+        """Whether the request went well; the answer, or what was wrong; and the state after it, where it changes any.
+
+        `state`: from which a member that is not made yet goes on."""
+        try:
+            if self._member is None:
+                self._member = self._made()
+                if state is not None:
+                    self._member.restore(state)
+            answer = self._member.ask(request, arguments)
+            return True, answer, self._member.state() if changes else None
+        except IowbcError as error:
+            return False, str(error), None
+        except Exception:
+            return False, traceback.format_exc(), None
+
+    def _made(self) -> Member:
+        import ray
+
+        origin = self._origin
+        if different := origin.driver.mismatch(identity()):
+            raise StageFailed(f"a node is not as the driver: {different}; install the same on both")
+        here = {name: placed(folder, ray.get, copy=origin.copy) for name, folder in origin.folders.items()}
+        return origin.make(*self._arguments, **here)
+
+
+@dataclass
+class Place:
+    """Where a member is, as far as is known."""
+
+    arguments: tuple[Any, ...]
+    actor: Any = None
+    host: str = ""
+    """Empty as long as it waits for a core."""
+    since: float = 0.0
+    """When it was sent to its node, or asked."""
+    state: Any = None
+    """Of the last request that changed it."""
+    answer: Any = None
+    losses: int = 0
+    """In a row."""
+    shares: bool = False
+    """Whether it takes no core of its own."""
+    waiting: dict[Any, str] = field(default_factory=dict)
+    """Ray's references to what it has not answered yet."""
+
+
+class NodeCrew:
+    """Members on the nodes of the cluster. See `Crew`."""
+
+    def __init__(
+        self,
+        origin: Origin,
+        calls: Sequence[tuple[Any, ...]],
+        interrupted: Callable[[], bool],
+        say: Callable[[str], None],
+    ) -> None:
+        """calls: the arguments that make each member. say: is told of lost members, and of those that wait."""
+        self._origin, self._interrupted, self._say = origin, interrupted, say
+        self._told = False
+        self._request: tuple[str, Sequence[tuple[Any, ...]], bool] = ("", (), False)
+        self._places = [Place(arguments) for arguments in calls]
+        for place in self._places:
+            self._send(place)
+
+    @property
+    def states(self) -> list[Any]:
+        """See `Crew`."""
+        return [place.state for place in self._places]
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True) -> None:
+        """See `Crew`."""
+        self._request = request, arguments, changes
+        for index in range(len(self._places)):
+            self._begin(index)
+
+    def answers(self) -> list[Any]:
+        """See `Crew`."""
+        import ray
+
+        while waiting := {one: place for place in self._places for one in place.waiting}:
+            over, _ = ray.wait(list(waiting), timeout=POLL)
+            for reference in over:
+                place = waiting[reference]
+                if reference in place.waiting:  # it was not lost meanwhile
+                    self._hear(place, reference)
+            if not over:
+                self._look()
+        return [place.answer for place in self._places]
+
+    def close(self) -> None:
+        """See `Crew`."""
+        import ray
+
+        for place in self._places:
+            place.waiting.clear()
+            ray.kill(place.actor)
+
+    def _send(self, place: Place) -> None:
+        """Has a member made on some node."""
+        import ray
+
+        options = {"num_cpus": 0 if place.shares else 1, "scheduling_strategy": "SPREAD", "max_restarts": 0}
+        place.actor = ray.remote(Holder).options(**options).remote(self._origin, place.arguments)
+        place.host, place.since = "", time.monotonic()
+        place.waiting = {place.actor.host.remote(): "host"}
+
+    def _begin(self, index: int) -> None:
+        """Asks a member; one that is remade goes on from its last state."""
+        request, arguments, changes = self._request
+        place = self._places[index]
+        asked = place.actor.ask.remote(None if place.host else place.state, request, arguments[index], changes)
+        place.waiting[asked] = "answer"
+        place.since = time.monotonic()
+
+    def _hear(self, place: Place, reference: Any) -> None:
+        import ray
+
+        try:
+            found = ray.get(reference)
+        except ray.exceptions.RayTaskError:
+            raise
+        except ray.exceptions.RayError:
+            self._lost(place)
+            return
+        if place.waiting.pop(reference) == "host":
+            place.host, place.since = found, time.monotonic()
+            return
+        fine, place.answer, state = found
+        index = self._places.index(place)
+        if not fine:
+            raise WorkerFailed(f"member {index} of {len(self._places)}, on {place.host}:\n{place.answer.rstrip()}")
+        place.losses = 0
+        if self._request[2]:
+            place.state = state
+
+    def _look(self) -> None:
+        """What to do about members that do not answer."""
+        now = time.monotonic()
+        homeless = [place for place in self._places if not place.host]
+        if homeless and self._interrupted():
+            raise Interrupted("waited for cores")
+        late = [place for place in homeless if now - place.since > CORE_PATIENCE]
+        for place in late:
+            if place.losses and not place.shares:
+                place.shares = True
+                self._again(place)
+        if late and not self._told:
+            self._told = True
+            self._say(f"{len(homeless)} of {len(self._places)} rollout actors wait for cores")
+        for place in self._places:
+            if place.host and place.waiting and now - place.since > PATIENCE:
+                self._lost(place)
+
+    def _lost(self, place: Place) -> None:
+        """Remakes a member whose node or worker is lost, or that hangs."""
+        place.losses += 1
+        if place.losses > TRIES:
+            raise StageFailed(f"lost a rollout actor {place.losses} times in a row; is there too little memory for it?")
+        self._say(f"a rollout actor was lost{f' on {place.host}' if place.host else ''}; another one takes its place")
+        place.shares = False
+        self._again(place)
+
+    def _again(self, place: Place) -> None:
+        """Sends a member anew, and asks it what it was asked."""
+        import ray
+
+        ray.kill(place.actor)
+        asked = "answer" in place.waiting.values()
+        self._send(place)
+        if asked:
+            self._begin(self._places.index(place))

@@ -1,0 +1,106 @@
+"""The environments of a training: in worker processes here, or in groups on other machines, with the same rollouts."""
+
+import secrets
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from iowbc.pipeline.stage import Job, Spread
+from iowbc.rollouts.blocks import shares_in_blocks
+from iowbc.task.specification import Specification
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.shared import private_buffers
+from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.vector.workers import Workers
+
+WRITTEN = ("action", "counters", "terms")
+"""Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
+LOOKS = ("levels", "drawn", "snapshot")
+"""Requests that change nothing."""
+
+
+def training_environments(job: Job, *, count: int, seed: int, divergences: Path | None = None) -> VectorEnv:
+    """The environments of a job's recipe, stepped where it says. `divergences`: see `VectorEnv`."""
+    world = Specification(job.recipe, job.robot, job.inputs.get("rg-fit"))
+    actors = job.recipe.execution.rollout_actors
+    workers: Any = job.workers
+    if actors is not None and job.spread is not None:
+        workers = partial(Elsewhere, job.spread, min(actors, job.spread.width))
+    return VectorEnv(world, num_envs=count, workers=workers, seed=seed, divergences=divergences)
+
+
+class Elsewhere(Workers):
+    """Environments in groups on other machines; what is here is a copy of their buffers after the last request."""
+
+    def __init__(self, spread: Spread, count: int, setup: Setup) -> None:
+        """`count`: groups that are asked for."""
+        world = setup.specification
+        folders = {"robot": world.robot} | ({} if world.rg is None else {"generator": world.rg})
+        self.groups = shares_in_blocks(setup.count, count)
+        self.buffers = private_buffers(setup.buffer_fields(), setup.count)
+        self._divergences = setup.divergences
+        self._crew = spread.crew(Group, [(setup, *group) for group in self.groups], folders)
+        self._looks = False
+
+    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+        """See `Workers`."""
+        self._looks = request in LOOKS
+        every = arguments or [()] * len(self.groups)
+        own = [
+            ({name: self.buffers[name][first:last] for name in WRITTEN}, *given)
+            for (first, last), given in zip(self.groups, every, strict=True)
+        ]
+        self._crew.ask(request, own, changes=not self._looks)
+
+    def answers(self) -> list[Any]:
+        """See `Workers`."""
+        found = self._crew.answers()
+        if not self._looks:
+            for group, state in zip(self.groups, self._crew.states, strict=True):
+                for name, values in self.buffers.rows(*group).arrays.items():
+                    values[:] = state[f"buffer/{name}"]
+        for _, files in found:
+            for name, content in files.items():
+                assert self._divergences is not None
+                self._divergences.mkdir(parents=True, exist_ok=True)
+                (self._divergences / name).write_bytes(content)
+        return [answer for answer, _ in found]
+
+    def close(self) -> None:
+        """See `Workers`."""
+        self._crew.close()
+
+
+class Group:
+    """A group of environments where it is stepped: a `Member`."""
+
+    def __init__(self, setup: Setup, first: int, last: int, *, robot: Path, generator: Path | None = None) -> None:
+        world = Specification(setup.specification.recipe, robot, generator)
+        self._kept = Path(tempfile.gettempdir(), f"iowbc-divergences-{secrets.token_hex(8)}")
+        folder = None if setup.divergences is None else self._kept
+        buffers = private_buffers(setup.buffer_fields(), last - first)
+        self._batch = replace(setup, specification=world, divergences=folder).batch(first, last, buffers)
+
+    def ask(self, request: str, arguments: tuple[Any, ...]) -> tuple[Any, dict[str, bytes]]:
+        """What a method of the batch returns, and the files of simulations that have diverged meanwhile. `arguments`:
+        rows of the buffers in `WRITTEN`, and the method's own."""
+        written, *own = arguments
+        for name, values in written.items():
+            self._batch.buffers[name][:] = values
+        answer = getattr(self._batch, request)(*own)
+        files = {path.name: path.read_bytes() for path in sorted(self._kept.glob("*"))}
+        if files:
+            shutil.rmtree(self._kept)
+        return answer, files
+
+    def state(self) -> dict[str, Any]:
+        """See `Member`."""
+        return self._batch.snapshot()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """See `Member`."""
+        self._batch.restore(state)
