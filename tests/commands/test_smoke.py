@@ -1,27 +1,80 @@
-"""The smoke recipe runs from its name to its end: all six stages, at the smallest size."""
+"""The smoke recipe runs from its name to its end: all six stages, at the smallest size; here, and on Ray."""
 
+import json
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from network_watch import watched
+from ray_processes import HEALTH, below, kill, kill_a_node, name, rays
 
 from iowbc import open_artifact
 from iowbc.recipe.recipe import PIPELINE
 
+UNTRACKED = ("--set", "execution.track=false")
+POINTS = 3
+PATIENCE = 600.0
+"""Seconds that a sweep may take to its first training, and from there to its end."""
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the recipe was run."""
+    folder = tmp_path_factory.mktemp("smoke")
+    words = [sys.executable, "-m", "iowbc", "run", "smoke", *UNTRACKED]
+    with watched(folder / "watch") as watch:
+        made = subprocess.run(words, cwd=folder, env=watch.environment, capture_output=True, text=True, check=False)
+        assert made.returncode == 0, made.stdout[-3000:] + made.stderr[-3000:]
+        assert watch.contacts() == [], "no process of a run tells anybody"
+    return folder
+
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_the_smoke_recipe_runs_in_an_empty_folder_and_is_cached_afterwards(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "iowbc", "run", "smoke", "--set", "execution.track=false"]
-    with watched(tmp_path / "watch") as watch:
-        made = subprocess.run(words, cwd=tmp_path, env=watch.environment, capture_output=True, text=True, check=False)
-        assert made.returncode == 0, made.stdout[-3000:] + made.stderr[-3000:]
-        assert watch.contacts() == [], "no process of a run tells anybody"
+def test_the_smoke_recipe_runs_in_an_empty_folder_and_is_cached_afterwards(smoke: Path) -> None:
     for stage in PIPELINE:
-        assert open_artifact(f"smoke/{stage}", tmp_path / "runs").metrics
-    exported = open_artifact("smoke/export", tmp_path / "runs").folder
+        assert open_artifact(f"smoke/{stage}", smoke / "runs").metrics
+    exported = open_artifact("smoke/export", smoke / "runs").folder
     assert {"policy.onnx", "contract.json", "golden.npz"} <= {path.name for path in exported.iterdir()}
-    again = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    words = [sys.executable, "-m", "iowbc", "run", "smoke", *UNTRACKED]
+    again = subprocess.run(words, cwd=smoke, capture_output=True, text=True, check=True)
     assert again.stdout.count(": cached") == len(PIPELINE)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_sweep_of_it_on_ray_outlives_a_node_with_the_same_results(smoke: Path, tmp_path: Path) -> None:
+    pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
+    words = [sys.executable, "-m", "iowbc", "sweep", "smoke", "--set", f"seed=0..{POINTS - 1}", *UNTRACKED]
+    words += ["--set", "execution.copy_files=true", "--set", "execution.rollout_actors=2"]
+    words += ["--engine", "ray", "--address", "local:3", "--jobs", str(POINTS)]
+    said = tmp_path / "said.txt"
+    with said.open("wb") as output:
+        sweep = subprocess.Popen(words, cwd=tmp_path, env=os.environ | HEALTH, stdout=output, stderr=output)
+    try:
+        limit = time.monotonic() + PATIENCE
+        while not any(name(process).startswith("ray::Holder") for process in rays(sweep.pid)):
+            assert sweep.poll() is None, said.read_text()
+            assert time.monotonic() < limit, "no training has begun"
+            time.sleep(0.1)
+        kill_a_node(sweep.pid)
+        assert sweep.wait(PATIENCE) == 0, said.read_text()
+    finally:
+        kill(below(sweep.pid))
+        sweep.kill()
+    alone, swept = results(smoke), results(tmp_path)
+    assert len(swept) == POINTS * len(PIPELINE)
+    assert [stage for stage, key in alone.keys() - swept.keys()] == ["export"], "its key holds the point's name"
+    for key in alone.keys() & swept.keys():
+        assert swept[key] == alone[key], key
+
+
+def results(folder: Path) -> dict[tuple[str, str], str]:
+    """Digests of the stored artifacts, by stage and key."""
+    return {
+        (path.parts[-3], path.parts[-2]): json.loads(path.read_text())["digest"]
+        for path in folder.glob("runs/store/*/*/manifest.json")
+    }

@@ -1,15 +1,15 @@
 """A sweep on Ray gives what a local one gives, loses nothing to Ctrl-C or a dead node, and leaves no process behind."""
 
-import contextlib
 import json
 import re
 import signal
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
+from ray_processes import HEALTH, below, kill, kill_a_node, listens_on, name, rays
 from workplace import Command, Workplace, until
 
 pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
@@ -19,9 +19,6 @@ PATIENCE = 240.0
 WORDS = ("sweep", "small.yaml", "--set", "seed=0..2", "--set", "execution.copy_files=true", "--until", "teacher")
 RAY = ("--jobs", "3", "--workers", "64", "--engine", "ray", "--address")
 """Each point takes a whole node for its teacher."""
-RAYS = ("raylet", "gcs_server", "ray::")
-HEALTH = {"RAY_health_check_failure_threshold": "3", "RAY_health_check_period_ms": "1000"}
-"""Ray looks three times in three seconds before it believes in a node's death, not five times in fifteen."""
 
 
 class Sweep:
@@ -55,37 +52,7 @@ class Sweep:
 
     def processes(self) -> list[psutil.Process]:
         """Those of Ray that the sweep has started."""
-        return [process for process in below(self.commands[-1]) if name(process).startswith(RAYS)]
-
-
-def below(command: Command) -> list[psutil.Process]:
-    """The processes that a command has started, and theirs."""
-    try:
-        return list(psutil.Process(command.process.pid).children(recursive=True))
-    except psutil.NoSuchProcess:
-        return []
-
-
-def name(process: psutil.Process) -> str:
-    """Empty once it has ended."""
-    try:
-        return "" if process.status() == psutil.STATUS_ZOMBIE else str(process.name())
-    except psutil.NoSuchProcess:
-        return ""
-
-
-def listens_on(process: psutil.Process) -> set[str]:
-    """Addresses of this machine; none once it has ended."""
-    try:
-        return {entry.laddr.ip for entry in process.net_connections("tcp") if entry.status == psutil.CONN_LISTEN}
-    except psutil.NoSuchProcess:
-        return set()
-
-
-def kill(processes: Iterable[psutil.Process]) -> None:
-    for process in processes:
-        with contextlib.suppress(psutil.NoSuchProcess):
-            process.kill()
+        return rays(self.commands[-1].process.pid)
 
 
 @pytest.fixture
@@ -94,7 +61,7 @@ def sweep(workplace: Workplace) -> Iterator[Sweep]:
     made = Sweep(workplace)
     yield made
     for command in made.commands:
-        kill(below(command))
+        kill(below(command.process.pid))
         command.process.kill()
         command.process.wait()
 
@@ -120,9 +87,7 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
 def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: Sweep, tmp_path: Path) -> None:
     command = sweep.start("local:2")
     sweep.wait("teacher: runs on", 2)
-    nodes = [process for process in sweep.processes() if name(process) == "raylet"]
-    second = next(node for node in nodes if "--head" not in node.cmdline())
-    kill([second, *second.children(recursive=True)])
+    kill_a_node(command.process.pid)
     sweep.wait("was lost", 1)
     sweep.gate.touch()
     assert command.finish() == 0, command.errors

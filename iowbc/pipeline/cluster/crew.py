@@ -17,9 +17,9 @@ POLL = 0.2
 """Seconds between two looks at the members."""
 PATIENCE = 600.0
 """Seconds that a member has for a request; it takes a few. Whoever needs longer counts as lost."""
-CORE_PATIENCE = 15.0
-"""Seconds after which a member that is remade shares a core, for its own may have gone for good; and after which it is
-said that members wait for cores."""
+CORE_PATIENCE = 30.0
+"""Seconds after which a member that waits for a core shares one: those that are there may be held by crews that wait
+for this one's, or may have gone for good."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +100,8 @@ class NodeCrew:
         interrupted: Callable[[], bool],
         say: Callable[[str], None],
     ) -> None:
-        """calls: the arguments that make each member. say: is told of lost members, and of those that wait."""
+        """calls: the arguments that make each member. say: is told of members that are lost, or share a core."""
         self._origin, self._interrupted, self._say = origin, interrupted, say
-        self._told = False
         self._request: tuple[str, Sequence[tuple[Any, ...]], bool] = ("", (), False)
         self._places = [Place(arguments) for arguments in calls]
         for place in self._places:
@@ -185,14 +184,12 @@ class NodeCrew:
         homeless = [place for place in self._places if not place.host]
         if homeless and self._interrupted():
             raise Interrupted("waited for cores")
-        late = [place for place in homeless if now - place.since > CORE_PATIENCE]
+        late = [place for place in homeless if not place.shares and now - place.since > CORE_PATIENCE]
+        if late:
+            self._say(f"{len(late)} of {len(self._places)} rollout actors find no core of their own, and share one")
         for place in late:
-            if place.losses and not place.shares:
-                place.shares = True
-                self._again(place)
-        if late and not self._told:
-            self._told = True
-            self._say(f"{len(homeless)} of {len(self._places)} rollout actors wait for cores")
+            place.shares = True
+            self._again(place)
         for place in self._places:
             if place.host and place.waiting and now - place.since > PATIENCE:
                 self._lost(place)
