@@ -55,7 +55,7 @@ chaos: setup
 	$(BIN)/python tests/chaos/chaos.py --recipe tests/chaos/workers.yaml --events 40
 
 chaos-nodes: setup
-	$(BIN)/python tests/chaos/nodes.py --kills 10
+	$(BIN)/python tests/chaos/nodes.py --kills 10 --actors 3
 	$(BIN)/python tests/chaos/nodes.py --vary seed=0..1 --until teacher --kills 10
 
 leaks: setup
