@@ -61,6 +61,24 @@ def test_unbalanced_moments_turn_the_object_until_the_palms_bear_them(carried, b
     assert abs(4.0 * grip.angle[0]) + hanging == pytest.approx(moment, rel=0.25)
 
 
+def test_palms_damp_what_turns_against_them_and_not_what_turns_with_them(start, by_hands, hold_base):
+    hold_base()
+    simulation = start(by_hands, ["lift"], object_mass=4.0)
+    world = simulation.world_of(0)[0]
+    grip, layout = world._grip, world.layout
+    hands = grip._sites[0, layout.grips]
+    axis = (hands[0] - hands[1]) / np.linalg.norm(hands[0] - hands[1])
+    grip._spatial = grip._spatial.copy()  # MuJoCo's own array takes no other numbers
+    grip.angle[:], grip.rate[:] = 0.0, 0.0
+    holding = np.array([4.0]), np.array([140.0]), np.ones((1, 2))
+    grip._spatial[0, layout.hands, :3] = grip._spatial[0, layout.object, :3] = 0.2 * axis
+    assert grip.twist(*holding)[0] == pytest.approx(np.zeros(3), abs=1e-9), "the robot turns with what it holds"
+    grip._spatial[0, layout.hands, :3] = 0.0
+    against = grip.twist(*holding)[0] @ axis
+    assert against < 0.0
+    assert abs(against) < 2.0 * 0.02 * 140.0, "below the torque at which the palms slip"
+
+
 def test_palms_slip_at_their_torque_and_not_below(start, by_hands, hold_base, monkeypatch):
     hold_base()
     simulation = start(by_hands, ["lift"], object_mass=4.0, surface_friction=1.0)

@@ -28,6 +28,18 @@ def test_feet_that_cross_meet(start, calm, body_contact):
     assert frozenset(("left_ankle_roll_link", "right_ankle_roll_link")) in touching(model, data)
 
 
+def test_thighs_and_shins_that_cross_meet_each_other_and_the_other_foot(start, calm):
+    model, data = crossed(start(calm, ["free"]), 0.25)
+    for pair in (
+        ("left_knee_link", "right_knee_link"),
+        ("left_hip_yaw_link", "right_hip_yaw_link"),
+        ("left_hip_yaw_link", "right_knee_link"),
+        ("left_ankle_roll_link", "right_knee_link"),
+        ("left_knee_link", "right_ankle_roll_link"),
+    ):
+        assert frozenset(pair) in touching(model, data), pair
+
+
 def test_feet_are_pushed_apart_and_do_not_pass(start, calm):
     simulation = start(calm, ["free"])
     model, data = crossed(simulation, 0.09)

@@ -16,12 +16,16 @@ def test_draws_cover_the_ranges_of_table_one_and_light_loads(start):
         ("ground_friction", 0.5, 1.2),
         ("object_ground_friction", 0.02, 0.15),
         ("surface_friction", 1.0, 1.5),
+        ("start_yaw", -np.pi, np.pi),
     ):
         drawn = simulation.drawn[name]
         assert drawn.min() >= low
         assert drawn.max() <= high
         assert np.ptp(drawn) > 0.8 * (high - low)
     assert np.allclose(simulation.drawn["object_mass"], 65.0 * simulation.drawn["object_mass_scale"])
+    ahead = (simulation.state.object_position - simulation.state.base_position)[:, :2]
+    way = np.stack([np.cos(simulation.drawn["start_yaw"]), np.sin(simulation.drawn["start_yaw"])], axis=1)
+    assert np.vecdot(ahead, way) == pytest.approx(np.linalg.norm(ahead, axis=1), rel=0.02), "the crate stands ahead"
 
 
 def test_every_episode_draws_anew(start, carrying):

@@ -34,15 +34,28 @@ def test_a_rollout_over_mixed_scenes_does_not_depend_on_the_number_of_workers(ma
         assert same(courses[0], course)
 
 
-def test_what_the_teacher_sees_of_an_absent_object_is_zero(make: Make) -> None:
-    changes = {"task.scenes.free": 1.0, "task.scenes.lift": 0.0, "simulation.impulses.interval.low": 0.2}
-    env = make(num_envs=6, changes=changes)
+OF_WHEELS = ("object_ground_friction", "rolling_resistance")
+OF_OBJECTS = (
+    *OF_WHEELS,
+    *(
+        "object_mass",
+        "object_com_offset",
+        "inertia_scale",
+        "surface_friction",
+        "link_object_force",
+        "hand_weight_share",
+    ),
+    *("partner_share", "external_force", "external_torque"),
+)
+
+
+@pytest.mark.parametrize(("scene", "absent"), [("free", OF_OBJECTS), ("lift", OF_WHEELS)])
+def test_what_the_teacher_sees_of_an_absent_object_is_zero(make: Make, scene: str, absent: tuple[str, ...]) -> None:
+    changes = {"task.scenes.free": 0.0, "task.scenes.lift": 0.0, "simulation.impulses.interval.low": 0.2}
+    env = make(num_envs=6, changes=changes | {f"task.scenes.{scene}": 1.0})
     rows = [env.reset()] + [env.step(actions(step, 6))[0] for step in range(60)]
     seen = np.stack(rows)[..., env.layout.privileged]
-    for name in (
-        *("object_mass", "object_com_offset", "inertia_scale", "object_ground_friction", "surface_friction"),
-        *("partner_share", "external_force", "external_torque"),
-    ):
+    for name in absent:
         assert not seen[..., env.layout.extra.slices[name]].any(), name
 
 
