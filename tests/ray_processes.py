@@ -46,8 +46,17 @@ def kill(processes: Iterable[psutil.Process]) -> None:
             process.kill()
 
 
-def kill_a_node(parent: int) -> None:
-    """Kills a node that is not the head, with all its processes."""
-    nodes = [process for process in rays(parent) if name(process) == "raylet"]
-    other = next(node for node in nodes if "--head" not in node.cmdline())
-    kill([other, *other.children(recursive=True)])
+def nodes(parent: int) -> list[psutil.Process]:
+    """The nodes that are not the head."""
+    found = [process for process in rays(parent) if name(process) == "raylet"]
+    return [node for node in found if "--head" not in node.cmdline()]
+
+
+def holds_an_actor(node: psutil.Process) -> bool:
+    """Whether a training's rollouts are made there."""
+    return any(name(process).startswith("ray::Holder") for process in below(node.pid))
+
+
+def kill_a_node(node: psutil.Process) -> None:
+    """Kills a node with all its processes."""
+    kill([node, *below(node.pid)])

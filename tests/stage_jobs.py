@@ -65,7 +65,10 @@ class Remade:
         self.states: list[Any] = [None for _ in made]
         self.found: list[Any] = []
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True) -> None:
+    def ask(
+        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
+    ) -> None:
+        assert patience > 0.0
         self.found = []
         for index, (make, own) in enumerate(zip(self.made, arguments, strict=True)):
             member = make()

@@ -154,7 +154,8 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
 def _shared_out(points: Sequence[ReadyPoint], asked: SweepRequest, cluster: "Cluster | None") -> int:
     """Points that run at the same time; each is given its part of the cores, unless it says how many it wants."""
     cores = available_cores() if cluster is None else cluster.cores
-    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores, len(points))))
+    actors = max(one.planner.loaded.recipe.execution.rollout_actors or 1 for one in points)
+    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores // actors, len(points))))
     most = cores if cluster is None else cluster.largest
     for one in points:
         wanted = asked.recipe.options.workers or one.planner.loaded.recipe.execution.workers

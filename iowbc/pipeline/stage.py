@@ -51,14 +51,17 @@ class Crew(Protocol):
     def states(self) -> list[Any]:
         """The state of each member after the last request that changed it."""
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True) -> None:
-        """Begin a request of every member, each with its own arguments. `changes`: whether it changes states."""
+    def ask(
+        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
+    ) -> None:
+        """Begin a request of every member, each with its own arguments. `changes`: whether it changes states;
+        `patience`: seconds after which a member that has not answered counts as lost."""
 
     def answers(self) -> list[Any]:
         """What the members answered, in order.
 
-        Raises WorkerFailed with what a member raised, and `Interrupted` where they wait for cores when the job is asked
-        to stop.
+        Raises WorkerFailed with what a member raised, StageFailed where one is lost again and again, and `Interrupted`
+        where members have not begun yet when the job is asked to stop.
         """
 
     def close(self) -> None:

@@ -23,7 +23,7 @@ from iowbc.sim.sensing import Sensing
 from iowbc.sim.snapshots import by_environment, by_world
 from iowbc.sim.state import MeasuredState, SimulationState
 from iowbc.sim.timing import Timing
-from iowbc.sim.world import World
+from iowbc.sim.world import EVERY, World
 
 TINY = 1e-9
 """Keeps a division by the friction of an absent object from dividing by zero."""
@@ -167,13 +167,14 @@ class Simulation:
             speed[world.place] = world.foot_slide()
         return speed
 
-    def hold(self, fixed: Mapping[str, Array]) -> None:
-        """Holds quantities at values (n,) from the next reset on; NaN draws. Keeps what is held and not named here."""
+    def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
+        """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Keeps what is held
+        and not named here."""
         unknown = [name for name in fixed if name not in self._draws.names]
         if unknown:
             raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self._draws.names))}")
         for name, values in fixed.items():
-            self.fixed.setdefault(name, np.empty(self.n))[:] = values
+            self.fixed.setdefault(name, np.full(self.n, np.nan))[which] = values
 
     def reseed(self, key: NDArray[np.uint64]) -> None:
         """All that is random starts anew, from the next reset on; `key` (n,) as from `random.environment_key`."""

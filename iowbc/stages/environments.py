@@ -3,7 +3,7 @@
 import secrets
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,20 +14,20 @@ from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
-from iowbc.task.vector.vector_env import VectorEnv
-from iowbc.task.vector.workers import Workers
+from iowbc.task.vector.vector_env import PATIENCE, VectorEnv
+from iowbc.task.vector.workers import STARTING, Workers
 
 WRITTEN = ("action", "counters", "terms")
 """Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
 LOOKS = ("levels", "drawn", "snapshot")
-"""Requests that change nothing."""
+"""Requests after which nothing depends on the environments but what depended on them before."""
 
 
 def training_environments(job: Job, *, count: int, seed: int, divergences: Path | None = None) -> VectorEnv:
     """The environments of a job's recipe, stepped where it says. `divergences`: see `VectorEnv`."""
     world = Specification(job.recipe, job.robot, job.inputs.get("rg-fit"))
     actors = job.recipe.execution.rollout_actors
-    workers: Any = job.workers
+    workers: int | Callable[[Setup], Workers] = job.workers
     if actors is not None and job.spread is not None:
         workers = partial(Elsewhere, job.spread, min(actors, job.spread.width))
     return VectorEnv(world, num_envs=count, workers=workers, seed=seed, divergences=divergences)
@@ -54,7 +54,8 @@ class Elsewhere(Workers):
             ({name: self.buffers[name][first:last] for name in WRITTEN}, *given)
             for (first, last), given in zip(self.groups, every, strict=True)
         ]
-        self._crew.ask(request, own, changes=not self._looks)
+        steps = every[0][1] if request == "roll" else 0
+        self._crew.ask(request, own, changes=not self._looks, patience=STARTING + steps * PATIENCE)
 
     def answers(self) -> list[Any]:
         """See `Workers`."""
@@ -82,8 +83,8 @@ class Group:
         world = Specification(setup.specification.recipe, robot, generator)
         self._kept = Path(tempfile.gettempdir(), f"iowbc-divergences-{secrets.token_hex(8)}")
         folder = None if setup.divergences is None else self._kept
-        buffers = private_buffers(setup.buffer_fields(), last - first)
-        self._batch = replace(setup, specification=world, divergences=folder).batch(first, last, buffers)
+        here = replace(setup, specification=world, divergences=folder)
+        self._batch = here.batch(first, last, private_buffers(here.buffer_fields(), last - first))
 
     def ask(self, request: str, arguments: tuple[Any, ...]) -> tuple[Any, dict[str, bytes]]:
         """What a method of the batch returns, and the files of simulations that have diverged meanwhile. `arguments`:

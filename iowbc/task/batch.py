@@ -178,7 +178,7 @@ class Batch:
         key = self._schedule.start(which)
         joints, pitch = self.guidance.start(which, memory, key)
         memory.clear(which)
-        self.simulation.hold(self._schedule.scales(which, key))
+        self.simulation.hold(self._schedule.scales(which, key), which)
         self.simulation.reset(which, joints, base_pitch=pitch)
         memory.infeasible[which] = self.simulation.infeasible[which]
         count_pushes(self.buffers, self._pushing, memory, which)

@@ -44,7 +44,6 @@ class Schedule:
         self.episode_key = self.key.copy()
         """Key of all that is random in each environment's episode, (n,)."""
         memory.level[:] = initial_levels(task.curriculum, n) if trials is None else task.curriculum.fixed_level
-        self._scales = {name: np.ones(n) for name in ("load_scale", "resistance_scale", "impulse_scale", "push_scale")}
 
     @property
     def fixed(self) -> dict[str, Array]:
@@ -86,15 +85,17 @@ class Schedule:
         return key
 
     def scales(self, which: Indices, key: Keys) -> dict[str, Array]:
-        """How hard the simulation is to make new episodes, by name, (n,); trials say it themselves."""
+        """How hard the simulation is to make new episodes, by name, (k,); trials say it themselves."""
         if self._trials is not None:
             return {}
         hardness = difficulty(self._task.curriculum, self._memory.played[which])
-        self._scales["load_scale"][which] = hardness.load
         blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness.blocked
-        self._scales["resistance_scale"][which] = np.where(blocked, BLOCKING, hardness.resistance)
-        self._scales["impulse_scale"][which] = self._scales["push_scale"][which] = hardness.disturbance
-        return self._scales
+        return {
+            "load_scale": hardness.load,
+            "resistance_scale": np.where(blocked, BLOCKING, hardness.resistance),
+            "impulse_scale": hardness.disturbance,
+            "push_scale": hardness.disturbance,
+        }
 
     def _time_limits(self, which: Indices, key: Keys) -> NDArray[np.int64]:
         """Time limits of new episodes, (k,) [control steps]."""

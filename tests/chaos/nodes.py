@@ -44,8 +44,8 @@ ALIKE = {
 """What all nodes have, as those of `--address local`."""
 IDLE = ("IDLE", "Agent")
 """Ends of the names of Ray's processes that do nothing for a run."""
-WORKERS = ("multiprocessing.spawn", "task.vector.worker")
-"""What the command lines of stages' worker processes have in them."""
+WORKERS = ("multiprocessing.spawn", "task.vector.worker", "ray::Holder")
+"""What the command lines of stages' worker processes and rollout actors have in them."""
 LEAVING = 20.0
 """Seconds within which they are gone after a run."""
 POLL = 0.2

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from network_watch import watched
-from ray_processes import HEALTH, below, kill, kill_a_node, name, rays
+from ray_processes import HEALTH, below, holds_an_actor, kill, kill_a_node, nodes
 
 from iowbc import open_artifact
 from iowbc.recipe.recipe import PIPELINE
@@ -56,15 +56,17 @@ def test_a_sweep_of_it_on_ray_outlives_a_node_with_the_same_results(smoke: Path,
         sweep = subprocess.Popen(words, cwd=tmp_path, env=os.environ | HEALTH, stdout=output, stderr=output)
     try:
         limit = time.monotonic() + PATIENCE
-        while not any(name(process).startswith("ray::Holder") for process in rays(sweep.pid)):
+        while not (found := [node for node in nodes(sweep.pid) if holds_an_actor(node)]):
             assert sweep.poll() is None, said.read_text()
             assert time.monotonic() < limit, "no training has begun"
             time.sleep(0.1)
-        kill_a_node(sweep.pid)
+        kill_a_node(found[0])
         assert sweep.wait(PATIENCE) == 0, said.read_text()
     finally:
         kill(below(sweep.pid))
         sweep.kill()
+    logs = [log.read_text() for log in tmp_path.glob("runs/sweeps/*/logs/*.log")]
+    assert any("was lost" in log for log in logs), "the node had work"
     alone, swept = results(smoke), results(tmp_path)
     assert len(swept) == POINTS * len(PIPELINE)
     assert [stage for stage, key in alone.keys() - swept.keys()] == ["export"], "its key holds the point's name"

@@ -9,7 +9,7 @@ from typing import Any
 
 import psutil
 import pytest
-from ray_processes import HEALTH, below, kill, kill_a_node, listens_on, name, rays
+from ray_processes import HEALTH, below, kill, kill_a_node, listens_on, name, nodes, rays
 from workplace import Command, Workplace, until
 
 pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
@@ -87,7 +87,7 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
 def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: Sweep, tmp_path: Path) -> None:
     command = sweep.start("local:2")
     sweep.wait("teacher: runs on", 2)
-    kill_a_node(command.process.pid)
+    kill_a_node(nodes(command.process.pid)[0])
     sweep.wait("was lost", 1)
     sweep.gate.touch()
     assert command.finish() == 0, command.errors

@@ -15,8 +15,6 @@ TRIES = 5
 """Times in a row that a member is remade whose node or worker is lost, before the stage counts as failed."""
 POLL = 0.2
 """Seconds between two looks at the members."""
-PATIENCE = 600.0
-"""Seconds that a member has for a request; it takes a few. Whoever needs longer counts as lost."""
 CORE_PATIENCE = 30.0
 """Seconds after which a member that waits for a core shares one: those that are there may be held by crews that wait
 for this one's, or may have gone for good."""
@@ -40,13 +38,16 @@ class Holder:
         self._member: Member | None = None
 
     def host(self) -> str:
-        """The node's name: it is here."""
+        """Name of the node, once it runs there."""
         return identity().host
 
     def ask(self, state: Any, request: str, arguments: tuple[Any, ...], changes: bool) -> tuple[bool, Any, Any]:
         """Whether the request went well; the answer, or what was wrong; and the state after it, where it changes any.
 
-        `state`: from which a member that is not made yet goes on."""
+        `state`: from which a member that is not made yet goes on. Raises what Ray raises where inputs are lost.
+        """
+        import ray
+
         try:
             if self._member is None:
                 self._member = self._made()
@@ -54,6 +55,8 @@ class Holder:
                     self._member.restore(state)
             answer = self._member.ask(request, arguments)
             return True, answer, self._member.state() if changes else None
+        except ray.exceptions.RayError:
+            raise
         except IowbcError as error:
             return False, str(error), None
         except Exception:
@@ -69,7 +72,7 @@ class Holder:
         return origin.make(*self._arguments, **here)
 
 
-@dataclass
+@dataclass(eq=False)
 class Place:
     """Where a member is, as far as is known."""
 
@@ -101,8 +104,12 @@ class NodeCrew:
         say: Callable[[str], None],
     ) -> None:
         """calls: the arguments that make each member. say: is told of members that are lost, or share a core."""
+        import ray
+
         self._origin, self._interrupted, self._say = origin, interrupted, say
         self._request: tuple[str, Sequence[tuple[Any, ...]], bool] = ("", (), False)
+        self._patience = 0.0
+        self._holder = ray.remote(Holder)
         self._places = [Place(arguments) for arguments in calls]
         for place in self._places:
             self._send(place)
@@ -112,9 +119,11 @@ class NodeCrew:
         """See `Crew`."""
         return [place.state for place in self._places]
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True) -> None:
+    def ask(
+        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
+    ) -> None:
         """See `Crew`."""
-        self._request = request, arguments, changes
+        self._request, self._patience = (request, arguments, changes), patience
         for index in range(len(self._places)):
             self._begin(index)
 
@@ -123,12 +132,12 @@ class NodeCrew:
         import ray
 
         while waiting := {one: place for place in self._places for one in place.waiting}:
-            over, _ = ray.wait(list(waiting), timeout=POLL)
+            over, late = ray.wait(list(waiting), num_returns=len(waiting), timeout=POLL)
             for reference in over:
                 place = waiting[reference]
                 if reference in place.waiting:  # it was not lost meanwhile
                     self._hear(place, reference)
-            if not over:
+            if late:
                 self._look()
         return [place.answer for place in self._places]
 
@@ -137,15 +146,13 @@ class NodeCrew:
         import ray
 
         for place in self._places:
-            place.waiting.clear()
             ray.kill(place.actor)
+        self._places = []
 
     def _send(self, place: Place) -> None:
         """Has a member made on some node."""
-        import ray
-
         options = {"num_cpus": 0 if place.shares else 1, "scheduling_strategy": "SPREAD", "max_restarts": 0}
-        place.actor = ray.remote(Holder).options(**options).remote(self._origin, place.arguments)
+        place.actor = self._holder.options(**options).remote(self._origin, place.arguments)
         place.host, place.since = "", time.monotonic()
         place.waiting = {place.actor.host.remote(): "host"}
 
@@ -162,10 +169,13 @@ class NodeCrew:
 
         try:
             found = ray.get(reference)
-        except ray.exceptions.RayTaskError:
-            raise
-        except ray.exceptions.RayError:
-            self._lost(place)
+        except ray.exceptions.RayError as error:
+            cause = getattr(
+                error, "cause", None
+            )  # of an error in the member: inputs that were lost, or no node's fault
+            if isinstance(error, ray.exceptions.RayTaskError) and not isinstance(cause, ray.exceptions.RayError):
+                raise
+            self._lost(place, str(error).strip().splitlines()[0])
             return
         if place.waiting.pop(reference) == "host":
             place.host, place.since = found, time.monotonic()
@@ -182,8 +192,8 @@ class NodeCrew:
         """What to do about members that do not answer."""
         now = time.monotonic()
         homeless = [place for place in self._places if not place.host]
-        if homeless and self._interrupted():
-            raise Interrupted("waited for cores")
+        if any(place.state is None for place in homeless) and self._interrupted():
+            raise Interrupted("members had not begun yet")
         late = [place for place in homeless if not place.shares and now - place.since > CORE_PATIENCE]
         if late:
             self._say(f"{len(late)} of {len(self._places)} rollout actors find no core of their own, and share one")
@@ -191,14 +201,15 @@ class NodeCrew:
             place.shares = True
             self._again(place)
         for place in self._places:
-            if place.host and place.waiting and now - place.since > PATIENCE:
-                self._lost(place)
+            settled = bool(place.host) or place.shares
+            if settled and place.waiting and now - place.since > self._patience:
+                self._lost(place, f"no answer for {self._patience:.0f} s")
 
-    def _lost(self, place: Place) -> None:
+    def _lost(self, place: Place, why: str) -> None:
         """Remakes a member whose node or worker is lost, or that hangs."""
         place.losses += 1
         if place.losses > TRIES:
-            raise StageFailed(f"lost a rollout actor {place.losses} times in a row; is there too little memory for it?")
+            raise StageFailed(f"lost a rollout actor {place.losses} times in a row, the last time: {why}")
         self._say(f"a rollout actor was lost{f' on {place.host}' if place.host else ''}; another one takes its place")
         place.shares = False
         self._again(place)

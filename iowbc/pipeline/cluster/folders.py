@@ -50,9 +50,10 @@ def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path
     if not copy and there.is_dir() and folder_digest(there) == folder.digest:
         return there
     own = _cache() / folder.digest / there.name
-    if own.is_dir() and folder_digest(own) == folder.digest:
-        return own
-    shutil.rmtree(own, ignore_errors=True)
+    if own.is_dir():
+        if folder_digest(own) == folder.digest:
+            return own
+        shutil.rmtree(own, ignore_errors=True)
     fresh = Path(tempfile.mkdtemp(dir=_cache()))
     write_files(fresh, fetch(folder.content[0]))
     if folder_digest(fresh) != folder.digest:
