@@ -248,6 +248,7 @@ class Simulation:
         )
         self.clock += 1
         diverged[:] = np.isnan(target.sum(axis=1))
+        speed = state.joint_velocity.copy()
         for world in self.worlds:
             place = world.place
             failed = diverged[place]
@@ -257,6 +258,7 @@ class Simulation:
                 self._keep_divergences(world, np.flatnonzero(failed), given)
             world.gather(state)
             world.release(state, drawn["slip_force"])
+        state.joint_acceleration[:] = (state.joint_velocity - speed) / self.period
         self._borne[:] = 0.5 * np.sqrt(np.vecdot(state.grip_force, state.grip_force)).sum(axis=1)
         self._partner.observe(state)
         self._sensing.advance(state)

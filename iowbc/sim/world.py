@@ -263,9 +263,7 @@ class World:
         state.base_linear_velocity[place] = qvel[:, BASE_LINEAR]
         state.base_angular_velocity[place] = qvel[:, BASE_ANGULAR]
         state.joint_position[place] = qpos[:, layout.joints]
-        speed = qvel[:, layout.joint_speeds]
-        state.joint_acceleration[place] = (speed - state.joint_velocity[place]) / self.timing.period
-        state.joint_velocity[place] = speed
+        state.joint_velocity[place] = qvel[:, layout.joint_speeds]
         state.joint_torque[place] = self._torque
         ranges = self.fields.torque_range
         limit = np.where(self._torque < 0.0, -ranges[..., 0], ranges[..., 1])
