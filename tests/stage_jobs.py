@@ -51,7 +51,7 @@ class Backwards:
             yield place, function(*calls[place], **folders)
 
     def crew(
-        self, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> "Remade":
         self.crews.append(len(calls))
         return Remade([partial(make, *own, **folders) for own in calls])

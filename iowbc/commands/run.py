@@ -113,7 +113,8 @@ def run_recipe(
     try:
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
-            display = _display(loaded, console, lambda: stop.text, manner)
+            load = (lambda: "") if cluster is None else lambda: cluster.load
+            display = _display(loaded, console, lambda: stop.text, load, manner)
             runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
             if cluster is not None:
                 runner.execute = cluster.run
@@ -155,11 +156,13 @@ def _rest(request: Request, made: Sequence[str]) -> str:
     return request.command([name for name in request.options.force if name not in made])
 
 
-def _display(loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], manner: Manner) -> Display:
+def _display(
+    loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], load: Callable[[], str], manner: Manner
+) -> Display:
     if manner == "quiet":
         return SilentDisplay()
     if manner == "verbose":
         return PlainDisplay(0.0, console.file)
     if console.is_terminal:
-        return LiveTable(console, stopping)
-    return PlainDisplay(loaded.recipe.execution.line_interval, console.file)
+        return LiveTable(console, stopping, load)
+    return PlainDisplay(loaded.recipe.execution.line_interval, console.file, load)

@@ -84,9 +84,11 @@ class Spread(Protocol):
         Raises `Interrupted` once the job is asked to stop.
         """
 
-    def crew(self, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]) -> Crew:
+    def crew(
+        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+    ) -> Crew:
         """Members of one core each on any machines, made by a function of a module from each of these arguments and
-        `folders`, as above."""
+        `folders`, as above. `called`: what users know a member as."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from iowbc.task.vector.shared import private_buffers
 from iowbc.task.vector.vector_env import PATIENCE, VectorEnv
 from iowbc.task.vector.workers import STARTING, Workers
 
+ACTOR = "rollout actor"
+"""What a group of environments on another machine is called."""
 WRITTEN = ("action", "counters", "terms")
 """Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
 LOOKS = ("levels", "drawn", "snapshot")
@@ -43,7 +45,7 @@ class Elsewhere(Workers):
         self.groups = shares_in_blocks(setup.count, count)
         self.buffers = private_buffers(setup.buffer_fields(), setup.count)
         self._divergences = setup.divergences
-        self._crew = spread.crew(Group, [(setup, *group) for group in self.groups], folders)
+        self._crew = spread.crew(ACTOR, Group, [(setup, *group) for group in self.groups], folders)
         self._looks = False
 
     def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:

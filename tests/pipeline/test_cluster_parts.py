@@ -1,5 +1,6 @@
 """What nodes and driver exchange: folders by their digest, who they are, and how a stage goes."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,13 +8,16 @@ from typing import Any
 
 import pytest
 
-from iowbc.errors import Damaged, UsageError
+from iowbc.errors import Damaged, StageFailed, UsageError
 from iowbc.pipeline.cluster import folders, remote
 from iowbc.pipeline.cluster.cluster import Cluster
 from iowbc.pipeline.cluster.folders import Folder, files_of, placed, write_files
-from iowbc.pipeline.cluster.identity import identity
+from iowbc.pipeline.cluster.identity import Identity, identity
 from iowbc.pipeline.cluster.remote import NodeReport
+from iowbc.pipeline.cluster.spread import _called
 from iowbc.pipeline.store.digests import folder_digest
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages import teacher
 
 
 @pytest.fixture
@@ -64,6 +68,37 @@ def test_a_machine_with_another_package_or_other_code_is_named_with_both(monkeyp
     assert f"code {own.code[:12]} here, ffffffffffff on node7" in told
 
 
+@pytest.fixture
+def strange() -> Identity:
+    """A driver with another MuJoCo and other code."""
+    own = identity()
+    return replace(own, host="driver", versions={**own.versions, "mujoco": "3.0"}, code="f" * 64)
+
+
+BOTH = r"mujoco 3\.0 here, \d+\.\d+\.\d+ on .*; code ffffffffffff here, [0-9a-f]{12} on "
+"""How the driver's and the node's versions and code are told."""
+
+
+def test_a_stage_is_refused_by_a_node_that_is_not_as_the_driver(strange: Identity, tmp_path: Path) -> None:
+    pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
+    nothing = Folder("", "", ())
+    order = remote.Order(
+        "task", strange, pytest.fail, Recipe(name="any"), "key", nothing, {}, None, "", "", "", 1, copy=False
+    )
+    outcome = remote.execute(order, (), None)
+    assert outcome.state == "mismatch"
+    assert re.match(BOTH, outcome.text)
+    job = SimpleNamespace(out=tmp_path)
+    with pytest.raises(StageFailed, match=rf"a node is not as this machine: {BOTH}"):
+        object.__new__(Cluster)._conclude(teacher.STAGE, job, outcome)
+
+
+def test_a_piece_is_refused_by_a_node_that_is_not_as_the_driver(strange: Identity) -> None:
+    pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
+    with pytest.raises(Damaged, match=rf"a node is not as the driver: {BOTH}"):
+        _called(strange, pytest.fail, (), {}, copy=False)
+
+
 class Heard:
     """A desk that keeps what it is told, and wants the second who tells to stop."""
 
@@ -108,11 +143,11 @@ HEAD, DYING = "a" * 56, "d" * 56
 class Asked:
     """Ray, as far as nodes are asked who they are; one of two dies before it answers."""
 
-    def __init__(self, known: bool) -> None:
-        """known: whether Ray tells of a death once it has happened."""
+    def __init__(self, known: bool, strange: Identity | None = None) -> None:
+        """known: whether Ray tells of a death once it has happened. strange: what the other node is instead."""
         from ray import exceptions
 
-        self.exceptions, self.known = exceptions, known
+        self.exceptions, self.known, self.strange = exceptions, known, strange
         self.alive = [HEAD, DYING]
 
     def nodes(self) -> list[dict[str, Any]]:
@@ -125,6 +160,8 @@ class Asked:
         return SimpleNamespace(remote=lambda: scheduling_strategy.node_id)
 
     def get(self, node: str) -> Any:
+        if node == DYING and self.strange is not None:
+            return self.strange
         if node == DYING:
             self.alive = [HEAD] if self.known else self.alive
             raise self.exceptions.NodeDiedError("it is gone")
@@ -143,4 +180,13 @@ def test_a_node_that_dies_while_it_is_asked_who_it_is_stops_nobody(known: bool) 
         cluster._require_alike()
         return
     with pytest.raises(UsageError, match="node d: cannot run iowbc"):
+        cluster._require_alike()
+
+
+def test_a_cluster_with_a_node_that_is_not_as_this_machine_is_refused(strange: Identity) -> None:
+    pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
+    cluster = object.__new__(Cluster)
+    cluster._ray = Asked(known=True, strange=strange)
+    told = r"^node d: mujoco \d+\.\d+\.\d+ here, 3\.0 on driver; code [0-9a-f]{12} here, f{12} on driver\ninstall "
+    with pytest.raises(UsageError, match=told):
         cluster._require_alike()

@@ -9,6 +9,7 @@ from typing import Any
 from iowbc.errors import Interrupted, IowbcError, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster.folders import Folder, placed
 from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.cluster.stragglers import straggler
 from iowbc.pipeline.stage import Member
 
 TRIES = 5
@@ -89,6 +90,12 @@ class Place:
     """In a row."""
     shares: bool = False
     """Whether it takes no core of its own."""
+    made: bool = False
+    """Whether it has answered where it is now."""
+    took: float | None = None
+    """Seconds from being asked to its answer; None where it was made meanwhile."""
+    straggles: bool = False
+    """Whether it was named for being slow."""
     waiting: dict[Any, str] = field(default_factory=dict)
     """Ray's references to what it has not answered yet."""
 
@@ -98,14 +105,17 @@ class NodeCrew:
 
     def __init__(
         self,
+        called: str,
         origin: Origin,
         calls: Sequence[tuple[Any, ...]],
         interrupted: Callable[[], bool],
         say: Callable[[str], None],
     ) -> None:
-        """calls: the arguments that make each member. say: is told of members that are lost, or share a core."""
+        """called: what users know a member as. calls: the arguments that make each. say: is told of members that are
+        lost, share a core, or are slow."""
         import ray
 
+        self._called = called
         self._origin, self._interrupted, self._say = origin, interrupted, say
         self._request: tuple[str, Sequence[tuple[Any, ...]], bool] = ("", (), False)
         self._patience = 0.0
@@ -139,6 +149,7 @@ class NodeCrew:
                     self._hear(place, reference)
             if late:
                 self._look()
+        self._name_stragglers()
         return [place.answer for place in self._places]
 
     def close(self) -> None:
@@ -153,7 +164,7 @@ class NodeCrew:
         """Has a member made on some node."""
         options = {"num_cpus": 0 if place.shares else 1, "scheduling_strategy": "SPREAD", "max_restarts": 0}
         place.actor = self._holder.options(**options).remote(self._origin, place.arguments)
-        place.host, place.since = "", time.monotonic()
+        place.host, place.since, place.made = "", time.monotonic(), False
         place.waiting = {place.actor.host.remote(): "host"}
 
     def _begin(self, index: int) -> None:
@@ -162,7 +173,7 @@ class NodeCrew:
         place = self._places[index]
         asked = place.actor.ask.remote(None if place.host else place.state, request, arguments[index], changes)
         place.waiting[asked] = "answer"
-        place.since = time.monotonic()
+        place.since, place.took = time.monotonic(), None
 
     def _hear(self, place: Place, reference: Any) -> None:
         import ray
@@ -183,8 +194,12 @@ class NodeCrew:
         fine, place.answer, state = found
         index = self._places.index(place)
         if not fine:
-            raise WorkerFailed(f"member {index} of {len(self._places)}, on {place.host}:\n{place.answer.rstrip()}")
+            raise WorkerFailed(
+                f"{self._called} {index + 1} of {len(self._places)}, on {place.host}:\n{place.answer.rstrip()}"
+            )
         place.losses = 0
+        place.took = time.monotonic() - place.since if place.made else None
+        place.made = True
         if self._request[2]:
             place.state = state
 
@@ -196,7 +211,7 @@ class NodeCrew:
             raise Interrupted("members had not begun yet")
         late = [place for place in homeless if not place.shares and now - place.since > CORE_PATIENCE]
         if late:
-            self._say(f"{len(late)} of {len(self._places)} rollout actors find no core of their own, and share one")
+            self._say(f"{len(late)} of {len(self._places)} {self._called}s find no core of their own, and share one")
         for place in late:
             place.shares = True
             self._again(place)
@@ -205,12 +220,23 @@ class NodeCrew:
             if settled and place.waiting and now - place.since > self._patience:
                 self._lost(place, f"no answer for {self._patience:.0f} s")
 
+    def _name_stragglers(self) -> None:
+        """Names who is slow, once for as long as it lasts."""
+        for place in self._places:
+            if place.took is None:
+                continue
+            others = [one.took for one in self._places if one is not place and one.took is not None]
+            told = straggler(f"{self._called} {self._places.index(place) + 1}", place.host, place.took, others)
+            if told and not place.straggles:
+                self._say(told)
+            place.straggles = bool(told)
+
     def _lost(self, place: Place, why: str) -> None:
         """Remakes a member whose node or worker is lost, or that hangs."""
         place.losses += 1
         if place.losses > TRIES:
-            raise StageFailed(f"lost a rollout actor {place.losses} times in a row, the last time: {why}")
-        self._say(f"a rollout actor was lost{f' on {place.host}' if place.host else ''}; another one takes its place")
+            raise StageFailed(f"lost a {self._called} {place.losses} times in a row, the last time: {why}")
+        self._say(f"a {self._called} was lost{f' on {place.host}' if place.host else ''}; another one takes its place")
         place.shares = False
         self._again(place)
 

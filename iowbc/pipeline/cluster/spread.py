@@ -1,6 +1,5 @@
 """A stage on a node that lets other nodes work for it."""
 
-import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from iowbc.errors import Damaged, Interrupted
 from iowbc.pipeline.cluster.crew import NodeCrew, Origin
 from iowbc.pipeline.cluster.folders import Folder, placed
 from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.cluster.stragglers import straggler
 from iowbc.pipeline.stage import Member
 
 Result = TypeVar("Result")
@@ -17,8 +17,6 @@ TRIES = 5
 """Times that a piece is begun whose node or worker is lost."""
 POLL = 0.2
 """Seconds between two looks at the pieces."""
-SLOW = 3.0
-"""Times the median of the pieces before it from which the node of a piece is named."""
 
 
 class NodeSpread:
@@ -68,9 +66,8 @@ class NodeSpread:
                 for task in over:
                     place = waiting.pop(task)
                     where, seconds, result = ray.get(task)
-                    usual = statistics.median(took or [seconds])
-                    if seconds > SLOW * usual:
-                        self._say(f"a piece took {seconds:.1f} s on {where}, the others {usual:.1f} s")
+                    if told := straggler("a piece", where, seconds, took):
+                        self._say(told)
                     took.append(seconds)
                     yield place, result
         finally:
@@ -78,11 +75,11 @@ class NodeSpread:
                 ray.cancel(task, force=True)
 
     def crew(
-        self, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
+        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> NodeCrew:
         """Members of one core each on the nodes; see `Spread`."""
         own = {name: self._folders[path] for name, path in folders.items()}
-        return NodeCrew(Origin(self._driver, make, own, self._copy), calls, self._interrupted, self._say)
+        return NodeCrew(called, Origin(self._driver, make, own, self._copy), calls, self._interrupted, self._say)
 
 
 def _called(

@@ -4,7 +4,7 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import IO, Protocol
 
@@ -108,9 +108,11 @@ class Display(Protocol):
 class PlainDisplay:
     """Lines for logs: each change of state, and progress once in a while."""
 
-    def __init__(self, interval: float, stream: IO[str] | None = None) -> None:
+    def __init__(self, interval: float, stream: IO[str] | None = None, load: Callable[[], str] = lambda: "") -> None:
+        """interval: seconds between two lines of progress. load: how much of a cluster is in use; empty without one."""
         self.interval = interval
         self.stream = stream or sys.stdout
+        self._load = load
         self._last = time.monotonic()
 
     def begin(self, views: Sequence[StageView]) -> None:
@@ -134,6 +136,8 @@ class PlainDisplay:
             parts.append(f"{duration(view.left)} left")
         if view.curve:
             parts.append(f"{view.metric} {view.values[-1]:.4g}")
+        if load := self._load():
+            self.say(load)
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:

@@ -49,10 +49,14 @@ def sparkline(values: Sequence[float], width: int = CURVE_WIDTH) -> str:
 class LiveTable:
     """One row a stage, redrawn in place, with what the stages note beneath; lines that are said scroll by above it."""
 
-    def __init__(self, console: Console, stopping: Callable[[], str] = lambda: "") -> None:
-        """stopping: what to show once the run was asked to stop; empty before."""
+    def __init__(
+        self, console: Console, stopping: Callable[[], str] = lambda: "", load: Callable[[], str] = lambda: ""
+    ) -> None:
+        """stopping: what to show once the run was asked to stop; empty before. load: how much of a cluster is in use;
+        empty without one."""
         self.console = console
         self._stopping = stopping
+        self._load = load
         self._views: Sequence[StageView] = ()
         self._live = Live(console=console, get_renderable=self._drawn, refresh_per_second=REFRESH_RATE)
 
@@ -79,9 +83,8 @@ class LiveTable:
     def _drawn(self) -> Constrain:
         width = self.console.width
         notes = [_note(view) for view in self._views if view.note] if width >= WITH_NOTES else []
-        stopping = self._stopping()
-        below = [Text(stopping, style="magenta")] if stopping else []
-        return Constrain(Group(self._table(width), *notes, *below), width - ECHO)
+        said = (Text(self._load(), style="dim"), Text(self._stopping(), style="magenta"))
+        return Constrain(Group(self._table(width), *notes, *filter(None, said)), width - ECHO)
 
     def _table(self, width: int) -> Table:
         table = Table(box=None, padding=(0, 1, 0, 0), expand=False)
