@@ -125,9 +125,9 @@ class Series:
         """Kill nodes of runs until so many kills are made and the last run has come to its end."""
         for number in range(MOST_STARTS):
             begun = time.monotonic()
-            process = self._start("ray", "--engine", "ray", "--address", self.nodes.address, "--workers", "1")
+            process = self._start("spread", "--engine", "ray", "--address", self.nodes.address, "--workers", "1")
             while self._lasts(process, self.draws.uniform(0.0, 2.0 * self.gap) if self._kills < kills else None):
-                self.finished |= self._results("ray")
+                self.finished |= self._results("spread")
                 moment = time.monotonic() - begun
                 self._tell(Turn(len(self.tally.turns), self.nodes.replace(self.draws), round(moment, 1)))
             over = process.returncode == 0
@@ -137,7 +137,7 @@ class Series:
             if over and self._kills >= kills:
                 return
             if over:
-                (self.folder / "ray").rename(self.folder / f"done-{number}")
+                (self.folder / "spread").rename(self.folder / f"done-{number}")
                 self.finished.clear()
         raise SystemExit(f"not done after {MOST_STARTS} runs:\n{self._said()}")
 
@@ -158,7 +158,7 @@ class Series:
 
     def _ending(self, code: int, seconds: float) -> Turn:
         """What a run has left that came to its end, or gave up."""
-        found, lost = self._results("ray"), []
+        found, lost = self._results("spread"), []
         assert self.tally.undisturbed is not None
         for (stage, key), digest in self.finished.items():
             if found.get((stage, key)) != digest:
@@ -224,7 +224,7 @@ def main() -> int:
     record.parent.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory(prefix="iowbc-nodes-", ignore_cleanup_errors=True) as folder:
-        os.environ |= {**ALONE, **PATIENT, **secured(), "RAY_TMPDIR": folder}
+        os.environ |= {**ALONE, **PATIENT, **secured(), "RAY_TMPDIR": folder}  # its own files lie in ray/ there
         nodes = Nodes(asked.nodes)
         try:
             series = Series(words, Path(folder), nodes, Tally(record), asked.gap, random.Random(asked.seed))
