@@ -7,7 +7,6 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.simulation.scene import Grasp, Object
 from iowbc.sim.model_index import Layout
-from iowbc.sim.objects import TORSION
 from iowbc.sim.shapes import measured
 
 TINY = 1e-9
@@ -43,7 +42,7 @@ class Grip:
         stable = self._grasp.stability * inertia / self._period
         stiffness = np.minimum(self._grasp.stiffness, stable / self._period)
         holding = 0.5 * (connected[:, 0] + connected[:, 1])
-        most = 2.0 * TORSION * slip_force * holding
+        most = 2.0 * self._grasp.torsion * slip_force * holding
         reach = most / np.maximum(stiffness, TINY)
         self.angle.clip(-reach, reach, out=self.angle)
         damping = np.minimum(self._grasp.swing_damping * inertia, stable)

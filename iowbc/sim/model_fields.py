@@ -8,7 +8,6 @@ import numpy as np
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.sim.model_index import Layout
-from iowbc.sim.objects import TORSION
 from iowbc.sim.shapes import measured
 from iowbc.sim.timing import Timing
 
@@ -77,7 +76,7 @@ class ModelFields:
         if self._layout.palms is not None:
             friction = drawn["surface_friction"][:, None]
             fields["geom_friction"][ids[:, None], self._layout.palms, 0] = friction
-            fields["geom_friction"][ids[:, None], self._layout.palms, 1] = TORSION * friction
+            fields["geom_friction"][ids[:, None], self._layout.palms, 1] = self._scene.grasp.torsion * friction
 
     @property
     def rolling(self) -> tuple[Array, Array]:

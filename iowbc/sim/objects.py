@@ -20,8 +20,6 @@ OFF_CENTRE = [0.001, 0.001, 0.001]
 """Centre of mass before one is drawn [m]; off the centre, or else the compiler hard-codes that it is there."""
 PALM_CONDIM = 4
 """Palms resist sliding and twisting."""
-TORSION = 0.02
-"""Torsional friction of a palm per unit of sliding friction [m]: two thirds of the radius of a 3 cm contact patch."""
 RING_SEGMENTS = 16
 CLEARANCE = 0.06
 """Height of a crate's floor above the ground [m]."""
@@ -121,7 +119,7 @@ def _add_palms(spec: Any, scene: Scene) -> None:
             conaffinity=OBJECT_BIT,
             condim=PALM_CONDIM,
             priority=2,
-            friction=[1.0, TORSION, 0.0001],
+            friction=[1.0, scene.grasp.torsion, 0.0001],
             rgba=(0.2, 0.2, 0.22, 1.0),
             group=2,
         )

@@ -15,9 +15,6 @@ from iowbc.task.episodes import Episode, PlannedPush
 from iowbc.task.memory import Memory
 from iowbc.task.progress import course
 
-BLOCKING = 50.0
-"""Factor on the rolling resistance at which a crate does not roll."""
-
 
 class Schedule:
     """Random keys, time limits and levels of n environments."""
@@ -92,7 +89,7 @@ class Schedule:
         blocked = random.uniform(key, "episode/blocked", 1)[:, 0] < hardness.blocked
         return {
             "load_scale": hardness.load,
-            "resistance_scale": np.where(blocked, BLOCKING, hardness.resistance),
+            "resistance_scale": np.where(blocked, self._task.curriculum.blocking, hardness.resistance),
             "impulse_scale": hardness.disturbance,
             "push_scale": hardness.disturbance,
         }

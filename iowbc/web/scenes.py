@@ -12,7 +12,7 @@ from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot.description import Robot
 from iowbc.sim.model import scene_spec
-from iowbc.sim.objects import HANDS, TORSION
+from iowbc.sim.objects import HANDS
 from iowbc.sim.shapes import measured
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.timing import Timing
@@ -178,7 +178,7 @@ def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mappi
         "strength": grasp.strength,
         "friction": drawn["surface_friction"],
         "slip_force": drawn["slip_force"],
-        "torsion": TORSION,
+        "torsion": grasp.torsion,
         "about": float(inertia[1] + grasp.height**2),
         "stability": grasp.stability,
         "stiffness": grasp.stiffness,

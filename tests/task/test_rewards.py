@@ -59,7 +59,7 @@ def test_the_object_costs_nothing_where_none_is_held() -> None:
 
 
 def test_what_rests_on_other_links_than_the_hands_costs_by_its_force_within_bounds() -> None:
-    assert equilibrium.link_contact(np.array([0.0, 50.0, 5000.0])).tolist() == [0.0, 50.0, 200.0]
+    assert equilibrium.link_contact(np.array([0.0, 50.0, 5000.0]), 200.0).tolist() == [0.0, 50.0, 200.0]
 
 
 def test_an_object_that_only_turns_about_the_vertical_is_level() -> None:

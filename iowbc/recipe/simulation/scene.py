@@ -29,8 +29,10 @@ class Grasp(Section):
     stiffness: float = Field(default=4.0, ge=0.0)
     """Stiffness with which the palms resist turning of the object about the line between them [N·m/rad]; so soft that a
     box still hangs and wrists of 5 N·m bear what a tilt of the hands costs, yet it bears what a second carrier leaves
-    unbalanced. They slip at two thirds of a contact radius of 3 cm times the slip force, both together 5.6 N·m at
-    friction 1.0."""
+    unbalanced."""
+    torsion: float = Field(default=0.02, ge=0.0, json_schema_extra=LATER)
+    """Torque at which a palm slips about the line between the hands, over the force at which it slips [m]: two thirds
+    of the radius of a 3 cm contact patch. Two hands of a compliant grasp bear 5.6 N·m at friction 1.0."""
     stability: float = Field(default=0.3, gt=0.0, le=1.0)
     """Bound on that stiffness · period² / inertia, and on damping · period / inertia, above which a torque that is held
     over a control period would make a light object oscillate."""

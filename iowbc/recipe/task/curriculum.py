@@ -60,6 +60,9 @@ class Curriculum(Section):
     blocked: Scale = Scale(start=0.0, full=0.0, extreme=0.25)
     """Part of the pushes whose crate does not roll at all, by the level of load. Together with `resistance` more than
     30 % of the pushes at level 2 are infeasible: they teach to stay upright against what does not yield."""
+    blocking: float = Field(default=50.0, ge=1.0, json_schema_extra=LATER)
+    """Factor on the rolling resistance of a crate that is not to roll: at the nominal resistance of 0.06 one of 13 kg
+    then resists with the 392 N that feet hold at most, and heavier ones do not move."""
     disturbance: Scale = Scale(start=0.0, full=1.0, extreme=1.5)
     """Factor on impulses and pushes."""
     balance: Ceilings = Ceilings(posture=1.0, locomotion=0.5, load=1.0, disturbance=0.3)

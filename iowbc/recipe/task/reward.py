@@ -56,6 +56,8 @@ class ObjectEquilibrium(Section):
     link_contact: float = -0.01
     """Weight of the force of links other than the hands on the object [N]: 50 N of a box that rests in the lap cost as
     much as being alive brings. What thighs and torso carry is not carried."""
+    largest_link_contact: float = Field(default=200.0, ge=0.0, json_schema_extra=LATER)
+    """Force beyond which `link_contact` costs no more [N]: a box of 20 kg in the lap; blows beyond say no more."""
     vertical_velocity: float = -0.5
     """Weight of the squared vertical velocity beyond the one that a commanded change of height asks for [m²/s²]."""
 

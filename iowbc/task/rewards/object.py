@@ -5,9 +5,6 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.task.rewards.kernel import squared_norm
 
-LAP = 200.0
-"""A box of 20 kg in the lap [N]; blows beyond say no more."""
-
 
 def position(object_offset: Array, place: Array, held: Mask) -> Array:
     """‖x_obj − x_grasp‖², (n,) [m²]; object and its place in the grasp from the base, heading frame, (n, 3) [m]."""
@@ -22,9 +19,9 @@ def orientation(object_quaternion: Array, held: Mask) -> Array:
     return tilt
 
 
-def link_contact(force: Array) -> Array:
-    """Force of links other than the hands on the object, no more than `LAP`, (n,) [N]."""
-    bounded: Array = np.minimum(force, LAP)
+def link_contact(force: Array, most: float) -> Array:
+    """Force of links other than the hands on the object, no more than `most`, (n,) [N]."""
+    bounded: Array = np.minimum(force, most)
     return bounded
 
 

@@ -77,7 +77,9 @@ TERMS: dict[str, Term] = {
     "sync.torso_roll": lambda s: sync.torso_roll(s.motion.torso_roll),
     "object.position": lambda s: equilibrium.position(s.motion.object_offset, s.object_place, s.held),
     "object.orientation": lambda s: equilibrium.orientation(s.state.object_quaternion, s.held),
-    "object.link_contact": lambda s: equilibrium.link_contact(s.state.link_object_force),
+    "object.link_contact": lambda s: equilibrium.link_contact(
+        s.state.link_object_force, s.recipe.object.largest_link_contact
+    ),
     "object.vertical_velocity": lambda s: equilibrium.vertical_velocity(
         s.state.object_linear_velocity, s.height_rate, s.held
     ),
