@@ -30,7 +30,9 @@ HEADLINES: Mapping[str, tuple[str, ...]] = {
 METRICS_SHOWN = 3
 """Metrics of a stage that are shown at most."""
 TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "trainings", "probe")
-"""Tables that are drawn; the others are named."""
+"""The main tables, in their order."""
+DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
+"""Those that are drawn at the end of a run; the others are named."""
 EXPORTED = "policy.onnx"
 POLICIES = ("export", "distill", "teacher")
 """Stages that leave a policy, the one to prefer first."""
@@ -101,7 +103,7 @@ def _print_tables(folder: Path, console: Console) -> None:
     """Draw the main ones of a folder's tables, and say where the others are."""
     others = []
     for path in sorted(folder.glob("*.md"), key=_rank):
-        if path.stem in TABLES:
+        if path.stem in DRAWN:
             console.print()
             console.print(drawn(read_table(path.read_text(encoding="utf-8", errors="replace")), console.width))
         else:

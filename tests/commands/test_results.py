@@ -3,6 +3,7 @@
 import io
 import json
 import re
+import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from iowbc.commands.results import headline, next_commands, print_results
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
+PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 LIFTING = """*Command tracking errors under lifting: means over surviving trials with their 95 % interval.*
 
 | Mass | Algorithm | E_α [rad] | E_h [m] | Survived | paper E_α |
@@ -89,6 +91,21 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
         ["iowbc", "report", "first"],
     ]
     assert len(lines) < 35
+
+
+def test_the_end_of_the_largest_run_fits_a_screen_of_80_columns(folder: Path) -> None:
+    runs = Runs(folder / "runs")
+    artifacts = last_used(Store(runs), "first")
+    tables = max((PUBLISHED / "eval").glob("*/tables"), key=lambda path: (path / "pushing.md").stat().st_size)
+    shutil.copytree(tables, runs.root / "first" / "eval" / "tables", dirs_exist_ok=True)
+    lines = shown(80, lambda console: print_results(runs, "first", artifacts, console)).splitlines()
+    assert len(lines) < 70
+    assert "Success in the heavy tasks" in lines
+    assert max(len(line) for line in lines if str(runs.root) not in line) <= 80
+    heads = [line.split() for line in lines if line.startswith("Mass")]
+    assert len(heads) == 2
+    assert all({"E_α", "E_h", "E_v", "E_ψ", "Survived"} <= set(head) for head in heads)
+    assert any(line.startswith("more tables") and "paper.md" in line for line in lines)
 
 
 def test_what_a_run_with_overrides_made_goes_by_its_key_in_a_new_store_too(
