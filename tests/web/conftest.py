@@ -17,6 +17,7 @@ import pytest
 from exported_policies import made_up_generator, untrained
 
 from iowbc.deploy import contract
+from iowbc.errors import UsageError
 from iowbc.evaluation.golden_rollout import golden_inputs
 from iowbc.export import golden
 from iowbc.export.folder import write_folder
@@ -24,7 +25,7 @@ from iowbc.export.onnx_graph import run_torch
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
-from iowbc.web.bundling import parts_folder
+from iowbc.web.bundling import npm_parts, parts_folder
 
 DRAWING = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """Words with which the browser draws in three dimensions without a GPU."""
@@ -53,9 +54,14 @@ def exported(recipe: Recipe, robot: Robot, tmp_path_factory: pytest.TempPathFact
 
 @pytest.fixture(scope="session")
 def cache() -> Path:
-    """Where npm's packages are, for a browser that is there; a test does not fetch them."""
+    """Where npm's packages are, for a browser that is there; only in continuous integration are they fetched."""
     if BROWSER is None:
         pytest.skip("chromium is not installed")
+    if os.environ.get("CI") == "true":
+        try:
+            npm_parts(CACHE, print)
+        except UsageError as reason:
+            pytest.skip(str(reason))
     if shutil.which("node") is None or not (parts_folder(CACHE) / "node_modules").is_dir():
         pytest.skip(f"no npm packages in {CACHE}: `iowbc export WHAT --web DIR` fetches them, with node and a network")
     return CACHE

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import GOLDEN
+from iowbc.deploy.contract import GOLDEN, exported_folder
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import exported_world
 from iowbc.export.golden import read_golden
@@ -35,6 +35,9 @@ TOLERANCE = 1e-4
 """Of the controller, for which the graph computes in float32."""
 PHYSICS = 1e-6
 """How far joints, base and object are from Python's after a second, in rad and m; both compute in float64."""
+TRAINED = 1e-5
+"""The same of a trained policy, which answers to what differs."""
+PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +105,30 @@ def test_a_browser_computes_and_simulates_what_python_does(
         assert mass is None or not held
         assert np.abs(expected[-1] - expected[0]).max() > 0.05
         assert away.max() < PHYSICS
+
+
+def test_the_published_controller_walks_with_a_box_in_a_browser_as_it_does_in_python(
+    cache: Path,
+    robot: Robot,
+    command: NDArray[np.float64],
+    answer_of: Callable[..., Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(PUBLISHED)
+    monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
+    published, page = exported_folder("full"), tmp_path / "page"
+    write_page(published, page, cache, print)
+    shutil.copy(Path(__file__).with_name("check.html"), page)
+    asked = [{"scene": "lift", "mass": None, "command": command.tolist()}]
+    (page / "asked.json").write_text(json.dumps({"played": asked}))
+    told = answer_of(page, "check.html")
+    assert "error" not in told, told["error"]
+    assert max(told["largest"].values()) < TOLERANCE
+    expected, held = played(published, robot, "lift", None, command)
+    assert held
+    assert np.abs(np.array(told["rollouts"][0]["positions"]) - expected).max() < TRAINED
 
 
 def test_a_visitor_moves_the_sliders_and_no_other_place_is_asked(page: Path, answer_of: Callable[..., Any]) -> None:
