@@ -199,14 +199,33 @@ def written(runs: list[Run], folder: Path) -> Path:
     return path
 
 
+def test_postures_come_first_and_every_artifact_says_where_it_comes_from(runs: list[Run], tmp_path: Path) -> None:
+    pictures = runs[0].artifacts["eval"].folder / "figures"
+    (pictures / "postures.png").write_bytes(b"picture")
+    (pictures / "a.png").write_bytes(b"picture")
+    text = written(runs, tmp_path).read_text()
+    shown = [caption for caption in re.findall(r"<figcaption>(.*?)</figcaption>", text) if caption.startswith("first")]
+    places = [shown.index(f"first, eval: {name}.png") for name in ("postures", "a")]
+    assert places == sorted(places)
+    provenance = text[text.index('id="provenance"') :]
+    for run in runs:
+        for stage, artifact in run.artifacts.items():
+            assert f"{run.label}/{stage}" in provenance
+            assert artifact.manifest.key in provenance
+    assert MANIFEST.code["task"][:12] in provenance
+    assert MANIFEST.versions["python"] in provenance
+
+
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
-def test_a_dark_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: Path) -> None:
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_a_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: Path, theme: str) -> None:
     assert BROWSER is not None
     words = ["--headless", "--no-sandbox", "--disable-gpu", "--host-resolver-rules=MAP * ~NOTFOUND"]
     words += ["--window-size=390,6000", "--virtual-time-budget=8000", f"--user-data-dir={tmp_path / 'profile'}"]
-    command = [BROWSER, *words, "--force-dark-mode", "--dump-dom", written(runs, tmp_path).as_uri()]
+    words += ["--force-dark-mode"] * (theme == "dark")
+    command = [BROWSER, *words, "--dump-dom", written(runs, tmp_path).as_uri()]
     drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
-    assert 'data-theme="dark"' in drawn
+    assert f'data-theme="{theme}"' in drawn
     assert "data-error" not in drawn.partition(">")[0] + drawn.partition("<html")[2].partition(">")[0]
     places = re.findall(r'class="curve[^"]*"[^>]*', drawn)
     assert len(places) == 2 + 5
