@@ -40,6 +40,7 @@ measure: run
 	$(BIN)/iowbc show full
 	$(BIN)/iowbc run recipes/teacher.yaml
 	$(BIN)/iowbc run recipes/probe.yaml
+	$(BIN)/iowbc compare paper
 	$(BIN)/iowbc bench rg
 	$(BIN)/iowbc bench sim
 	$(BIN)/iowbc bench train
@@ -55,7 +56,7 @@ chaos: setup
 	$(BIN)/python tests/chaos/chaos.py --recipe tests/chaos/workers.yaml --events 40
 
 chaos-nodes: setup
-	$(BIN)/python tests/chaos/nodes.py --kills 10 --actors 3
+	$(BIN)/python tests/chaos/nodes.py --kills 10 --actors 3 --gap 8
 	$(BIN)/python tests/chaos/nodes.py --vary seed=0..1 --until teacher --kills 10
 
 leaks: setup

@@ -120,11 +120,13 @@ def test_one_command_makes_every_figure_of_the_readme_anew() -> None:
     figures = readme.partition("## The simulation")[2]
     benchmarks = set(re.findall(r"`(?:iowbc )?bench (\w+)", figures))
     recipes = {*re.findall(r"`iowbc run (recipes/\w+\.yaml)", figures), *re.findall(r"`(recipes/probe\.yaml)", readme)}
+    comparisons = set(re.findall(r"`iowbc (compare \w+)`", figures))
     assert {"sim", "train"} <= benchmarks
+    assert "compare paper" in comparisons
     assert {"recipes/full.yaml", "recipes/teacher.yaml", "recipes/probe.yaml"} <= recipes
     asked = [line.split("iowbc ")[1] for line in made.splitlines()]
     assert {f"bench {name}" for name in benchmarks} <= {" ".join(line.split()[:2]) for line in asked}
-    assert {f"run {recipe}" for recipe in recipes} <= set(asked)
+    assert {f"run {recipe}" for recipe in recipes} | comparisons <= set(asked)
 
 
 def test_every_page_stands_in_the_sites_contents_once() -> None:
