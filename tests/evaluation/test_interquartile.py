@@ -72,7 +72,9 @@ def test_a_table_shows_trainings_together_and_each_below() -> None:
         ("IO-WBC, seed 0", "1", "10"),
         ("IO-WBC, seed 1", "1", "10"),
         ("WBC", "1", "10"),
+        ("stands still", "–", "–"),
     ]
+    assert table.rows[4][4:] == ("none", "0.250", "0.250", "0.250", "0.250", "–")
     assert table.rows[0][-1] == "–"
     assert table.rows[3][5] == "Fails (0.383 to Fails)", "four of ten trials were not survived"
     assert latex(table).count(r"\toprule") == 1
@@ -98,6 +100,7 @@ def test_every_cell_of_the_papers_tables_has_ours_theirs_and_the_ratio() -> None
     assert "| II, lifting | IO-WBC | 0 kg | 5/5 | 0.300 / 0.125 = 2.40 |" in lines[4]
     assert "| IO-WBC | 8 kg | 0/5 | Fails / 0.145 = – |" in lines[5]
     assert "| load-agnostic | 8 kg | 0/5 | Fails / Fails = – |" in lines[8]
-    assert len(lines) == 9, "1 kg is in none of the paper's tables"
+    assert "| stands still | any | – | 0.250 | 0.250 | 0.250 | 0.250 |" in lines[9]
+    assert len(lines) == 10, "1 kg is in none of the paper's tables"
     assert "IO-WBC in lifting 0 of 8, load-agnostic in lifting 0 of 8" in table.caption
     assert paper_table(aggregate(trials.assign(variant="mine"))) is None

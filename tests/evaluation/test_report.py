@@ -10,10 +10,12 @@ from matplotlib.container import ErrorbarContainer
 
 from iowbc.evaluation.paper import LIFTING, PUSHING, VARIANTS, reported
 from iowbc.evaluation.report.aggregate import aggregate, variants_of
+from iowbc.evaluation.report.beside_paper import paper_table
 from iowbc.evaluation.report.capacity import load_capacity, push_capacity
 from iowbc.evaluation.report.differences import difference_table, mean_difference, paired, success_p
 from iowbc.evaluation.report.error_tables import error_table, moving_table
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, style_of
+from iowbc.evaluation.report.interquartile import interquartile_table
 from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
 from iowbc.evaluation.report.report import write_report
 from iowbc.evaluation.report.tables import latex, markdown
@@ -140,13 +142,30 @@ def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_pat
     }
 
 
-def test_there_is_no_table_of_walking_where_nobody_was_to_walk(tmp_path: Path) -> None:
-    standing = trials_of("IO-WBC", "lifting", {4.0: 5}).assign(
+@pytest.fixture
+def standing() -> pd.DataFrame:
+    """Trials in which no step is commanded."""
+    return trials_of("IO-WBC", "lifting", {4.0: 5}).assign(
         **{name: np.nan for part in ("", "still_") for name in (f"{part}{error}_moving" for error in ERRORS)}
     )
+
+
+def test_there_is_no_table_of_walking_where_nobody_was_to_walk(standing: pd.DataFrame, tmp_path: Path) -> None:
     write_report(standing, tmp_path, 0.8)
     assert "lifting_moving.md" not in {path.name for path in tmp_path.rglob("*.md")}
     assert "Fails" not in markdown(error_table(aggregate(standing), "lifting"))
+
+
+def test_standing_is_not_held_against_the_papers_walking(standing: pd.DataFrame) -> None:
+    walking = trials_of("IO-WBC", "lifting", {4.0: 5})
+    for trials, shown in ((walking, True), (standing, False)):
+        summary = aggregate(trials)
+        table = error_table(summary, "lifting")
+        assert ("paper E_α" in table.head, "Table II" in table.caption) == (shown, shown)
+        assert (paper_table(summary) is not None) == shown
+        for figure in (errors_against_mass(summary, "lifting"), comparison(summary, 0.8)):
+            dotted = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
+            assert (bool(dotted), "the paper's numbers" in figure.get_suptitle()) == (shown, shown)
 
 
 def test_every_error_table_says_what_standing_still_scores() -> None:
@@ -179,9 +198,13 @@ def test_captions_say_partner_friction_height_averaging_and_that_it_is_simulatio
     assert "without a partner (share 0), rolling resistance μ 0.06." in pushed.caption
     assert carried.caption.startswith("Command tracking errors under cooperative lifting (paper's Table II): means")
     assert pushed.caption.startswith("Command tracking errors under pushing alone (paper's Table III): means")
-    for table in (carried, pushed):
+    both = pd.concat([trials, trials.assign(variant="WBC")])
+    over_suites = [paper_table(summary), difference_table(both), interquartile_table(both)]
+    for table in (carried, pushed, *filter(None, over_suites)):
+        assert "In simulation" in table.caption
         assert "the pelvis above the ground" in table.caption
         assert "one gait period of 0.80 s" in table.caption
+    assert ["μ 0.06" in table.caption for table in over_suites if table] == [True] * 3
     assert "Table II" in carried.caption
     assert "| 0.132 (2.27) |" in markdown(carried), "cooperative lifting, too, has the paper's numbers"
 
@@ -200,6 +223,7 @@ def test_errors_differ_in_pairs_of_the_same_trial() -> None:
     assert table is not None
     assert table.rows[0][:4] == ("lifting", "WBC", "4", "+0.200")
     assert table.rows[0][-1] == "-20 % (p 1)"
+    assert table.rows[1][:4] == ("lifting", "stands still", "5", "-0.050 ± 0.196 (p 0.52)")
     assert difference_table(trials_of("IO-WBC", "lifting", {4.0: 5})) is None
 
 

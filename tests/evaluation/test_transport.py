@@ -66,12 +66,15 @@ def test_a_trial_of_standing_asks_for_no_transport() -> None:
 
 
 def test_success_asks_for_transport_of_robot_and_object() -> None:
-    ways = {"E_alpha": 0.1, "E_h": 0.01, "transport_robot": 0.6, "transport_object": 0.6}
+    ways = {"E_alpha": 0.1, "E_h": 0.01, "transport_robot": 0.6, "transport_object": 0.6, "weight_in_hands": 0.99}
     assert succeeded(Success(), "lifting", ways)
     assert not succeeded(Success(), "lifting", ways | {"transport_robot": 0.4})
     assert not succeeded(Success(), "pushing", ways | {"transport_object": 0.1})
     assert succeeded(Success(), "lifting", ways | {"transport_object": np.nan}), "no object to bring along"
     assert succeeded(Success(transport=0.1), "lifting", ways | {"transport_robot": 0.2})
+    assert not succeeded(Success(), "lifting", ways | {"weight_in_hands": 0.9}), "the rest lies in its lap"
+    assert succeeded(Success(weight_in_hands=0.8), "lifting", ways | {"weight_in_hands": 0.9})
+    assert succeeded(Success(), "pushing", ways | {"weight_in_hands": np.nan}), "nothing is held"
 
 
 def test_stagnation_asks_for_posture_and_not_for_transport() -> None:

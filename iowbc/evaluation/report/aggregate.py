@@ -110,6 +110,12 @@ def variants_of(trials: pd.DataFrame) -> list[str]:
     return sorted(present, key=lambda name: VARIANTS.index(name) if name in VARIANTS else len(VARIANTS))
 
 
+def asks_for_steps(rows: pd.DataFrame) -> bool:
+    """Whether any of these trials commands steps, as the paper's do: errors of standing are not to be held against its
+    errors of walking."""
+    return bool(rows["still_E_v_moving"].notna().any())
+
+
 def suites_of(summary: pd.DataFrame, *kinds: str) -> list[str]:
     """The suites of some kinds, in order of appearance."""
     return [str(suite) for suite in dict.fromkeys(summary.loc[summary["kind"].isin(kinds), "suite"])]

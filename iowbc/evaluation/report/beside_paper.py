@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import TABLES, VARIANTS, reported
-from iowbc.evaluation.report.aggregate import suites_of
-from iowbc.evaluation.report.captions import rolling_resistance
-from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, NO_LABELS, NUMBERS
+from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of
+from iowbc.evaluation.report.captions import in_common
+from iowbc.evaluation.report.error_tables import ANY_MASS, HEADS, LATEX_HEADS, NO_LABELS, NUMBERS, STANDS_STILL
 from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS
 
@@ -17,13 +17,15 @@ CELL = "{} / {} = {}"
 
 
 def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
-    """The masses of the paper's tables that were played, for each of its variants; None where there are none.
+    """The masses of the paper's tables that were played walking, for each of its variants; None where there are none.
 
     labels: the paper's name of variants that go by another one here.
     """
     rows, numbers, counted = [], [], []
     for suite in suites_of(summary, *NUMBERS):
         chosen = summary[summary["suite"] == suite]
+        if not asks_for_steps(chosen):
+            continue
         kind = str(chosen["kind"].iloc[0])
         for variant, own in chosen.groupby("variant", sort=False):
             label = labels.get(str(variant), str(variant))
@@ -42,6 +44,9 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
                     at_most += sum(one <= other for one, other in zip(ours, theirs, strict=True))
                     of += int(np.isfinite(theirs).sum())
             counted += [f"{variant} in {suite} {at_most} of {of}"] if of else []
+        if rows and rows[-1][0] == f"{NUMBERS[kind]}, {suite}":
+            still = [f"{float(chosen[f'still_{name}'].mean()):.3f}" for name in ERRORS]
+            rows.append((f"{NUMBERS[kind]}, {suite}", STANDS_STILL, ANY_MASS, ABSENT, *still))
     if not rows:
         return None
     columns = ("Table", "Algorithm", "Mass", "Survived")
@@ -49,17 +54,13 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
         "paper",
         "Tables II and III cell by cell: ours / the paper's = ratio, means over surviving trials; the paper's are for "
         f"its own commands. {FAILS}: no trial survived. Cells with a number of the paper's in which ours is at most as "
-        f"large: {', '.join(counted)}. In simulation{_resistance(summary)}.",
+        f"large: {', '.join(counted)}. {STANDS_STILL}: what doing nothing scores, from the script. "
+        f"{in_common(summary)}",
         (*columns, *HEADS.values()),
         (*columns, *LATEX_HEADS.values()),
         tuple(rows),
         pd.DataFrame(numbers),
     )
-
-
-def _resistance(summary: pd.DataFrame) -> str:
-    pushes = summary[summary["kind"] == "pushing"]
-    return "" if pushes.empty else f", {rolling_resistance(pushes)}"
 
 
 def _cell(ours: float, theirs: float) -> str:

@@ -30,6 +30,13 @@ def measures(rows: pd.DataFrame) -> str:
     )
 
 
+def in_common(rows: pd.DataFrame) -> str:
+    """What trials of several suites have in common, and how their errors were measured."""
+    pushes = rows[rows["kind"] == "pushing"]
+    rolling = "" if pushes.empty else f", pushes with {rolling_resistance(pushes)}"
+    return f"In simulation{rolling}. {measures(rows)}"
+
+
 def partner(rows: pd.DataFrame) -> str:
     """Who helps."""
     shares = rows["partner_share"].unique()

@@ -5,7 +5,8 @@ import pandas as pd
 from scipy import stats
 
 from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
-from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS
+from iowbc.evaluation.report.captions import in_common
+from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.evaluation.report.tables import ABSENT, Table
 from iowbc.evaluation.trials.errors import ERRORS
@@ -69,13 +70,22 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
                 }
                 | {"success": success, "success_p": p}
             )
+        if rows and rows[-1][0] == suite:
+            survivors = within[(within["variant"] == reference) & within["survived"]]
+            still = {name: mean_difference(survivors[f"still_{name}"] - survivors[name]) for name in ERRORS}
+            rows.append((suite, STANDS_STILL, str(len(survivors)), *(_cell(*still[name]) for name in ERRORS), ABSENT))
+            numbers.append(
+                {"suite": suite, "variant": STANDS_STILL, "reference": reference, "both": len(survivors)}
+                | {name: still[name][0] for name in ERRORS}
+            )
     if not rows:
         return None
     return Table(
         "differences",
         f"Differences to {reference} in pairs of trials that met the same world and commands, over all masses of a "
         "suite: errors where both survived, with their 95 % interval and Student's p; success with McNemar's exact p. "
-        "Negative errors are better. No p is corrected for how many there are.",
+        f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
+        f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}",
         ("Suite", "Algorithm", "Pairs", *(f"Δ{head}" for head in HEADS.values()), "Δ success"),
         (
             "Suite",

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import VARIANTS, reported
+from iowbc.evaluation.report.aggregate import asks_for_steps
 from iowbc.evaluation.report.captions import conditions, measures
 from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS
@@ -32,7 +33,8 @@ def error_table(
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
     swept = kind in NUMBERS
-    with_paper = swept and any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
+    known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
+    with_paper = swept and known and asks_for_steps(chosen)
     rows = []
     for first, group in _groups(chosen, swept):
         for _, row in group.iterrows():
@@ -112,8 +114,13 @@ def _still(rows: pd.DataFrame, part: str = "") -> list[str]:
     return [ABSENT if np.isnan(value) else f"{value:.3f}" for value in values]
 
 
+def asks_for_transport(rows: pd.DataFrame) -> bool:
+    """Whether any of these trials commands a way that has to be covered."""
+    return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
+
+
 def _still_outcome(rows: pd.DataFrame) -> list[str]:
-    walks = bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
+    walks = asks_for_transport(rows)
     return [ABSENT, "none" if walks else ABSENT, "0.00" if walks else ABSENT, ABSENT]
 
 
@@ -144,7 +151,8 @@ def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     swept = kind in NUMBERS
-    title = f"{_with_whom(chosen, kind)} (paper's Table {NUMBERS[kind]})" if swept else f"the suite {kind}"
+    like = f" (paper's Table {NUMBERS[kind]})" if swept and asks_for_steps(chosen) else ""
+    title = f"{_with_whom(chosen, kind)}{like}" if swept else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
     aim = " Success here is survival in posture, for the push is infeasible." if kind == "stagnation" else ""
     beside = (
@@ -153,8 +161,8 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     return (
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
         f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
-        f"in hands: part of the weight that the robot carries which rests in its hands; {STANDS_STILL}: what doing "
-        f"nothing scores, from the script.{failed}{aim}{beside}"
+        f"in hands: part of the weight that the robot carries which rests in its hands; success: survived, with enough "
+        f"of both; {STANDS_STILL}: what doing nothing scores, from the script.{failed}{aim}{beside}"
     )
 
 

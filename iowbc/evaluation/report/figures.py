@@ -16,7 +16,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
-from iowbc.evaluation.report.aggregate import suites_of, variants_of
+from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of, variants_of
 from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.error_tables import NUMBERS, STANDS_STILL
@@ -31,10 +31,9 @@ LABELS = {
     "E_v": "$E_v$, velocity [m/s]",
     "E_psi": "$E_\\psi$, heading [rad]",
 }
-NOTE = (
-    "means over the trials survived; at the upper edge: how many where not all survived, × none\n"
-    "hollow, dotted: the paper's numbers, for its own commands; grey: a robot that stands still"
-)
+MARKS = "means over the trials survived; at the upper edge: how many where not all survived, × none"
+STILL_NOTE = "grey: a robot that stands still"
+PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands"
 STILL_COLOUR = "0.55"
 DPI = 150
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
@@ -70,7 +69,8 @@ def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
 
 def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
     """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
-    kind = str(summary.loc[summary["suite"] == suite, "kind"].iloc[0])
+    chosen = summary[summary["suite"] == suite]
+    kind, with_paper = str(chosen["kind"].iloc[0]), asks_for_steps(chosen)
     figure = Figure(figsize=(9.5, 6.6), layout="constrained")
     for axes, name in zip(figure.subplots(2, 2, sharex=True).flat, ERRORS, strict=True):
         for variant in variants_of(summary):
@@ -82,7 +82,8 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
             axes.errorbar(
                 masses, rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
             )
-            _paper_curve(axes, kind, variant, ERRORS.index(name), colour, marker)
+            if with_paper:
+                _paper_curve(axes, kind, variant, ERRORS.index(name), colour, marker)
             _mark_survivors(axes, rows, variant, variants_of(summary))
         _still_line(axes, float(summary.loc[summary["suite"] == suite, f"still_{name}"].mean()))
         axes.set_ylabel(LABELS[name])
@@ -90,9 +91,8 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
     for axes in figure.axes[2:]:
         axes.set_xlabel(f"{kind} mass [kg]")
     _legend(figure, figure.axes[0])
-    chosen = summary[summary["suite"] == suite]
     heading = f"Tracking errors against {kind} mass, bars: 95 % intervals. {conditions(chosen)}"
-    figure.suptitle(f"{heading}\n{NOTE}", fontsize=9)
+    figure.suptitle(f"{heading}\n{_note(with_paper)}", fontsize=9)
     return figure
 
 
@@ -114,7 +114,8 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     _success_panel(panels[-1], _heaviest(summary))
     _letter(panels)
     if sweeps:
-        figure.suptitle(NOTE, fontsize=9)
+        walked = any(asks_for_steps(summary[summary["suite"] == suite]) for suite in sweeps)
+        figure.suptitle(_note(walked), fontsize=9)
     _legend(figure, panels[0])
     return figure
 
@@ -142,6 +143,11 @@ def write_figure(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
+def _note(with_paper: bool) -> str:
+    """What marks, grey lines and dotted ones mean."""
+    return f"{MARKS}\n{'; '.join([PAPER_NOTE] * with_paper + [STILL_NOTE])}"
+
+
 def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
     axes.set_title(f"error norm, {suite}")
     kind = str(summary.loc[summary["suite"] == suite, "kind"].iloc[0])
@@ -151,7 +157,8 @@ def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
         rows = _rows(summary, suite, variant)
         colour, marker = style_of(variant, variants_of(summary))
         axes.plot(rows["mass"], rows["norm"], color=colour, marker=marker, markersize=5, label=variant)
-        _paper_curve(axes, kind, variant, None, colour, marker)
+        if asks_for_steps(rows):
+            _paper_curve(axes, kind, variant, None, colour, marker)
         _mark_survivors(axes, rows, variant, variants_of(summary))
     axes.set_xlabel("mass [kg]")
     axes.set_ylabel("norm of the four errors [SI units]")

@@ -14,7 +14,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
-from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS
+from iowbc.evaluation.report.captions import in_common
+from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL, asks_for_transport
 from iowbc.evaluation.report.statistics import RESAMPLES, interquartile_mean, percentile_interval
 from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
@@ -58,8 +59,10 @@ class Block:
 def interquartile_table(trials: pd.DataFrame) -> Table | None:
     """A row for each suite and variant, then for each of its trainings where there are several; None without suites."""
     rows, numbers = [], []
-    for suite in dict.fromkeys(trials.loc[trials["kind"].isin(KINDS), "suite"]):
-        found = blocks(trials[trials["suite"] == suite])
+    played = trials[trials["kind"].isin(KINDS)]
+    for suite in dict.fromkeys(played["suite"]):
+        within = played[played["suite"] == suite]
+        found = blocks(within)
         first = next(iter(found), "")
         for variant, block in found.items():
             several = range(len(block.trainings)) if len(block.trainings) > 1 else range(0)
@@ -75,6 +78,12 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
                 numbers.append({"suite": suite, "variant": name, "seeds": len(part.trainings), "trials": count})
                 for key, one in estimates.items():
                     numbers[-1] |= {key: one.value, f"{key}_low": one.low, f"{key}_high": one.high}
+        if found:
+            still = {name: float(interquartile_mean(within[f"still_{name}"].to_numpy(np.float64))) for name in ERRORS}
+            achieved = "none" if asks_for_transport(within) else ABSENT
+            cells = [f"{value:.3f}" for value in still.values()]
+            rows.append((suite, STANDS_STILL, ABSENT, ABSENT, achieved, *cells, ABSENT))
+            numbers.append({"suite": suite, "variant": STANDS_STILL, **still})
     if not rows:
         return None
     columns = ("Suite", "Algorithm", "Seeds", "Trials", "Success")
@@ -84,7 +93,8 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
         "errors (of the middle half of all trials), with 95 % intervals by bootstrap over trainings and worlds. A "
         f"trial that was not survived counts as worse than any other; {FAILS}: such trials reach into the middle half. "
         "P: probability that a trial has a smaller norm of the four errors than one of the first algorithm at the same "
-        "mass. Few trainings say little of how much another one would differ: their own rows stand below.",
+        "mass. Few trainings say little of how much another one would differ: their own rows stand below. "
+        f"{STANDS_STILL}: what doing nothing scores, from the script. {in_common(played)}",
         (*columns, *HEADS.values(), "P"),
         (*columns, *LATEX_HEADS.values(), "P"),
         tuple(rows),

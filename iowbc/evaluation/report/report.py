@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import TRAINING, aggregate, suites_of, with_trainings
+from iowbc.evaluation.report.aggregate import TRAINING, aggregate, asks_for_steps, suites_of, with_trainings
 from iowbc.evaluation.report.beside_paper import paper_table
 from iowbc.evaluation.report.differences import difference_table
 from iowbc.evaluation.report.error_tables import NO_LABELS, error_table, moving_table, slug
@@ -46,11 +46,10 @@ def report_tables(
 ) -> list[Table]:
     """All tables that the trials give; of walking and of joints only where somebody was to walk, or survived."""
     swept, kinds = suites_of(summary, "lifting", "pushing"), set(summary["kind"])
-    walked = set(summary.loc[summary["still_E_v_moving"].notna(), "suite"])
     tables = [error_table(summary, suite, labels) for suite in swept]
     beside = paper_table(summary, labels)
     tables += [] if beside is None else [beside]
-    tables += [moving_table(summary, suite) for suite in swept if suite in walked]
+    tables += [moving_table(summary, suite) for suite in swept if asks_for_steps(summary[summary["suite"] == suite])]
     tables += [error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")]
     if "heavy" in kinds:
         tables += [success_table(summary, labels), error_table(summary, "heavy", name="heavy_errors")]

@@ -71,11 +71,16 @@ def survived(success: Success, outcome: Outcome) -> bool:
 
 
 def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
-    """Whether a trial that was survived is a success: transport, or in a push that is infeasible posture."""
+    """Whether a trial that was survived is a success: transport of what the hands carry, or in a push that is
+    infeasible posture."""
     if kind == STAGNATION:
         return metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
-    ways = (metrics["transport_robot"], metrics["transport_object"])
-    return all(np.isnan(way) or way >= success.transport for way in ways)
+    shares = (
+        (metrics["transport_robot"], success.transport),
+        (metrics["transport_object"], success.transport),
+        (metrics["weight_in_hands"], success.weight_in_hands),
+    )
+    return all(np.isnan(share) or share >= least for share, least in shares)
 
 
 def replayed(row: "pd.Series[Any]") -> Episode:

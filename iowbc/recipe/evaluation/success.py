@@ -7,15 +7,15 @@ from iowbc.recipe.section import COSMETIC, Section
 
 class Success(Section):
     """Survival: no fall and nothing dropped, by `task.termination`, for the whole trial. Success: survival and
-    transport, or, where a push is infeasible, survival and posture."""
+    transport of what the hands carry, or, where a push is infeasible, survival and posture."""
 
     slip_fails: bool = False
     """Also count a trial as failed in which a hand ever lost the object, even though the other kept it."""
     transport: float = Field(default=0.5, ge=0, le=1)
     """Part of the commanded displacement that robot and object must cover; a robot that stands still covers none."""
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
-    """Part of a held object's weight, less the partner's share, that must rest in the hands on average for a trial to
-    be reported as carried there; the rest lies on thighs or torso."""
+    """Part of a held object's weight, less the partner's share, that must rest in the hands on average; the rest lies
+    on thighs or torso."""
     posture_pitch: float = Field(default=0.3, gt=0)
     """Largest mean error of the torso pitch of a stagnating push that is a success [rad]; twice the paper's E_α."""
     posture_height: float = Field(default=0.05, gt=0)

@@ -129,9 +129,11 @@ class Robustness(Section):
         Case(name="gains 120 %", fixed={"kp_scale": 1.2, "kd_scale": 1.2}),
         Case(name="weak motors", fixed={"motor_strength": 0.7}),
         Case(name="friction 0.4", fixed={"ground_friction": 0.4}),
+        Case(name="held by friction", scene="squeeze"),
         Case(name="60 s", repetitions=3),
     )
     """Conditions with a 4 kg box: twice the training's largest bias of encoders [rad], inertial unit [rad], gyroscope
-    [rad/s], twice its change of gains and loss of strength, less than its least friction, three sequences in a row."""
+    [rad/s], twice its change of gains and loss of strength, less than its least friction, palms that hold the box by
+    nothing but friction, three sequences in a row."""
     pushes: PushLadder | None = PushLadder()
     """Pushes on the base; empty leaves them out."""
