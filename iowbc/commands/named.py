@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from iowbc.deploy.contract import SHORTEST_PREFIX
 from iowbc.errors import UsageError, nearest
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall
@@ -14,9 +15,6 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import PIPELINE
-
-SHORTEST_PREFIX = 4
-"""Characters of a key that are enough to name an artifact, where they are unique."""
 
 
 @dataclass(frozen=True)

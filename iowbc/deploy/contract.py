@@ -22,6 +22,10 @@ from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import DESCRIPTION
 
+EXPORT = "export"
+"""Stage that writes such folders."""
+SHORTEST_PREFIX = 4
+"""Characters of a key that are enough to name an artifact, where they are unique."""
 CONTRACT = "contract.json"
 GRAPH = "policy.onnx"
 GOLDEN = "golden.npz"
@@ -238,11 +242,18 @@ def readable(part: Path) -> Iterator[None]:
 
 def exported_folder(word: Path | str) -> Path:
     """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`; where it was
-    not run here, what came with the repository."""
+    not run here, what came with the repository. `RECIPE/export` and the first characters of a key are names, too, as
+    in all commands. Raises ContractBroken where several keys begin like that."""
     folder, runs = Path(word), Path(os.environ.get("IOWBC_RUNS") or "runs")
-    made, published = runs / word / "export", sorted(runs.glob("published/export/*"))
-    shipped = [place for place in published if _recipe_name(place) == str(word)]
-    return next((place for place in (folder, made, *shipped) if (place / CONTRACT).is_file()), folder)
+    name = str(word).removesuffix(f"/{EXPORT}")
+    published = sorted(runs.glob(f"published/{EXPORT}/*"))
+    shipped = [place for place in published if _recipe_name(place) == name]
+    stored = {place.name: place for place in (*published, *runs.glob(f"store/{EXPORT}/*"))}
+    keyed = [place for key, place in stored.items() if len(name) >= SHORTEST_PREFIX and key.startswith(name)]
+    found = next((place for place in (folder, runs / name / EXPORT, *shipped) if (place / CONTRACT).is_file()), None)
+    if found is None and len(keyed) > 1:
+        raise ContractBroken(f"{name}: the keys of {len(keyed)} exports begin like that; give more characters")
+    return found or next(iter(keyed), folder)
 
 
 def _recipe_name(folder: Path) -> str | None:

@@ -14,6 +14,7 @@ from iowbc.commands.export import exported_folder as exported_by
 from iowbc.commands.named import named
 from iowbc.commands.play import playable
 from iowbc.deploy.contract import exported_folder
+from iowbc.errors import ContractBroken
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
@@ -105,6 +106,16 @@ def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch
     assert exported_folder("shipped") == shipped
     (shipped / "recipe.json").write_text('{"name": "mine"}')
     assert exported_folder("mine") == Path("runs/mine/export"), "what was made here comes first"
+    assert exported_folder("mine/export") == Path("runs/mine/export")
+    assert exported_folder("0123") == shipped, "a key"
+    assert exported_folder("012") == Path("012"), "too few characters of one"
+    for key in ("0123aa", "4567aa"):
+        stored = Path("runs/store/export", key)
+        stored.mkdir(parents=True)
+        (stored / "contract.json").write_text("{}")
+    assert exported_folder("4567") == stored
+    with pytest.raises(ContractBroken, match="2 exports begin like that"):
+        exported_folder("0123")
     monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
     monkeypatch.chdir("/")
     assert exported_folder("mine") == export
