@@ -15,9 +15,12 @@ from typing import Any
 import pytest
 from network_watch import watched
 
+from iowbc.commands.ui import COLUMNS, view
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.journal import Journal
 from iowbc.pipeline.tracking.tracker import DESCRIPTION
+
+PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 
 
 def free_port() -> int:
@@ -49,6 +52,15 @@ def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
         journal.write("end", id="recipe", status="FINISHED")
     words = [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root)]
     assert subprocess.run(words, env=environment, check=False, timeout=120).returncode == 0
+
+
+def test_the_columns_are_metrics_that_stages_leave() -> None:
+    columns = view()["selectedColumns"]
+    for stage, names in COLUMNS.items():
+        left = [json.loads(path.read_bytes())["metrics"] for path in PUBLISHED.glob(f"{stage}/*/summary.json")]
+        for name in names:
+            assert any(name in metrics for metrics in left), (stage, name)
+            assert f"metrics.`{stage}/{name}`" in columns  # type: ignore[operator]
 
 
 @pytest.mark.slow
@@ -84,6 +96,9 @@ def answers_and_ends(tmp_path: Path, environment: Mapping[str, str]) -> None:
                 time.sleep(0.5)
         page = next(line for line in (tmp_path / "log.txt").read_text().splitlines() if line.startswith(address))
         number = page.partition("#/experiments/")[2].partition("/runs?workflowType=machine_learning")[0]
+        with urllib.request.urlopen(f"{address}/api/2.0/mlflow/experiments/get?experiment_id={number}") as answer:
+            told = {tag["key"]: tag["value"] for tag in json.load(answer)["experiment"]["tags"]}
+        assert json.loads(told[f"mlflow.sharedViewState.{page.partition('viewStateShareKey=')[2]}"]) == view()
         (run,) = ask("/api/2.0/mlflow/runs/search", experiment_ids=[number], max_results=5)["runs"]
         tags = {tag["key"]: tag["value"] for tag in run["data"]["tags"]}
         assert tags[DESCRIPTION] == "| a |"
