@@ -1,5 +1,8 @@
 from pathlib import Path
 
+import pytest
+from matplotlib.figure import Figure
+
 from iowbc.learning.curve_titles import title_of
 from iowbc.learning.curves import Curves
 from iowbc.stages import distill, teacher
@@ -69,3 +72,16 @@ def test_every_figure_that_a_published_training_recorded_has_a_title() -> None:
     for table in (Path(__file__).parents[2] / "runs" / "published").glob("*/*/tables/learning_curves.csv"):
         names = table.read_text().splitlines()[0].split(",")[1:]
         assert [name for name in names if title_of(name) == name] == []
+
+
+@pytest.mark.parametrize(("outlier", "told"), [(1.0, []), (1e6, ["cut: outliers lie beyond"])])
+def test_a_panel_says_where_an_outlier_cut_its_axis(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outlier: float, told: list[str]
+) -> None:
+    shown: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *given, **more: shown.append(figure))
+    curves = Curves(tmp_path / "curves.jsonl", 0)
+    for step in range(200):
+        curves.append(step, {"reward": 1.0 + 0.01 * step if step != 150 else outlier})
+    curves.write_figure(tmp_path / "curves.png", "title", ["reward"])
+    assert [text.get_text() for text in shown[0].axes[0].texts] == told
