@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from iowbc.recipe.beside import ModuleFile
 from iowbc.recipe.section import LATER, OWN_NAME, Section
+from iowbc.recipe.task.own_function import OwnFunction
 
 
 class Kernel(Section):
@@ -97,13 +97,10 @@ class GaitConstraint(Section):
     """Lateral distance of the feet below which `foot_distance` counts [m]."""
 
 
-class OwnTerm(Section):
-    """A term that is a function in a file of one's own."""
+class OwnTerm(OwnFunction):
+    """A term that is a function in a file of one's own. It takes a `Step` (iowbc/task/rewards/table.py) of n
+    environments and returns a value for each, (n,)."""
 
-    module: ModuleFile
-    """Python file beside the recipe, which may import what is installed, and no file beside it."""
-    function: str = Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)
-    """Its function: takes a `Step` (iowbc/task/rewards/table.py) of n environments, returns a value for each, (n,)."""
     weight: float
     """Reward a second at the value 1; at 0 the file is not executed, and no key knows of the term."""
     width: float | None = Field(default=None, gt=0.0)

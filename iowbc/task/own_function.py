@@ -1,0 +1,103 @@
+"""Functions in a user's file: executed when they are loaded, and held against what they must return."""
+
+import functools
+import linecache
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FunctionType, ModuleType
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.errors import StageFailed, nearest
+from iowbc.recipe.beside import ModuleFile
+from iowbc.recipe.task.own_function import OwnFunction
+
+Source = TypeVar("Source")
+"""What a function takes."""
+Shape = tuple[int | None, ...]
+"""Of an array; None where any length will do."""
+LARGEST = float(np.finfo(np.float32).max)
+"""Observations and rewards are float32, in which more is infinite."""
+
+
+@dataclass(frozen=True)
+class Held(Generic[Source]):
+    """A function whose values are held against its contract."""
+
+    where: str
+    """Its place: path in the recipe, file, name."""
+    contract: str
+    """What it takes and returns, in words."""
+    file: ModuleFile
+    function: Callable[[Source], Any]
+
+    def __call__(self, source: Source, *shapes: Shape, excused: Mask | None = None) -> Array:
+        """Its values, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,).
+
+        Raises StageFailed where it raises, or returns something else.
+        """
+        try:
+            found = np.asarray(self.function(source), np.float64)
+        except Exception as error:
+            raise StageFailed(f"{self.where}: raised {_told(error, self.file)}; {self.contract}") from error
+        if not any(_fits(found.shape, shape) for shape in shapes):
+            expected = " or ".join(str(shape).replace("None", "k") for shape in shapes)
+            raise StageFailed(f"{self.where}: returned shape {found.shape}, expected {expected}; {self.contract}")
+        count = len(found)
+        wrong = ~(np.abs(found) <= LARGEST).reshape(count, -1).all(axis=1)
+        if excused is not None:
+            wrong &= ~excused
+        if wrong.any():
+            first = int(np.flatnonzero(wrong)[0])
+            text = f"returned {found[first]} for environment {first} of {count}"
+            raise StageFailed(f"{self.where}: {text}; {self.contract}")
+        return found
+
+
+def load_function(path: str, own: OwnFunction, contract: str) -> Held[Any]:
+    """Executes the file of a function. `path`: in the recipe; `contract`: see `Held`.
+
+    Raises StageFailed where it cannot be used.
+    """
+    where = f"{path}: {own.module.path}"
+    try:
+        module = _executed(own.module)
+    except Exception as error:
+        raise StageFailed(f"{where}: cannot be executed: {_told(error, own.module)}") from error
+    functions = [known for known, value in vars(module).items() if isinstance(value, FunctionType)]
+    function = getattr(module, own.function, None)
+    if not callable(function):
+        known = ", ".join(functions) or "none"
+        hint = nearest(own.function, functions)
+        raise StageFailed(f"{where}: has no function {own.function!r}; there are: {known}{hint}; {contract}")
+    return Held(f"{where}, function {own.function}", contract, own.module, function)
+
+
+def _fits(found: tuple[int, ...], shape: Shape) -> bool:
+    return len(found) == len(shape) and all(wanted in (None, size) for size, wanted in zip(found, shape, strict=True))
+
+
+@functools.cache
+def _executed(file: ModuleFile) -> Any:
+    """The module of a file; its lines are shown in tracebacks."""
+    source = file.unpacked().decode("utf-8")
+    name = f"<{file.path} {file.sha256[:8]}>"
+    linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
+    module = ModuleType(f"iowbc_own_{file.sha256[:16]}")
+    exec(compile(source, name, "exec"), vars(module))
+    return module
+
+
+def _told(error: Exception, file: ModuleFile) -> str:
+    """An error of the user's code, with the last line of the file that led to it."""
+    text = error.msg if isinstance(error, SyntaxError) else str(error)
+    lines = [error.lineno] if isinstance(error, SyntaxError) else []
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == f"<{file.path} {file.sha256[:8]}>":
+            lines.append(trace.tb_lineno)
+        trace = trace.tb_next
+    line = f" in line {lines[-1]}" if lines else ""
+    return f"{type(error).__name__}: {text}{line}"
