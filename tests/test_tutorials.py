@@ -1,5 +1,6 @@
 """The tutorials, as a reader follows them, at the smallest size."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -74,6 +75,9 @@ def test_change_a_reward(place: Path, tmp_path: Path) -> None:
     assert (changed.smooth.action_rate, changed.sync.height.weight) == (-0.05, 2.0)
     curves = trained(place / "recipes" / "symmetric.yaml", tmp_path / "job")
     assert "reward/own.leg_symmetry" in curves.splitlines()[0]
+    trained(place / "recipes" / "feet.yaml", tmp_path / "feet")
+    told = json.loads((tmp_path / "feet" / "out" / "teacher.json").read_text())["layout"]["privileged"]
+    assert (told[-1]["name"], told[-1]["size"]) == ("foot_height", 2)
 
 
 def test_add_an_object(place: Path) -> None:

@@ -107,7 +107,9 @@ def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
     from iowbc.evaluation.play import Source
 
-    return Source(world_of(artifact.recipe, generator), artifact.folder)
+    world = world_of(artifact.recipe, generator)
+    student = artifact.manifest.stage == "distill" or world.recipe.teacher.history is not None
+    return Source(world.deployed if student else world, artifact.folder)
 
 
 def _training_source(store: Store, training: InTraining, recipe: Mapping[str, Any]) -> "Source":

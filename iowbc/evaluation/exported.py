@@ -29,7 +29,7 @@ def exported_world(folder: Path) -> Specification:
         raise ContractBroken(f"{path}: not a recipe of this version: {error}; export again") from error
     generator = contract.generator_folder(said, folder)
     with contract.readable(folder):
-        return Specification(recipe, folder / contract.ROBOT, generator)
+        return Specification(recipe.deployed, folder / contract.ROBOT, generator)
 
 
 class ExportedPolicy:

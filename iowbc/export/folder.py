@@ -82,7 +82,7 @@ def world_of(recipe: Recipe) -> Recipe:
         robot=recipe.robot,
         rg=ReferenceGenerator(height=recipe.rg.height),
         simulation=recipe.simulation,
-        task=recipe.task,
+        task=recipe.deployed.task,
         eval=Evaluation(sequence=played[0].sequence) if played else Evaluation(),
         export=recipe.export,
     )

@@ -71,7 +71,7 @@ class FileBeside(Section):
 
 
 class ModuleFile(FileBeside):
-    """Python code. Reading a recipe or an artifact does not execute it, and neither do plans and trials."""
+    """Python code. Reading a recipe or an artifact does not execute it, and neither do plans."""
 
     suffixes: ClassVar[tuple[str, ...]] = (".py",)
     largest: ClassVar[int] = 100_000

@@ -56,6 +56,12 @@ class Recipe(Section):
     execution: Execution = Execution()
     """How this machine runs it; never changes a result, and is not part of any key."""
 
+    @property
+    def deployed(self) -> Self:
+        """The same for a policy that does not see s_priv: without the parts of it that are in a user's file."""
+        observation = self.task.observation.model_copy(update={"own": {}})
+        return self.model_copy(update={"task": self.task.model_copy(update={"observation": observation})})
+
     @model_validator(mode="after")
     def _students_units_in_pairs(self) -> Self:
         student = self.distill

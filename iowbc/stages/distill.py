@@ -26,7 +26,7 @@ FACTS = ("object_mass", "base_linear_velocity")
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """A teacher that is a student already, or what s_priv does not hold."""
-    yield from not_privileged("distill.withheld", recipe.distill.withheld)
+    yield from not_privileged(recipe, "distill.withheld", recipe.distill.withheld)
     if recipe.teacher.history is not None:
         text = "with teacher.history PPO trains the student's network itself, and nothing is to be distilled: leave "
         yield "stages", f"{text}`distill` out, or set teacher.history to null"

@@ -62,7 +62,7 @@ def run(job: Job) -> None:
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, recipe, rg, sources)
     try:
-        world = Specification(recipe, job.robot, rg)
+        world = Specification(recipe, job.robot, rg).deployed
         policy, played = try_out(world, job.out, job.interrupted)
         by_torch = try_out_network(world, policy_of(student, about["architecture"]), job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)

@@ -22,13 +22,13 @@ def leaves_student(recipe: Recipe) -> bool:
     return "distill" in recipe.stages or recipe.teacher.history is not None
 
 
-def not_privileged(path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+def not_privileged(recipe: Recipe, path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Which of the names at a dotted path of the recipe are no parts of s_priv, as a stage's problems."""
     if not names:
         return
     from iowbc.task.privileged import PRIVILEGED
 
-    parts = [part.name for part in PRIVILEGED]
+    parts = [*(part.name for part in PRIVILEGED), *recipe.task.observation.own]
     for name in names:
         if name not in parts:
             yield path, f"{name!r} is no part of s_priv: {', '.join(parts)}"

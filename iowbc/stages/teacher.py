@@ -43,8 +43,12 @@ PANELS = (
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """What s_priv does not hold."""
-    return not_privileged("teacher.value_only", recipe.teacher.value_only)
+    """What s_priv does not hold, or has a name that another part of it has."""
+    yield from not_privileged(recipe, "teacher.value_only", recipe.teacher.value_only)
+    if recipe.task.observation.own:
+        from iowbc.task.own_parts import taken_names
+
+        yield from taken_names(recipe.task.observation)
 
 
 def run(job: Job) -> None:

@@ -12,6 +12,7 @@ from iowbc.control.observation import ObservationLayout, observation_layout
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import MirrorMap, side_by_side
+from iowbc.task.own_parts import own_parts
 from iowbc.task.privileged import PrivilegedLayout, privileged_layout
 
 
@@ -60,5 +61,7 @@ class FullLayout:
 
 
 def full_layout(recipe: Recipe, robot: Robot) -> FullLayout:
-    """Layout of the rows that the environments of a recipe deliver."""
-    return FullLayout(observation_layout(robot, recipe.task.observation.observe_object), privileged_layout(robot))
+    """Layout of the rows that the environments of a recipe deliver. Raises StageFailed for a part of the recipe's own
+    that cannot have its name."""
+    seen = recipe.task.observation
+    return FullLayout(observation_layout(robot, seen.observe_object), privileged_layout(robot, own_parts(seen)))

@@ -3,7 +3,7 @@
 To add a part, write a function that computes it from `Truth` and a line of the list.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from iowbc.arrays import Array
@@ -76,6 +76,6 @@ PRIVILEGED: tuple[Part[Truth], ...] = (
 PrivilegedLayout = Layout[Truth]
 
 
-def privileged_layout(robot: Robot) -> PrivilegedLayout:
-    """Layout of s_priv."""
-    return Layout(PRIVILEGED, robot)
+def privileged_layout(robot: Robot, own: Sequence[Part[Truth]] = ()) -> PrivilegedLayout:
+    """Layout of s_priv; `own`: parts of a recipe's own, which come last."""
+    return Layout((*PRIVILEGED, *own), robot)

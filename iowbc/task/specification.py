@@ -1,6 +1,6 @@
 """What an environment is made from: a recipe, a robot and a reference generator."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,6 +16,12 @@ class Specification:
     """Folder of the robot's description."""
     rg: Path | None = None
     """Folder of the fitted reference generator; without one θ_S_ref is the default posture."""
+
+    @property
+    def deployed(self) -> Self:
+        """The same for a policy that does not see s_priv: without the parts of it that are in a user's file, which
+        nothing then executes."""
+        return replace(self, recipe=self.recipe.deployed)
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, read back by `from_json`; folders in full, for another process."""

@@ -4,18 +4,22 @@ import io
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from own_parts import own_part
 from rich.console import Console
 
 from iowbc.commands import filming
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import in_training
-from iowbc.commands.play import named_source
+from iowbc.commands.play import _source, named_source
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
+from iowbc.recipe.recipe import Recipe
 
 
 def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
@@ -48,6 +52,17 @@ def test_a_training_without_a_checkpoint_yet_is_told_in_one_sentence(folder: Pat
     with pytest.raises(UsageError, match=r"^teacher of third was interrupted; there is neither a checkpoint that can"):
         named_source(store, console, "third/teacher", None)
     assert not console.file.getvalue()  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("stage", "history", "told"), [("teacher", None, 1), ("teacher", {}, 0), ("distill", None, 0)])
+def test_only_a_policy_that_sees_s_priv_is_played_with_its_parts_in_a_users_file(
+    tmp_path: Path, stage: str, history: Any, told: int
+) -> None:
+    values = Recipe(name="mine").model_dump(mode="json")
+    values["teacher"]["history"] = history
+    values["task"]["observation"]["own"] = {"mine": own_part(tmp_path)}
+    artifact: Any = SimpleNamespace(manifest=SimpleNamespace(stage=stage), recipe=values, folder=tmp_path)
+    assert len(_source(artifact, None).world.recipe.task.observation.own) == told
 
 
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:

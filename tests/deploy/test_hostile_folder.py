@@ -11,13 +11,16 @@ import numpy as np
 import onnx
 import pytest
 import yaml
+from own_parts import own_part
 
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.deploy.contract import CONTRACT, Contract, read_contract, seal
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
 from iowbc.evaluation.exported import exported_world
+from iowbc.evaluation.golden_rollout import golden_episode
 from iowbc.robot.description import DESCRIPTION, robot_folder
+from iowbc.task.vector.vector_env import VectorEnv
 
 
 class Bomb:
@@ -114,6 +117,13 @@ def test_nothing_is_read_that_the_contract_has_no_digest_of(exported: Path, tmp_
     (folder / CONTRACT).write_text(json.dumps(told))
     with pytest.raises(ContractBroken, match=f"says nothing of {name}"):
         exported_world(folder)
+
+
+def test_a_part_of_s_priv_in_a_users_file_is_not_executed(exported: Path, tmp_path: Path) -> None:
+    values = json.loads((exported / "recipe.json").read_text())
+    values["task"]["observation"]["own"] = {"mine": own_part(tmp_path, "raise SystemExit('it was executed')")}
+    world = exported_world(sealed(exported, tmp_path / "folder", "recipe.json", json.dumps(values).encode()))
+    VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=[golden_episode(world.recipe)]).reset()
 
 
 def test_a_graph_with_other_outputs_is_refused(exported: Path, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from exported_policies import untrained
+from own_parts import own_part
 
 from iowbc.export import folder as module
 from iowbc.recipe.recipe import Recipe
@@ -26,3 +27,18 @@ def test_an_export_takes_along_a_list_of_files_and_no_folder(
     generator = {"rg/rg.json", "rg/rg.safetensors", "rg/feasible.npz"}
     assert set(contract.files) == {"policy.onnx", "recipe.json", "robot/robot.yaml", "robot/g1.xml"} | generator
     assert not list((tmp_path / "out").rglob("password.txt"))
+
+
+def test_a_part_of_s_priv_in_a_users_file_changes_nothing_in_an_export(
+    recipe: Recipe, robot: Robot, rg: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "write_onnx", lambda graph, path, *rest: path.write_bytes(b"a graph"))
+    values = recipe.model_dump(mode="json")
+    values["task"]["observation"]["own"] = {"mine": own_part(tmp_path)}
+    found = []
+    for name, one in (("without", recipe), ("with", Recipe.model_validate(values))):
+        (tmp_path / name).mkdir()
+        module.write_folder(tmp_path / name, untrained(one, robot, rg), one, rg, {})
+        found.append({path.name: path.read_bytes() for path in (tmp_path / name).rglob("*.*") if path.is_file()})
+    assert {"contract.json", "recipe.json"} < found[0].keys()
+    assert found[0] == found[1]

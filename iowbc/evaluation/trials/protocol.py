@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -19,12 +20,13 @@ from iowbc.task.vector.setup import shares
 
 
 def evaluated_world(specification: Specification) -> Specification:
-    """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's."""
+    """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's.
+    A student's has no part of s_priv that is in a user's file."""
     recipe = specification.recipe
+    world = specification.deployed if recipe.eval.policy == "student" else specification
     if recipe.eval.simulation is None:
-        return specification
-    pinned = recipe.model_copy(update={"simulation": recipe.eval.simulation})
-    return Specification(pinned, specification.robot, specification.rg)
+        return world
+    return replace(world, recipe=world.recipe.model_copy(update={"simulation": recipe.eval.simulation}))
 
 
 Batches = Mapping[str, Sequence[Trial]]

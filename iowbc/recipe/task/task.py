@@ -57,7 +57,7 @@ class Task(Section):
     action: Action = Action()
     """The residual action."""
     observation: Observation = Observation()
-    """What the policy sees."""
+    """What policy and teacher see."""
     reward: Reward = Reward()
     """Terms and weights of the reward."""
     termination: Termination = Termination()

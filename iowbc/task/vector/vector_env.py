@@ -19,6 +19,7 @@ from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
+from iowbc.task.own_parts import load_parts
 from iowbc.task.record.signals import REASONS, SIGNALS
 from iowbc.task.record.statistics import Statistics
 from iowbc.task.rewards.own import load_terms
@@ -52,14 +53,16 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         environment, played anew after every reset. `divergences`: folder for simulations that diverged.
 
         The rollout does not depend on `workers`. Raises WorkerFailed when a worker dies, hangs for `patience` [s] or
-        raises, and StageFailed where episodes are drawn and a term of the reward in a user's file cannot be used.
+        raises, and StageFailed where a function in a user's file cannot be used: a part of s_priv, or a term of the
+        reward where episodes are drawn.
         """
         trials = None if episodes is None else tuple(episodes)
         self.setup = Setup(specification, num_envs, seed, trials, divergences)
         recipe = specification.recipe
-        if trials is None:
-            load_terms(recipe.task.reward)  # what is wrong with them is told here, before processes start
         self.layout = full_layout(recipe, load_robot(specification.robot))
+        load_parts(recipe.task.observation)  # what is wrong with them is told here, before processes start
+        if trials is None:
+            load_terms(recipe.task.reward)
         self._scenes = self.setup.scenes
         self.workers = _workers(self.setup, workers, patience)
         self._buffers = self.workers.buffers

@@ -1,0 +1,71 @@
+"""Parts of s_priv in a user's file. Its execution waits until a row is filled: who reads a layout executes nothing."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from iowbc.arrays import Array
+from iowbc.control.layout import Part
+from iowbc.errors import StageFailed
+from iowbc.recipe.task.observation import Observation, OwnPart
+from iowbc.robot.mirror import in_place
+from iowbc.task.own_function import Held, load_function
+from iowbc.task.privileged import PRIVILEGED, Truth
+
+CONTRACT = (
+    "it takes the Truth (iowbc/task/privileged.py) of n environments and returns finite numbers, shape (n, k), "
+    "where k is the number of signs in `mirror`"
+)
+
+
+@dataclass(frozen=True)
+class OwnValue:
+    """The values of a part."""
+
+    path: str
+    """In the recipe."""
+    said: OwnPart
+
+    @cached_property
+    def function(self) -> Held[Truth]:
+        """The user's function. Raises StageFailed where it cannot be used."""
+        return load_function(self.path, self.said, CONTRACT)
+
+    def __call__(self, truth: Truth) -> Array:
+        return self.function(truth, (len(truth.motor_effort), len(self.said.mirror)))
+
+
+def own_parts(recipe: Observation) -> tuple[Part[Truth], ...]:
+    """The recipe's own parts in alphabetical order, for a key does not know in which they were written.
+
+    Raises StageFailed for a name that is taken.
+    """
+    for path, text in taken_names(recipe):
+        raise StageFailed(f"{path}: {text}")
+    return tuple(_part(name, recipe.own[name]) for name in sorted(recipe.own))
+
+
+def load_parts(recipe: Observation) -> None:
+    """Executes their files. Raises StageFailed for one that cannot be used."""
+    for name, part in recipe.own.items():
+        load_function(_path(name), part, CONTRACT)
+
+
+def taken_names(recipe: Observation) -> Iterator[tuple[str, str]]:
+    """Dotted paths of own parts that have the name of another one, and what is wrong there."""
+    known = [part.name for part in PRIVILEGED]
+    for name in recipe.own:
+        if name in known:
+            yield _path(name), "s_priv has a part of this name already; take another"
+
+
+def _part(name: str, said: OwnPart) -> Part[Truth]:
+    """Its unit and its frame, which only its author knows, are told by what they follow from: with another file or
+    other signs it is another observation."""
+    unit = f"of {said.function} in {said.module.sha256[:12]}"
+    frame = f"mirror {', '.join(map(str, said.mirror))}"
+    return Part(name, in_place(*said.mirror), unit, frame, OwnValue(_path(name), said))
+
+
+def _path(name: str) -> str:
+    return f"task.observation.own.{name}"
