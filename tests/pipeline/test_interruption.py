@@ -38,6 +38,21 @@ def test_a_signal_leaves_a_checkpoint_and_the_command_that_resumes(
     assert workplace.store.artifacts("teacher")[0].manifest.attempts == 2
 
 
+def test_a_resumed_run_shows_the_curve_from_its_first_step_on(workplace: Workplace) -> None:
+    command = workplace.start("run", "small.yaml", behaviour=SLOW)
+    until(lambda: workplace.checkpoint("teacher") > 2)
+    command.signal(signal.SIGINT)
+    assert command.finish() == 130
+    reached = workplace.checkpoint("teacher")
+
+    again = workplace.start("run", "small.yaml", behaviour=SLOW)
+    until(lambda: workplace.checkpoint("teacher") > reached + 2)
+    again.signal(signal.SIGINT)
+    assert again.finish() == 130
+    steps = [step for step, _ in workplace.progress("teacher")["curve"]]  # type: ignore[index]
+    assert steps[0] < reached < steps[-1]
+
+
 def test_a_second_signal_aborts_at_once(workplace: Workplace) -> None:
     command = workplace.start("run", "small.yaml", behaviour={"teacher": {"steps": 3, "pause": 60}})
     until(lambda: workplace.progress("teacher"))
