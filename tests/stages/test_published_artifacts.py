@@ -9,8 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
+from iowbc.commands.play import playable
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.report.aggregate import aggregate
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
 
 ROOT = Path(__file__).parents[2]
 
@@ -40,10 +43,15 @@ def test_a_fresh_clone_makes_the_published_figures_from_the_published_trials(fol
     pd.testing.assert_frame_equal(made[published.columns], published, rtol=1e-12)
 
 
-def test_a_fresh_clone_has_a_controller_to_try(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("IOWBC_RUNS", str(ROOT / "runs"))
+def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
+    monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
     controller = Controller.load("quickstart")
     assert controller.robot.name == "g1"
+    played = playable(Store(Runs(tmp_path / "runs")), "quickstart", None)
+    assert (played.manifest.stage, played.manifest.recipe, played.published) == ("export", "quickstart", True)
+    assert sum(path.stat().st_size for path in played.folder.rglob("*") if path.is_file()) < 1e6
     folders = list((ROOT / "runs" / "published" / "export").iterdir())
     metrics = [json.loads((folder / "summary.json").read_text())["metrics"] for folder in folders]
     assert min(one["acceptance_survived"] for one in metrics) >= 4
