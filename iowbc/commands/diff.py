@@ -14,7 +14,7 @@ from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.named import Named, named
-from iowbc.commands.tables import hanging
+from iowbc.commands.tables import NARROWEST, folded, hanging
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.ingredients import changed_code
@@ -29,6 +29,10 @@ ABSENT = "(absent)"
 """In place of a value that one of the two has not."""
 INDENT = 2
 """Characters by which differences stand to the right of their stage."""
+GAP = 2
+"""Characters between two columns."""
+WHOLE = 14
+"""A value of at most so many characters, such as a number or the beginning of a key, is never folded."""
 
 
 def diff(store: Store, console: Console, first: str, second: str, as_json: bool = False) -> None:
@@ -74,14 +78,20 @@ class Difference:
 
 
 def _draw(console: Console, place: str, found: Sequence[Difference]) -> None:
-    """The differences of one place, old and new values below one another, and what has none below them."""
-    table = Table.grid(padding=(0, 2, 0, 0))
+    """The differences of one place, old and new values below one another, and what has none below them.
+
+    Long values are folded before names, and names before numbers and keys, which stay whole.
+    """
+    whole = max((len(text) for one in found for text in (one.old, one.new) if len(text) <= WHOLE), default=0)
+    steps = max(len(one.step) for one in found)
+    names = max(console.width - INDENT - 3 * GAP - 2 * whole - steps, NARROWEST)
+    table = Table.grid(padding=(0, GAP, 0, 0))
     table.add_column(no_wrap=True)
     for _ in range(3):
         table.add_column(overflow="fold")
     for one in found:
         if one.has_values:
-            table.add_row(*map(Text, (one.name, one.old, one.new, one.step)))
+            table.add_row(*map(Text, (folded(one.name, names), one.old, one.new, one.step)))
     console.print(Text(place or "recipe", style="bold"))
     console.print(Padding(table, (0, 0, 0, INDENT)))
     for one in found:

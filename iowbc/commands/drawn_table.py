@@ -9,10 +9,14 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.commands.tables import NARROWEST, folded
+
 INTERVAL = re.compile(r" ± [\d.]+(?:e[-+]\d+)?")
 """Half an interval behind a mean."""
 PAPER = "paper "
 """What the head of a column begins with that holds the paper's own figure."""
+NAMES = 1
+"""The column that may go on in the next line."""
 
 
 @dataclass(frozen=True)
@@ -35,28 +39,50 @@ def read_table(markdown: str) -> Cells:
 def drawn(cells: Cells, width: int) -> Group:
     """A table of at most so many characters, below the first words of its caption.
 
-    What does not fit goes in this order: the paper's figures, the intervals, columns from the right.
+    Numbers stay whole; the names in the second column are folded. What does not fit even so goes in this order: the
+    paper's figures, the intervals, columns from the right, of which those with a column of differences go first.
     """
     title = re.split(r"[:.](?: |$)", cells.caption, maxsplit=1)[0]
     head, rows = cells.head, cells.rows
-    if _width(head, rows) > width:
+    if _least_width(head, rows) > width:
         own = [place for place, name in enumerate(head) if not name.startswith(PAPER)]
         head, rows = tuple(head[place] for place in own), tuple(tuple(row[place] for place in own) for row in rows)
-    if _width(head, rows) > width:
+    if _least_width(head, rows) > width:
         rows = tuple(tuple(INTERVAL.sub("", cell) for cell in row) for row in rows)
-    while len(head) > 2 and _width(head, rows) > width:
-        head, rows = head[:-1], tuple(row[:-1] for row in rows)
+    while len(head) > 2 and _least_width(head, rows) > width:
+        place = next((place for place in reversed(range(len(head))) if f"Δ {head[place]}" in head), len(head) - 1)
+        head, rows = _without(head, place), tuple(_without(row, place) for row in rows)
+    names = NARROWEST + max(_spare(head, rows) - max(_width(head, rows) - width, 0), 0)
     table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
     for place, name in enumerate(head):
         table.add_column(Text(name), justify="left" if place < 2 else "right", overflow="fold")
     for row in rows:
-        table.add_row(*map(Text, row))
+        table.add_row(*(Text(folded(cell, names) if place == NAMES else cell) for place, cell in enumerate(row)))
     left_out = ", ".join(name for name in cells.head if name not in head)
     below = [Text(f"(wider terminals show {left_out})", style="dim")] if left_out else []
     above = [Text(title, style="italic")] if title else []
     return Group(*above, table, *below)
 
 
+def _without(cells: tuple[str, ...], place: int) -> tuple[str, ...]:
+    return cells[:place] + cells[place + 1 :]
+
+
+def _widths(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[int]:
+    """Characters of each column on one line a row."""
+    return [max(map(cell_len, column)) for column in zip(head, *rows, strict=True)]
+
+
 def _width(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
     """Characters that the table takes on one line a row."""
-    return sum(max(cell_len(cell) for cell in column) + 2 for column in zip(head, *rows, strict=True))
+    return sum(width + 2 for width in _widths(head, rows))
+
+
+def _least_width(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
+    """The same with its names folded."""
+    return _width(head, rows) - _spare(head, rows)
+
+
+def _spare(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
+    """Characters by which its names can be folded."""
+    return max([0, *(width - NARROWEST for width in _widths(head, rows)[NAMES : NAMES + 1])])

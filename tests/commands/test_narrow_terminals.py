@@ -1,8 +1,9 @@
-"""Plans and differences read well on 80 characters, and numbers as people write them."""
+"""What commands tell reads well on 80 characters, and numbers as people write them."""
 
 import io
 import json
 import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,10 +12,15 @@ from typing import cast
 import pytest
 from rich.console import Console
 
+from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
+from iowbc.commands.drawn_table import Cells, drawn
 from iowbc.commands.ls import list_artifacts
+from iowbc.commands.named import named
+from iowbc.commands.show import show
+from iowbc.commands.status import print_status
 from iowbc.commands.sweep_plan import PlannedStage, plan_table
-from iowbc.commands.tables import hanging
+from iowbc.commands.tables import folded, hanging
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.planner import Step
 from iowbc.pipeline.stage import Stage
@@ -23,6 +29,121 @@ from iowbc.pipeline.store.store import Store
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 WIDTH = 80
+LONG = "lifting_with_partner_0.5/16kg/E_alpha"
+"""The name of a metric as long as an evaluation's are."""
+
+
+def shown(tell: Callable[[Console], object], terminal: bool = False) -> list[str]:
+    """Lines that a command writes, of which none is too long."""
+    written = io.StringIO()
+    tell(Console(file=written, width=WIDTH, force_terminal=terminal, color_system=None))
+    lines = [line.rstrip() for line in written.getvalue().splitlines()]
+    assert [line for line in lines if len(line) > WIDTH] == []
+    return lines
+
+
+@pytest.fixture
+def measured(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
+    """The folder's store; the teachers of both recipes measured something that has a long name."""
+    monkeypatch.chdir(folder)
+    store = Store(Runs(Path("runs")))
+    for recipe, value in (("first", 0.0123456), ("second", 0.6543219)):
+        metrics = {"count": 3.0, LONG: value, f"other_{LONG}": -1e-7 * value}
+        Path("runs", recipe, "teacher", "summary.json").write_text(json.dumps({"metrics": metrics}))
+    return store
+
+
+def test_a_comparison_keeps_every_number_and_the_difference(measured: Store) -> None:
+    lines = shown(lambda console: compare(measured, console, ["first", "second"]))
+    assert lines[0].split() == ["stage", "metric", "first", "second", "Δ", "second"]
+    (row,) = [line.split() for line in lines if "0.01235" in line]
+    assert row[0] == "teacher"
+    assert row[-3:] == ["0.01235", "0.6543", "+0.642"]
+    assert any(line.split()[-3:] == ["-1.235e-09", "-6.543e-08", "-6.42e-08"] for line in lines)
+    assert "".join(word for line in lines[1:5] for word in line.split() if "_" in word) == f"{LONG}other_{LONG}"
+
+
+@pytest.mark.parametrize(
+    ("width", "head", "folds"),
+    [
+        (98, "stage metric a b Δb c Δc", False),
+        (81, "stage metric a b Δb c Δc", True),
+        (80, "stage metric a b Δb Δc", True),
+        (70, "stage metric a Δb Δc", True),
+        (60, "stage metric a Δb", True),
+        (50, "stage metric a", True),
+    ],
+)
+def test_a_narrow_comparison_folds_names_then_leaves_out_what_a_difference_tells(
+    width: int, head: str, folds: bool
+) -> None:
+    numbers = ("0.012345", "0.654322", "+0.64197", "0.111111", "+0.09876")
+    cells = Cells("", ("stage", "metric", "a", "b", "Δ b", "c", "Δ c"), (("teacher", LONG, *numbers),))
+    written = io.StringIO()
+    Console(file=written, width=width).print(drawn(cells, width))
+    first, row, *others = written.getvalue().splitlines()
+    assert first.replace("Δ ", "Δ").split() == head.split()
+    by_name = dict(zip(["a", "b", "Δb", "c", "Δc"], numbers, strict=True))
+    assert row.split()[2:] == [by_name[name] for name in head.split()[2:]]
+    assert (LONG in row) != folds
+    left_out = ", ".join(name for name in cells.head if name.replace(" ", "") not in head.split())
+    assert others[-1:] == [f"(wider terminals show {left_out})"] or not left_out
+
+
+def test_a_difference_keeps_keys_and_numbers_whole_and_folds_names(measured: Store) -> None:
+    lines = shown(lambda console: diff(measured, console, "first", "second"), terminal=True)
+    teacher = [line.split() for line in lines[lines.index("teacher") :]]
+    key = next(line for line in teacher if line[0] == "key")
+    assert [len(digits) for digits in key[1:]] == [12, 12]
+    (number,) = [line for line in teacher if "0.0123456" in line]
+    assert number[-2:] == ["0.654322", "+0.642"]
+    assert any(line[-3:] == ["-1.23456e-09", "-6.54322e-08", "-6.42e-08"] for line in teacher)
+
+
+@pytest.mark.parametrize("word", ["first", "first/teacher"])
+def test_what_is_shown_of_a_run_keeps_keys_and_metrics_whole(measured: Store, word: str) -> None:
+    lines = shown(lambda console: show(measured, console, word))
+    manifest = named(measured, "first/teacher").artifacts["teacher"].manifest
+    heading = manifest.key if "/" in word else f"teacher {manifest.key[:12]}, made "
+    for text in ("count 3", f"{LONG} 0.0123", f"other_{LONG} -1.23", heading):
+        assert any(text in line for line in lines), text
+    if "/" in word:
+        text = " ".join(" ".join(lines).split())
+        assert all(f"{name} {version}" in text for name, version in manifest.versions.items())
+    else:
+        stages = [line.split()[0] for line in lines if ", made " in line and ", took " in line]
+        assert stages == ["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+
+
+def test_the_status_keeps_how_far_a_stage_is_and_every_recipe(measured: Store) -> None:
+    work = measured.runs.work / ("0123456789abcdef" * 4)
+    work.mkdir(parents=True)
+    record = {
+        "stage": "teacher",
+        "recipe": "quickstart-seed-0-use_rg-true-d06fd9",
+        "key": work.name,
+        "attempts": 2,
+        "done": 35.0,
+        "total": 100.0,
+        "seconds": 7500.0,
+        "updated": time.time() - 7500.0,
+        "note": "12.3 s an episode, 5 % fall, level 1.23, KL 0.012, 4,500 steps/s",
+        "metric": "episode_seconds",
+        "curve": [[step, 0.25 * step] for step in range(200)],
+    }
+    (work / "progress.json").write_text(json.dumps(record))
+    lines = shown(lambda console: print_status(measured, console))
+    text = " ".join(" ".join(lines).split())
+    assert "teacher of quickstart-seed-0-use_rg-true-d06fd9 (0123456789ab): stopped 2 h 05 min ago" in text
+    assert "35 %, 2 h 05 min spent, attempt 2, 12.3 s an episode" in text
+    (curve,) = [line.split() for line in lines if "█" in line]
+    assert (curve[0], curve[-1]) == ("episode_seconds", "49.75")
+    head = next(place for place, line in enumerate(lines) if line.startswith("recipe "))
+    assert lines[head].split() == ["recipe", "finished", "stages", "last"]
+    for recipe in ("first", "second"):
+        (row,) = [line for line in lines[head:] if line.startswith(recipe)]
+        assert "rg-dataset, rg-fit, teacher, distill, eval, export" in row
+        assert row.endswith(" ago")
 
 
 def test_a_difference_is_drawn_on_a_terminal_stage_by_stage(folder: Path, command: Command) -> None:
@@ -75,6 +196,13 @@ def test_a_plan_of_several_recipes_keeps_names_and_times_whole(what: str, name: 
     assert folded == name
     assert rows[0][head.index(stages[0]) :].split("  ")[0].strip() == "~0.5 s"
     assert all(time in rows[0] for time in ("~42 s", "~2 h 05 min", "~10 min", "run"))
+
+
+def test_a_name_is_broken_where_its_parts_meet() -> None:
+    assert folded(LONG, 40) == LONG
+    assert folded(LONG, 34).splitlines() == ["lifting_with_partner_0.5/16kg/", "E_alpha"]
+    assert folded(LONG, 24).splitlines() == ["lifting_with_partner_0.", "5/16kg/E_alpha"]
+    assert folded("abcdefgh", 3).splitlines() == ["abc", "def", "gh"]
 
 
 def test_what_does_not_fit_stands_further_to_the_right() -> None:
