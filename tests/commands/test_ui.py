@@ -9,6 +9,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,8 @@ def answers_and_ends(tmp_path: Path, environment: Mapping[str, str]) -> None:
             return json.load(answer)
 
     log = (tmp_path / "log.txt").open("w")
-    with log, subprocess.Popen(words, env=environment, stdout=log, stderr=log) as server:
+    with log, subprocess.Popen(words, env=environment, stdout=log, stderr=log) as server, ExitStack() as at_last:
+        at_last.callback(server.terminate)
         limit = time.monotonic() + 90.0
         while True:
             try:
@@ -96,7 +98,8 @@ def answers_and_ends(tmp_path: Path, environment: Mapping[str, str]) -> None:
                 time.sleep(0.5)
         page = next(line for line in (tmp_path / "log.txt").read_text().splitlines() if line.startswith(address))
         number = page.partition("#/experiments/")[2].partition("/runs?workflowType=machine_learning")[0]
-        with urllib.request.urlopen(f"{address}/api/2.0/mlflow/experiments/get?experiment_id={number}") as answer:
+        about = f"{address}/api/2.0/mlflow/experiments/get?experiment_id={number}"
+        with urllib.request.urlopen(about, timeout=10) as answer:
             told = {tag["key"]: tag["value"] for tag in json.load(answer)["experiment"]["tags"]}
         assert json.loads(told[f"mlflow.sharedViewState.{page.partition('viewStateShareKey=')[2]}"]) == view()
         (run,) = ask("/api/2.0/mlflow/runs/search", experiment_ids=[number], max_results=5)["runs"]

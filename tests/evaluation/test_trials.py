@@ -144,7 +144,7 @@ def test_trials_are_batched_with_those_that_last_as_long() -> None:
     recipe = Recipe.model_validate({"name": "test", "eval": {"trials": 3, "robustness": {"pushes": None}}})
     trials = [trial for one in planned_sweeps(recipe) for trial in one.trials((0.0, 4.0))] + case_trials(recipe)
     batches = list(batched_by_duration(trials, 16))
-    assert [len(batch) for batch in batches] == [11, 11, 11, 3]
+    assert [len(batch) for batch in batches] == [12, 12, 12, 3]
     assert all(len({trial.episode.duration for trial in batch}) == 1 for batch in batches)
     assert sum(map(len, batches)) == len(trials)
 
