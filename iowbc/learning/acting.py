@@ -56,9 +56,9 @@ class StudentPolicy:
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         del privileged
         if self.history is None:
-            self.history = History(len(observation), self.length, observation.shape[1])
+            self.history = History(len(observation), self.length, self.network.observation)
             self.starts = np.ones(len(observation), np.bool_)
-        frames = self.history.push(observation, self.starts)
+        frames = self.history.push(observation[:, : self.network.observation], self.starts)
         self.starts[:] = False
         with torch.inference_mode():
             mean = self.network(torch.from_numpy(frames))

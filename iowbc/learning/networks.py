@@ -114,11 +114,13 @@ class StudentNetwork(nn.Module):
         mirrors: Any = None,
         privileged: Any = None,
     ) -> None:
-        """`mirrors`: of observation and action, as `mirror_as_json` gives them; the network then commutes with them.
+        """`observation`: size of what it sees of s_t, which may end before the object's pose. `mirrors`: of observation
+        and action, as `mirror_as_json` gives them; the network then commutes with them.
 
         `privileged`: mirror of s_priv, where the body is to see an estimate of it: what a teacher's body sees.
         """
         super().__init__()
+        self.observation = observation
         self.normalizer = Normalizer(observation, clip)
         both = mirrors_from_json(mirrors)
         extra = None if privileged is None else mirror_from_json(privileged)

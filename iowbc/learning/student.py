@@ -29,13 +29,13 @@ class Rows:
     """Where in a row of the environments is what, and how it is mirrored."""
 
     observation: slice
-    """s_t."""
+    """What the student sees of s_t, with which the row begins."""
     privileged: slice
-    """s_priv."""
+    """What the teacher alone sees: the rest of s_t, and s_priv."""
     facts: NDArray[np.int64]
     """What the latent is to tell: places of the object's mass and the base's velocity."""
     withheld: NDArray[np.int64]
-    """Places in s_priv of what the teacher is not told."""
+    """Places in `privileged` of what the teacher is not told."""
     observation_mirror: MirrorMap
     privileged_mirror: MirrorMap
     facts_mirror: MirrorMap

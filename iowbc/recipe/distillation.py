@@ -50,6 +50,9 @@ class Distillation(Section):
     """Parts of s_priv, by name, that the teacher is not told when it drives or answers: it takes each for its mean in
     training. What no history shows, such as a motor's strength, the student cannot answer to as the teacher does; and a
     teacher that walks loses nothing without it."""
+    observe_object: bool = Field(default=True, json_schema_extra=LATER)
+    """Whether the student sees the object where its teacher does (`task.observation.observe_object`). Without, it has
+    proprioception alone (paper III-C.2), and infers the object's pose from its history as it infers s_priv."""
     std: Literal["learnt", "shared"] = "learnt"
     """Standard deviation of the student's Gaussian. `learnt`: its own, which grows where its action is uncertain
     (paper eq. 7). `shared`: the teacher's, and the loss is a squared error that it scales."""

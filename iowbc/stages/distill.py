@@ -35,6 +35,7 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 def run(job: Job) -> None:
     """Distil the teacher; leave the student's network, normalisation and curves."""
     from iowbc.control.action import action_mirror
+    from iowbc.control.observation import observation_layout
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
@@ -49,13 +50,15 @@ def run(job: Job) -> None:
         environments.set_curriculum(about["curriculum"])
         layout = environments.layout
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
+        seen = observation_layout(robot, recipe.task.observation.observe_object and settings.observe_object)
+        unseen = layout.state.parts[len(seen.parts) :]
         rows = Rows(
-            observation=layout.observation,
-            privileged=layout.privileged,
+            observation=slice(0, seen.size),
+            privileged=slice(seen.size, layout.size),
             facts=layout.privileged_places(FACTS),
-            withheld=layout.privileged_places(settings.withheld) - layout.privileged.start,
-            observation_mirror=layout.state.mirror,
-            privileged_mirror=layout.extra.mirror,
+            withheld=layout.privileged_places(settings.withheld) - seen.size,
+            observation_mirror=seen.mirror,
+            privileged_mirror=side_by_side([*(part.kind(robot) for part in unseen), layout.extra.mirror]).as_float32(),
             facts_mirror=side_by_side([own[name] for name in FACTS]),
             action_mirror=action_mirror(robot),
         )
@@ -66,7 +69,8 @@ def run(job: Job) -> None:
     finally:
         environments.close()
 
-    save_network(training.network, training.architecture, job.out, "student", {"layout": layout.describe()})
+    told = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
+    save_network(training.network, training.architecture, job.out, "student", {"layout": told})
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 
 

@@ -22,7 +22,7 @@ def run(job: Job) -> None:
 
     from iowbc.control.action import action_scale
     from iowbc.control.generator import ReferenceNetwork
-    from iowbc.control.observation import observation_layout
+    from iowbc.control.observation import OBJECT, observation_layout
     from iowbc.deploy import contract
     from iowbc.deploy.session import open_session
     from iowbc.deploy.session import run as run_graph
@@ -53,7 +53,7 @@ def run(job: Job) -> None:
         student,
         ReferenceNetwork.load(rg) if rg is not None and task.references.use_rg else None,
         robot,
-        observation_layout(robot, task.observation.observe_object),
+        observation_layout(robot, OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}),
         task.references.gait,
         history=int(about["architecture"]["history"]),
         action_scale=action_scale(robot, task.action),

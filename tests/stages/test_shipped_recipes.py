@@ -40,7 +40,7 @@ VARIANTS = {
         "stages",
         *(f"teacher.history.{name}" for name in ("length", "encoder", "frame_features", "latent")),
     },
-    "blind": {"task.observation.observe_object"},
+    "blind": {"distill.observe_object"},
 }
 """What each variant changes, beside its name, description and label."""
 NAMES = {"name", "description", "eval.label"}

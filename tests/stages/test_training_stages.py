@@ -19,7 +19,7 @@ from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
 from iowbc.errors import StageFailed
-from iowbc.learning.acting import StudentPolicy, load_policy
+from iowbc.learning.acting import StudentPolicy, load_policy, policy_of
 from iowbc.learning.storage import load_network, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.recipe.execution import Execution
@@ -201,6 +201,42 @@ def test_ppo_of_the_students_network_leaves_a_policy_that_needs_nothing_privileg
     refused = [text for stage in (distill.STAGE, evaluate.STAGE, export.STAGE) for _, text in stage.problems(recipe)]
     assert len(refused) == 1
     assert "nothing is to be distilled" in refused[0]
+
+
+def test_a_student_that_never_sees_the_object_begins_as_the_sighted_teacher_and_ignores_it(
+    trained: Path, tmp_path: Path
+) -> None:
+    recipe = small_recipe()
+    blind = recipe.distill.model_copy(update={"observe_object": False, "learning_rate": 1e-12})
+    inputs = {"teacher": trained / "teacher" / "out"}
+    job = make_job(tmp_path, recipe.model_copy(update={"distill": blind}), inputs=inputs, workers=0)
+    distill.STAGE.run(job)
+    network, about = load_network(job.out)
+    teacher_network, _ = load_teacher(trained / "teacher" / "out")
+    seen = about["layout"]["observation"]
+    assert {"joint_position", "arm_reference"} <= {part["name"] for part in seen}
+    assert not any(part["name"].startswith("object") for part in seen)
+    size = sum(part["size"] for part in seen)
+    layout = full_layout(recipe, load_robot(robot_folder("g1")))
+    assert size == network.observation < layout.state.size
+
+    torch.manual_seed(0)
+    rows = torch.randn(20, layout.size)
+    told = rows.clone()
+    told[:, size:] = teacher_network.normalizer.mean[size:]
+    policy, again = (policy_of(network, about["architecture"]) for _ in range(2))
+    action = policy.act(rows[:, : layout.state.size].numpy(), np.zeros((20, 0), np.float32))
+    np.testing.assert_allclose(action, teacher_network(told).numpy(), atol=1e-5)
+    rows[:, size:] += 5.0
+    np.testing.assert_array_equal(
+        again.act(rows[:, : layout.state.size].numpy(), np.zeros((20, 0), np.float32)), action
+    )
+    mirrored = mirror_tensor(layout.state.mirror, rows[:, : layout.state.size])[:, None, :size]
+    np.testing.assert_allclose(
+        network(mirrored.repeat(1, about["architecture"]["history"], 1)).numpy(),
+        action_mirror(load_robot(robot_folder("g1")))(action),
+        atol=1e-5,
+    )
 
 
 def test_only_parts_of_s_priv_can_be_withheld_from_policy_and_teacher() -> None:

@@ -58,9 +58,10 @@ class Listener:
         self._starts |= which
 
     def act(self, observation: Features, privileged: Features) -> Features:
+        size = observation.shape[1] if self.student is None else self.student.observation
         if self._history is None:
-            self._history = History(len(observation), self.length, observation.shape[1])
-        frames = self._history.push(observation, self._starts)
+            self._history = History(len(observation), self.length, size)
+        frames = self._history.push(observation[:, :size], self._starts)
         self._starts[:] = False
         if self._steps % self.every == 0:
             self.kept.append(self._seen(frames, privileged))
