@@ -38,6 +38,8 @@ STILL_COLOUR = "0.55"
 DPI = 150
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
+ROOMY = 4
+"""Variants whose bars and counts have room in a panel of that width; more make it wider."""
 LABEL_WIDTH = 11
 """Characters in a line under a bar."""
 SHIFT = 0.012
@@ -102,11 +104,12 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     A panel for each that was evaluated.
     """
     sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
-    count = len(sweeps) + bool(sweeps) + 1
+    bars = max(1.0, len(variants_of(summary)) / ROOMY)
+    widths = [*(1.0 for _ in sweeps), *[bars] * bool(sweeps), bars]
     figure = Figure(
-        figsize=(max(PANEL_WIDTH * count, SMALLEST_WIDTH), 4.2), layout=ConstrainedLayoutEngine(wspace=0.06)
+        figsize=(max(PANEL_WIDTH * sum(widths), SMALLEST_WIDTH), 4.2), layout=ConstrainedLayoutEngine(wspace=0.06)
     )
-    panels = list(figure.subplots(1, count, squeeze=False).flat)
+    panels = list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
     for axes, suite in zip(panels, sweeps, strict=False):
         _norm_panel(axes, summary, suite)
     if sweeps:
@@ -126,7 +129,8 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     pushes = suites_of(summary, "pushes")
     panels_needed = [*suites, *pushes]
     widths = [max(2, len(summary.loc[summary["suite"] == suite, "case"].unique())) for suite in panels_needed]
-    figure = Figure(figsize=(max(1.2 * sum(widths), SMALLEST_WIDTH), 4.2), layout="constrained")
+    bars = max(1.0, len(variants_of(summary)) / ROOMY)
+    figure = Figure(figsize=(max(1.2 * bars * sum(widths), SMALLEST_WIDTH), 4.2), layout="constrained")
     panels = list(figure.subplots(1, len(panels_needed), squeeze=False, width_ratios=widths).flat)
     for axes, suite in zip(panels, suites, strict=False):
         _success_panel(axes, summary[summary["suite"] == suite])
