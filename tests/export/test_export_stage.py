@@ -66,7 +66,7 @@ def student(graph: ControllerGraph, tmp_path_factory: pytest.TempPathFactory) ->
         "activation": "elu",
         "clip": 10.0,
     }
-    save_network(graph.student, architecture, folder, "student", {})
+    save_network(graph.student, architecture, folder, "student", {"layout": {"observation": graph.layout.describe()}})
     return folder
 
 
