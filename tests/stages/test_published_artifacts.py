@@ -4,12 +4,14 @@ import json
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
 from iowbc.commands.play import playable
+from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.report.aggregate import aggregate
 from iowbc.pipeline.store.runs import Runs
@@ -18,7 +20,17 @@ from iowbc.pipeline.store.store import Store
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("recipe", "last"), [("full", "eval"), ("teacher", "eval")])
+PUBLISHED_TO = {
+    "full": "export",
+    "teacher": "eval",
+    "wbc": "eval",
+    "wo_rg": "eval",
+    "wo_distill": "eval",
+    "blind": "export",
+}
+
+
+@pytest.mark.parametrize(("recipe", "last"), PUBLISHED_TO.items())
 def test_a_fresh_clone_finds_the_stages_of_a_recipe_published(recipe: str, last: str, tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
@@ -55,3 +67,22 @@ def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pyte
     folders = list((ROOT / "runs" / "published" / "export").iterdir())
     metrics = [json.loads((folder / "summary.json").read_text())["metrics"] for folder in folders]
     assert min(one["acceptance_survived"] for one in metrics) >= 4
+
+
+def test_a_fresh_clone_has_a_controller_that_needs_no_sight_of_the_object(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
+    monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
+    controller = Controller.load("blind")
+    measured = Measured(
+        projected_gravity=np.array([[0.0, 0.0, -1.0]]),
+        base_angular_velocity=np.zeros((1, 3)),
+        heading=np.zeros((1, 1)),
+        joint_position=controller.robot.default_position[None],
+        joint_velocity=np.zeros((1, 29)),
+    )
+    targets = controller.step(measured, np.array([0, 0, 0, 0.72, 0, 0, 0, 0, 0, 0, 0.0]))
+    assert not targets.held.any()
+    assert np.abs(targets.position - controller.robot.default_position).max() < 1.0
