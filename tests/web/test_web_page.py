@@ -107,7 +107,9 @@ def test_a_browser_computes_and_simulates_what_python_does(
         assert away.max() < PHYSICS
 
 
-def test_the_published_controller_walks_with_a_box_in_a_browser_as_it_does_in_python(
+@pytest.mark.parametrize("name", ["full", "blind"])
+def test_a_published_controller_walks_with_a_box_in_a_browser_as_it_does_in_python(
+    name: str,
     cache: Path,
     robot: Robot,
     command: NDArray[np.float64],
@@ -118,7 +120,7 @@ def test_the_published_controller_walks_with_a_box_in_a_browser_as_it_does_in_py
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "published").symlink_to(PUBLISHED)
     monkeypatch.setenv("IOWBC_RUNS", str(tmp_path / "runs"))
-    published, page = exported_folder("full"), tmp_path / "page"
+    published, page = exported_folder(name), tmp_path / "page"
     write_page(published, page, cache, print)
     shutil.copy(Path(__file__).with_name("check.html"), page)
     asked = [{"scene": "lift", "mass": None, "command": command.tolist()}]
