@@ -22,7 +22,8 @@ class Observation(Section):
     """What policy and teacher see."""
 
     observe_object: bool = True
-    """Whether s_t contains the object's pose and rates in the base frame (eq. 5); otherwise proprioception alone."""
+    """Whether s_t contains the object's pose and rates in the base frame (eq. 5); otherwise teacher and student have
+    proprioception alone. `distill.observe_object` is for the student."""
     own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnPart] = Field(
         default_factory=dict, json_schema_extra=LATER
     )
