@@ -35,8 +35,11 @@ class Check(Section):
     films: int = Field(default=0, ge=0, le=100, json_schema_extra=COSMETIC)
     """Films of a trial of a middling load, one each time a further such part of the training is done; each takes some
     15 s without a graphics card. 0 makes none."""
-    sequence: tuple[Segment, ...] = Field(default=STAND_WALK_TURN, min_length=1)
-    """Commands of a trial, in order."""
+    sequence: tuple[Segment, ...] = STAND_WALK_TURN
+    """Commands of a trial, in order; empty takes those of the evaluation, of lifting and of pushing."""
+    fall: float = Field(default=1.0, ge=0, le=1, json_schema_extra=LATER)
+    """What the score of a trial is multiplied by that is not survived. At 1 who falls in the last second of twenty
+    loses a twentieth, less than what walking a little nearer to the velocity brings."""
     collapse: float = Field(default=1 / 3, gt=0, lt=1)
     """Part of the best score whose loss counts as a collapse: the training goes back to its best policy."""
     notable: float = Field(default=0.4, ge=0, lt=1)

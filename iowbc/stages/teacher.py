@@ -72,7 +72,7 @@ def run(job: Job) -> None:
         open_ones.enter_context(closing(environments))
         score, films = None, None
         if settings.check.every is not None:
-            check = open_ones.enter_context(_check(world, job.workers))
+            check = open_ones.enter_context(check_of(world, job.workers))
             score, films = check.play, _films(check, job)
         rows = environments
         if settings.history is not None:
@@ -120,7 +120,7 @@ def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) 
     environments.set_curriculum(about["curriculum"])
 
 
-def _check(world: "Specification", workers: int) -> "QuickEvaluation":
+def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
     """The recipe's check. What it plays follows from `teacher.check` and the task; `eval` has no part in it."""
     from iowbc.evaluation.trials.quick import QuickEvaluation, quick_trials
     from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -137,7 +137,7 @@ def _check(world: "Specification", workers: int) -> "QuickEvaluation":
         for trial in quick_trials(own, scene, masses, check.trials, check.seed)
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
-    return QuickEvaluation(own, trials, workers=min(workers, len(trials)))
+    return QuickEvaluation(own, trials, fall=check.fall, workers=min(workers, len(trials)))
 
 
 def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":

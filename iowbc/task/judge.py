@@ -87,6 +87,7 @@ class Judge:
             stepping=memory.stepping,
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),
+            pushed=state.has_object & ~self._holding,
             object_place=place,
             ended=ending.failed,
         )

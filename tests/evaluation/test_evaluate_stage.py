@@ -239,6 +239,9 @@ def test_the_score_of_a_quick_evaluation_is_one_without_error_and_a_half_at_the_
     assert figures([perfect | SCALES])["score"] == pytest.approx(0.5)
     assert figures([perfect, perfect | {"upright": 0.0}])["score"] == 0.5
     assert figures([perfect | {"transport_robot": np.nan}])["transport"] == 0.0
+    fallen = perfect | {"survived": 0.0, "upright": 0.9}
+    assert figures([fallen])["score"] == pytest.approx(0.9)
+    assert figures([perfect, fallen], fall=0.5)["score"] == pytest.approx((1.0 + 0.45) / 2)
 
 
 def test_progress_grows_within_a_batch(recipe: Recipe, student: Path, done: Job, tmp_path: Path) -> None:

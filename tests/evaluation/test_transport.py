@@ -6,7 +6,7 @@ import pytest
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.errors import given_commands
 from iowbc.evaluation.trials.table import succeeded
-from iowbc.evaluation.trials.transport import commanded_path, covered
+from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.evaluation.success import Success
 from iowbc.task.commands.script import CommandScript, CommandSegment
 
@@ -65,8 +65,23 @@ def test_a_trial_of_standing_asks_for_no_transport() -> None:
     assert np.isnan(covered(np.zeros((10, 2)), directions, length))
 
 
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_what_counts_of_an_object_beside_the_robot_is_the_furthest_it_came_while_steps_were_asked_for(
+    heading: float,
+) -> None:
+    forward, left = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
+    robot = np.linspace(0.0, 2.0, 100)[:, None] * forward
+    aside = np.concatenate([np.linspace(0.0, -0.2, 50), np.full(50, 0.6)])
+    crate = robot + 0.9 * forward + aside[:, None] * left
+    asked = np.arange(100) < 50
+    assert beside(robot, np.full(100, heading), crate, asked) == pytest.approx(0.2)
+    assert beside(robot, np.full(100, heading), crate, ~asked) == pytest.approx(0.6)
+    assert np.isnan(beside(robot, np.full(100, heading), crate, np.zeros(100, np.bool_)))
+
+
 def test_success_asks_for_transport_of_robot_and_object() -> None:
     ways = {"E_alpha": 0.1, "E_h": 0.01, "transport_robot": 0.6, "transport_object": 0.6, "weight_in_hands": 0.99}
+    ways |= {"object_beside": 0.2}
     assert succeeded(Success(), "lifting", ways)
     assert not succeeded(Success(), "lifting", ways | {"transport_robot": 0.4})
     assert not succeeded(Success(), "pushing", ways | {"transport_object": 0.1})
@@ -75,6 +90,9 @@ def test_success_asks_for_transport_of_robot_and_object() -> None:
     assert not succeeded(Success(), "lifting", ways | {"weight_in_hands": 0.9}), "the rest lies in its lap"
     assert succeeded(Success(weight_in_hands=0.8), "lifting", ways | {"weight_in_hands": 0.9})
     assert succeeded(Success(), "pushing", ways | {"weight_in_hands": np.nan}), "nothing is held"
+    assert not succeeded(Success(), "pushing", ways | {"object_beside": 0.4}), "the crate is lost at its side"
+    assert succeeded(Success(object_beside=0.5), "pushing", ways | {"object_beside": 0.4})
+    assert succeeded(Success(), "lifting", ways | {"object_beside": np.nan}), "no object to lose"
 
 
 def test_stagnation_asks_for_posture_and_not_for_transport() -> None:

@@ -19,9 +19,11 @@ from training_jobs import ENVIRONMENTS, rows, small_recipe, stopped_and_resumed
 
 from iowbc.control.action import action_mirror
 from iowbc.errors import StageFailed
+from iowbc.evaluation.trials.plan import command_script
 from iowbc.learning.acting import StudentPolicy, load_policy, policy_of
 from iowbc.learning.storage import load_network, load_teacher
 from iowbc.learning.symmetry import mirror_tensor
+from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
@@ -152,6 +154,17 @@ def test_a_training_is_filmed_at_its_parts_and_learns_the_same(trained: Path, tm
     assert sorted(path.name for path in (job.out / "videos").iterdir()) == [half, end]
     for name in teacher.STAGE.results:
         assert (job.out / name).read_bytes() == (trained / "teacher" / "out" / name).read_bytes(), name
+
+
+def test_a_check_without_a_sequence_plays_those_of_the_evaluation() -> None:
+    check = {"every": 2, "trials": 2, "lifting": [4], "pushing": [30], "sequence": []}
+    recipe = Recipe.model_validate(
+        {"name": "a", "task": {"references": {"use_rg": False}, "scenes": {"push": 0.5}}, "teacher": {"check": check}}
+    )
+    with teacher.check_of(Specification(recipe, robot_folder("g1")), 0) as played:
+        scripts = [trial.episode.script for trial in played.trials]
+    commands = recipe.task.commands
+    assert scripts == 2 * [command_script(LIFTING, commands)] + 2 * [command_script(PUSHING, commands)]
 
 
 def test_a_student_that_was_stopped_and_resumed_is_the_unbroken_one_bit_for_bit(trained: Path, tmp_path: Path) -> None:

@@ -62,6 +62,13 @@ def test_what_rests_on_other_links_than_the_hands_costs_by_its_force_within_boun
     assert equilibrium.link_contact(np.array([0.0, 50.0, 5000.0]), 200.0).tolist() == [0.0, 50.0, 200.0]
 
 
+def test_a_pushed_object_costs_by_how_far_it_is_beside_the_hands_up_to_where_it_is_lost() -> None:
+    away = np.array([[0.8, 0.1, 0.0], [1.4, -0.1, 0.3], [0.8, 2.0, 0.0], [0.8, 0.1, 0.0]])
+    place = np.array([[0.8, -0.1, 0.1]] * 4)
+    pushed = np.array([True, True, True, False])
+    assert equilibrium.beside(away, place, 0.5, pushed) == pytest.approx([0.04, 0.0, 0.25, 0.0])
+
+
 def test_an_object_that_only_turns_about_the_vertical_is_level() -> None:
     turned = np.array([[np.cos(0.4), 0.0, 0.0, np.sin(0.4)]])
     assert equilibrium.orientation(turned, np.array([True]))[0] == pytest.approx(0.0)
@@ -124,6 +131,16 @@ def test_every_weight_of_the_recipe_moves_its_own_term_and_no_other(make: Make) 
         assert after[name] == pytest.approx(factor * before[name]), name
 
 
+@pytest.mark.parametrize("scene", ["free", "lift", "push"])
+def test_only_what_is_pushed_can_be_beside_the_hands(make: Make, scene: str) -> None:
+    scenes = {f"task.scenes.{name}": float(name == scene) for name in ("free", "lift", "push")}
+    env = make(num_envs=2, changes=QUIET | scenes | {"task.reward.object.beside": -20.0})
+    env.reset()
+    rollout(env, 10)
+    cost = env.statistics()["reward/object.beside"]
+    assert cost < 0.0 if scene == "push" else cost == 0.0
+
+
 def test_a_fall_costs_its_price_once_and_is_not_scaled_by_the_period(make: Make) -> None:
     env = make(num_envs=4)
     env.reset()
@@ -161,7 +178,8 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
         update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
     )
     RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]))  # type: ignore[arg-type]
-    assert set(TERMS) - set(called) == {"alive", "sync.support_reference", "sync.lateral_reference"}
+    idle = {"alive", "sync.support_reference", "sync.lateral_reference", "object.beside"}
+    assert set(TERMS) - set(called) == idle
 
 
 def test_every_number_of_the_recipes_reward_that_is_a_weight_has_its_term() -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
 from iowbc.evaluation.trials.errors import (
     deviations_from_clamped,
     deviations_from_given,
@@ -17,7 +17,7 @@ from iowbc.evaluation.trials.errors import (
 from iowbc.evaluation.trials.feet import foot_metrics
 from iowbc.evaluation.trials.load import load_metrics
 from iowbc.evaluation.trials.trace import Trace
-from iowbc.evaluation.trials.transport import commanded_path, covered
+from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.task.commands.script import CommandScript
@@ -64,7 +64,7 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_we
         **deviations_from_clamped(trace, measure.window).means("_clamped"),
         **{f"still_{name}": value for name, value in still_errors.items()},
         "E_v_raw": float(np.mean(velocity_deviation(trace.system_velocity, given, 1))),
-        **transport_metrics(trace, whole),
+        **transport_metrics(trace, whole, steps_asked),
         "distance": walked,
         **foot_metrics(trace, measure.foot_load, walked),
         **load_metrics(trace, held_weight),
@@ -72,14 +72,17 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_we
     }
 
 
-def transport_metrics(trace: Trace, whole: Array) -> dict[str, float]:
-    """The parts of the commanded way that robot and object cover; `whole`: commands of the whole trial (T, 11)."""
+def transport_metrics(trace: Trace, whole: Array, moving: Mask) -> dict[str, float]:
+    """The parts of the commanded way that robot and object cover, and how far the object comes to be at the robot's
+    side [m]; `whole`: commands of the whole trial (T, 11); `moving`: where steps are asked for, (T,)."""
     directions, length = commanded_path(whole, start_heading(trace), trace.dt)
     has_object = bool(np.any(trace.object_position))
+    aside = beside(trace.base_position, trace.heading, trace.object_position, moving)
     return {
         "commanded_distance": length,
         "transport_robot": covered(trace.base_position, directions, length),
         "transport_object": covered(trace.object_position, directions, length) if has_object else np.nan,
+        "object_beside": aside if has_object else np.nan,
     }
 
 

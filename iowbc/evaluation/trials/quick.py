@@ -42,8 +42,9 @@ def quick_trials(world: Specification, scene: str, masses: Sequence[float], coun
 class QuickEvaluation:
     """Plays the same trials with one policy after another. Use as a context manager, or `close` it."""
 
-    def __init__(self, world: Specification, trials: Sequence[Trial], *, workers: int = 0) -> None:
-        """`workers`: processes; 0 steps the trials in this one. The figures do not depend on it."""
+    def __init__(self, world: Specification, trials: Sequence[Trial], *, fall: float = 1.0, workers: int = 0) -> None:
+        """`fall`: see `figures`; `workers`: processes, on which no figure depends; 0 steps the trials in this one."""
+        self._fall = fall
         self.world, self.trials, self.recipe = world, tuple(trials), world.recipe
         self._measure = measure_of(world.recipe, load_robot(world.robot).joints)
         episodes = [trial.episode for trial in trials]
@@ -57,7 +58,8 @@ class QuickEvaluation:
     def play(self, policy: Acting) -> dict[str, float]:
         """Means over all trials: see `figures`."""
         outcomes = play_in(self._environment, policy)
-        return figures([self._row(trial, outcome) for trial, outcome in zip(self.trials, outcomes, strict=True)])
+        rows = [self._row(trial, outcome) for trial, outcome in zip(self.trials, outcomes, strict=True)]
+        return figures(rows, self._fall)
 
     def _row(self, trial: Trial, outcome: Outcome) -> dict[str, float]:
         row = trial_row(self.recipe, self._measure, trial, outcome)
@@ -78,12 +80,12 @@ class QuickEvaluation:
         self.close()
 
 
-def figures(rows: Sequence[dict[str, float]]) -> dict[str, float]:
+def figures(rows: Sequence[dict[str, float]], fall: float = 1.0) -> dict[str, float]:
     """Means over trials: survived, succeeded, transport, weight_in_hands, upright (part of the time), four errors up
     to the end of each trial, and `score`.
 
     The score of a trial, in [0, 1], is the part of the time that it stayed upright times the mean over the four errors
-    of 1 / (1 + error / scale): 1 without any error, 1/2 at the paper's.
+    of 1 / (1 + error / scale): 1 without any error, 1/2 at the paper's; times `fall` where it is not survived.
     """
     means = {
         told: float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
@@ -91,5 +93,6 @@ def figures(rows: Sequence[dict[str, float]]) -> dict[str, float]:
         for values in [np.array([row[name] for row in rows])]
     }
     quality = [np.mean([1.0 / (1.0 + row[name] / SCALES[name]) for name in ERRORS]) for row in rows]
-    score = np.mean([row["upright"] * one for row, one in zip(rows, quality, strict=True)])
+    kept = [row["upright"] * (1.0 if row["survived"] else fall) for row in rows]
+    score = np.mean([one * part for one, part in zip(quality, kept, strict=True)])
     return means | {"score": float(score)}

@@ -71,8 +71,8 @@ def survived(success: Success, outcome: Outcome) -> bool:
 
 
 def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
-    """Whether a trial that was survived is a success: transport of what the hands carry, or in a push that is
-    infeasible posture."""
+    """Whether a trial that was survived is a success: transport of what the hands carry or do not lose, or in a
+    push that is infeasible posture."""
     if kind == STAGNATION:
         return metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
     shares = (
@@ -80,7 +80,8 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
         (metrics["transport_object"], success.transport),
         (metrics["weight_in_hands"], success.weight_in_hands),
     )
-    return all(np.isnan(share) or share >= least for share, least in shares)
+    kept = not metrics["object_beside"] > success.object_beside
+    return kept and all(np.isnan(share) or share >= least for share, least in shares)
 
 
 def replayed(row: "pd.Series[Any]") -> Episode:

@@ -1,8 +1,8 @@
-"""How much of the commanded way robot and object cover."""
+"""How much of the commanded way robot and object cover, and whether they stay together."""
 
 import numpy as np
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
 from iowbc.control.command import YAW_RATE
 
 SHORTEST_WAY = 0.1
@@ -34,3 +34,15 @@ def covered(position: Array, directions: Array, length: float) -> float:
         return np.nan
     steps = np.diff(position[:, :2], axis=0)
     return float(np.sum(steps * directions[1 : len(position)]) / length)
+
+
+def beside(robot: Array, heading: Array, body: Array, moving: Mask) -> float:
+    """How far to the side of the robot a body is at most while steps are asked for [m]; NaN where none are.
+
+    robot, body: (T, 2 or more) [m]; heading: (T,) [rad]; moving: (T,).
+    """
+    if not moving.any():
+        return np.nan
+    away = body[:, :2] - robot[:, :2]
+    aside = np.cos(heading) * away[:, 1] - np.sin(heading) * away[:, 0]
+    return float(np.max(np.abs(aside[moving])))

@@ -47,7 +47,7 @@ class Synchronisation(Section):
 
 
 class ObjectEquilibrium(Section):
-    """r_obj: deviation of the held object's pose and its vertical motion."""
+    """r_obj: deviation of the object's pose, and the vertical motion of a held one."""
 
     position: float = -4.0
     """Weight of the squared distance of the object from its place in the grasp, heading frame [m²]."""
@@ -58,6 +58,11 @@ class ObjectEquilibrium(Section):
     much as being alive brings. What thighs and torso carry is not carried."""
     largest_link_contact: float = Field(default=200.0, ge=0.0, json_schema_extra=LATER)
     """Force beyond which `link_contact` costs no more [N]: a box of 20 kg in the lap; blows beyond say no more."""
+    beside: float = Field(default=0.0, json_schema_extra=LATER)
+    """Weight of the squared distance to the side of a pushed object from the middle of the hands, heading frame [m²]. A
+    crate that two palms push drifts to a side unless it is steered, and is lost at half its width."""
+    largest_beside: float = Field(default=0.5, gt=0.0, json_schema_extra=LATER)
+    """Distance beyond which `beside` costs no more [m]: such a crate is lost."""
     vertical_velocity: float = -0.5
     """Weight of the squared vertical velocity beyond the one that a commanded change of height asks for [m²/s²]."""
 

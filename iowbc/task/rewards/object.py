@@ -1,4 +1,4 @@
-"""r_obj: equilibrium of the held object; terms are zero where nothing is held."""
+"""r_obj: equilibrium of the object; terms are zero where nothing is held, or nothing pushed."""
 
 import numpy as np
 
@@ -23,6 +23,12 @@ def link_contact(force: Array, most: float) -> Array:
     """Force of links other than the hands on the object, no more than `most`, (n,) [N]."""
     bounded: Array = np.minimum(force, most)
     return bounded
+
+
+def beside(object_offset: Array, place: Array, most: float, pushed: Mask) -> Array:
+    """(y_obj − y_hands)², of no more than `most` [m], (n,) [m²]; from the base, heading frame, (n, 3) [m]."""
+    aside: Array = np.square((object_offset[:, 1] - place[:, 1]).clip(-most, most)) * pushed
+    return aside
 
 
 def vertical_velocity(object_velocity: Array, commanded: Array, held: Mask) -> Array:

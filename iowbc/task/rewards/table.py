@@ -52,8 +52,10 @@ class Step:
     """Feet that should be on the ground, (n, 2)."""
     held: Mask
     """Environments that hold an object, (n,)."""
+    pushed: Mask
+    """Environments with an object that hands push, (n,)."""
     object_place: Array
-    """Where a held object belongs, from the base, heading frame, (n, 3) [m]."""
+    """Where a held object belongs, in a push the middle of the hands; from the base, heading frame, (n, 3) [m]."""
     ended: Mask
     """Environments that fell or dropped the object in this step, (n,)."""
 
@@ -79,6 +81,9 @@ TERMS: dict[str, Term] = {
     "object.orientation": lambda s: equilibrium.orientation(s.state.object_quaternion, s.held),
     "object.link_contact": lambda s: equilibrium.link_contact(
         s.state.link_object_force, s.recipe.object.largest_link_contact
+    ),
+    "object.beside": lambda s: equilibrium.beside(
+        s.motion.object_offset, s.object_place, s.recipe.object.largest_beside, s.pushed
     ),
     "object.vertical_velocity": lambda s: equilibrium.vertical_velocity(
         s.state.object_linear_velocity, s.height_rate, s.held
