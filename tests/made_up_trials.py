@@ -75,6 +75,8 @@ def trials_of(
             "survived": trial < count,
             "succeeded": trial < count,
             "carried": trial < count,
+            "kept": trial < count,
+            "object_beside": 0.1 if suite.startswith("push") else np.nan,
             **dict.fromkeys(ALL_ERRORS, error + 0.1 * trial),
             **dict.fromkeys(STILL, 0.25),
             **dict.fromkeys(COSTS, 1.0),

@@ -42,6 +42,17 @@ def test_fails_is_printed_only_where_none_survived() -> None:
     assert lines["8 kg"].count("Fails") == 8, "ours and the paper's"
 
 
+def test_kept_is_the_weight_in_the_hands_or_how_often_a_pushed_object_was_not_lost() -> None:
+    lifts = trials_of("IO-WBC", "lifting", {0.0: 5, 4.0: 5})
+    lifts["weight_in_hands"] = np.where(lifts["mass"] > 0, 0.98, np.nan)
+    pushes = trials_of("IO-WBC", "pushing", {0.0: 5, 30.0: 5}).assign(weight_in_hands=np.nan)
+    pushes.loc[pushes["mass"] == 0, "object_beside"] = np.nan
+    pushes["kept"] = pushes["trial"] > 0
+    for trials, suite, kept in ((lifts, "lifting", ["–", "98 %"]), (pushes, "pushing", ["–", "4/5"])):
+        table = error_table(aggregate(trials), suite)
+        assert [row[table.head.index("Kept")] for row in table.rows[:2]] == kept
+
+
 def test_the_papers_numbers_stand_beside_ours() -> None:
     summary = aggregate(trials_of("IO-WBC", "pushing", {30.0: 5}))
     table = error_table(summary, "pushing")

@@ -53,9 +53,10 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     """One row for each of `GROUP`, by suite and case in order of appearance, mass, and the paper's order of variants.
 
     Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
-    in the hands whose weight they carried) of `held`; `rate` of success with its Wilson interval `rate_low`,
-    `rate_high`; each error's mean over the surviving trials and `<error>_half`, half its 95 % interval; `norm`, the
-    norm of the four means. NaN where no trial survived (or one alone, for the half widths): "Fails" in the tables.
+    in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
+    `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving trials and
+    `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. NaN where no trial survived (or one
+    alone, for the half widths): "Fails" in the tables.
     """
     trials = with_trainings(trials)
     rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
@@ -73,6 +74,7 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
 def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
     survivors = group[group["survived"]]
     succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
+    pushed = group["object_beside"].notna() & ~held
     low, high = wilson_interval(succeeded, len(group))
     row: dict[str, object] = {
         **key,
@@ -82,6 +84,8 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
         "succeeded": succeeded,
         "held": int(held.sum()),
         "carried": int(group["carried"].sum()),
+        "pushed": int(pushed.sum()),
+        "kept": int((group["kept"] & pushed).sum()),
         "rate": succeeded / len(group),
         "rate_low": low,
         "rate_high": high,

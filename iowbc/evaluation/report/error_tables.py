@@ -25,7 +25,7 @@ NO_LABELS: Mapping[str, str] = MappingProxyType({})
 def error_table(
     summary: pd.DataFrame, suite: str, labels: Mapping[str, str] = NO_LABELS, name: str | None = None
 ) -> Table:
-    """Errors over the whole trial by mass or case and variant, with survival, success, transport, weight in the hands.
+    """Errors over the whole trial by mass or case and variant, with survival, success, transport, what is kept.
 
     labels: the paper's name of variants that go by another one here; where it knows none, its columns are left out.
     name: of the table; that of the suite by default.
@@ -47,7 +47,7 @@ def error_table(
         nothing = [ABSENT] * len(ERRORS) if with_paper else []
         rows.append((ANY_MASS, STANDS_STILL, *_still(chosen), *_still_outcome(chosen), *nothing))
     columns = ("Mass" if swept else "Case", "Algorithm")
-    outcome = ("Survived", "Success", "Transport", "In hands")
+    outcome = ("Survived", "Success", "Transport", "Kept")
     paper = [f"paper {head.split()[0]}" for head in HEADS.values() if with_paper]
     latex_paper = [f"paper {head}" for head in LATEX_HEADS.values() if with_paper]
     return Table(
@@ -101,11 +101,12 @@ def _errors(row: pd.Series, part: str = "") -> list[str]:
 def _outcome(row: pd.Series) -> list[str]:
     ways = (float(row["transport_robot"]), float(row["transport_object"]))
     share = float(row["weight_in_hands"])
+    in_hands = ABSENT if np.isnan(share) else f"{100 * share:.0f} %"
     return [
         f"{row['survived']}/{row['trials']}",
         f"{row['succeeded']}/{row['trials']}",
         " / ".join(f"{way:.2f}" for way in ways if not np.isnan(way)) or ABSENT,
-        ABSENT if np.isnan(share) else f"{100 * share:.0f} %",
+        f"{row['kept']}/{row['pushed']}" if row["pushed"] else in_hands,
     ]
 
 
@@ -161,8 +162,9 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
     return (
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
         f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
-        f"in hands: part of the weight that the robot carries which rests in its hands; success: survived, with enough "
-        f"of both; {STANDS_STILL}: what doing nothing scores, from the script.{failed}{aim}{beside}"
+        f"kept: part of the weight that the robot carries which rests in its hands, or how often what is pushed is not "
+        f"lost at its side; success: survived, with enough of both; {STANDS_STILL}: what doing nothing scores, from the "
+        f"script.{failed}{aim}{beside}"
     )
 
 

@@ -56,6 +56,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "survived": alive,
         "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics),
         "carried": metrics["weight_in_hands"] >= recipe.eval.success.weight_in_hands,
+        "kept": metrics["object_beside"] <= recipe.eval.success.object_beside,
         "end": outcome.ending,
         "seconds": outcome.seconds,
         **metrics,
