@@ -163,8 +163,8 @@ def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
         f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
         f"kept: part of the weight that the robot carries which rests in its hands, or how often what is pushed is not "
-        f"lost at its side; success: survived, with enough of both; {STANDS_STILL}: what doing nothing scores, from the "
-        f"script.{failed}{aim}{beside}"
+        f"lost at its side; success: survived, with enough of both; {STANDS_STILL}: what doing nothing scores, from "
+        f"the script.{failed}{aim}{beside}"
     )
 
 
