@@ -123,7 +123,7 @@ def played(
 
 
 def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
-    """Which of the trials that were asked for pass: survived, the weight in the hands, the way covered."""
+    """Which of the trials that were asked for pass: survived, weight in the hands, object not lost, way covered."""
     hands, ways, errors, passed = [], [], [], 0
     for episode, outcome in trials:
         assert episode.script is not None
@@ -135,7 +135,8 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
         errors.append([metrics[name] for name in ERRORS])
         carried = np.isnan(hands[-1]) or hands[-1] >= asked.weight_in_hands
         transported = all(np.isnan(way) or way >= asked.transport for way in moved)
-        passed += bool(outcome.survived and carried and transported)
+        kept = not metrics["object_beside"] > asked.object_beside
+        passed += bool(outcome.survived and carried and kept and transported)
     return Accepted(
         asked,
         survived=sum(outcome.survived for _, outcome in trials),

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.section import COSMETIC, Section
+from iowbc.recipe.section import COSMETIC, LATER, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 
 
@@ -29,6 +29,8 @@ class Acceptance(Section):
     on thighs or torso."""
     transport: float = Field(default=0.5, ge=0, le=1)
     """Part of the commanded displacement that robot and object must cover, where the commands ask for any."""
+    object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
+    """A pushed object that is ever further than this to the robot's side while it is to walk is lost [m]."""
     minimum: int = Field(default=1, ge=0)
     """Trials that must be survived with the object carried and transported, or the stage fails; 0 only reports."""
 

@@ -18,13 +18,16 @@ MASS, STEPS = 4.0, 400
 WALK = (0.4, 0.0, 0.0)
 
 
-def played(*, in_hands: float = 1.0, covered: float = 0.0, fallen: bool = False) -> tuple[Episode, Outcome]:
-    """Eight seconds in which the hands bear part of the weight and the robot covers part of the way."""
+def played(
+    *, in_hands: float = 1.0, covered: float = 0.0, beside: float = 0.0, fallen: bool = False
+) -> tuple[Episode, Outcome]:
+    """Eight seconds in which the hands bear part of the weight, the robot covers part of the way, and the object comes
+    to be at its side [m]."""
     signals = trace(STEPS)
     grip, path = signals.grip_force.copy(), signals.base_position.copy()
     grip[:, [2, 5]] = -0.5 * in_hands * MASS * GRAVITY
     path[:, 0] = covered * WALK[0] * MEASURE.control_frequency**-1 * np.arange(STEPS)
-    moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, 0.0, 1.0]))
+    moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, beside, 1.0]))
     drawn = {"object_mass": np.array([MASS])}
     outcome = Outcome(moved, 8.0, fallen=fallen, dropped=False, finished=not fallen, drawn=drawn)
     commands = script(8.0, WALK if covered else (0.0, 0.0, 0.0))
@@ -47,3 +50,8 @@ def test_a_statue_is_not_accepted_where_walking_is_asked_for() -> None:
     found = accepted(played(covered=0.9), played(covered=0.2))
     assert (found.survived, found.passed, found.enough) == (2, 1, True)
     assert "55% of the way covered" in found.sentence
+
+
+def test_who_loses_the_object_at_its_side_is_not_accepted() -> None:
+    found = accepted(played(covered=0.9), played(covered=0.9, beside=-0.4))
+    assert (found.survived, found.passed) == (2, 1)
