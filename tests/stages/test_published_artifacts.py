@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[2]
 
 PUBLISHED_TO = {
     "full": "export",
+    "full_seed_1": "eval",
     "teacher": "eval",
     "wbc": "eval",
     "wo_rg": "eval",
