@@ -10,12 +10,14 @@ import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
+from iowbc.commands.named import named
 from iowbc.commands.play import playable
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.report.aggregate import aggregate
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.report.runs import Run, grouped
 
 ROOT = Path(__file__).parents[2]
 
@@ -54,6 +56,13 @@ def test_a_fresh_clone_makes_the_published_figures_from_the_published_trials(fol
     published = pd.read_csv(table)
     made = pd.read_csv(StringIO(aggregate(pd.read_parquet(folder / "trials.parquet")).to_csv(index=False)))
     pd.testing.assert_frame_equal(made[published.columns], published, rtol=1e-12)
+
+
+def test_the_published_trainings_that_differ_in_their_seed_are_one_variant(tmp_path: Path) -> None:
+    (tmp_path / "published").symlink_to(ROOT / "runs" / "published")
+    found = [named(Store(Runs(tmp_path)), name) for name in ("full", "full_seed_1", "blind")]
+    groups = grouped([Run(one.word, one.artifacts, one.recipe or {}) for one in found])
+    assert [group.seeds for group in groups] == [("0", "1"), ("0",)]
 
 
 def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
