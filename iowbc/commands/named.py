@@ -96,8 +96,7 @@ def _recipe(store: Store, word: str, name: str, recipes: list[str]) -> Named:
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
     shipped = _published(store).get(name, {})
     if name not in known_recipes(store):
-        newest = max(shipped.values(), key=lambda artifact: artifact.manifest.made)
-        return Named(word, shipped, newest.recipe)
+        return Named(word, shipped, list(shipped.values())[-1].recipe)
     used = last_used(store, name)
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
     return Named(word, used, recall(store.runs, name)["recipe"], others)

@@ -11,6 +11,7 @@ from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
 
+EVAL = "eval"
 NAMING = ("name", "description", "execution")
 """Parts of a recipe in which runs of one group may differ, beside their seeds."""
 
@@ -62,8 +63,7 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
     """Runs by recipe, seeds together, in order of appearance; a group of several is called by its first run."""
     found: list[list[Run]] = []
     for run in runs:
-        own = _compared(run)
-        group = next((group for group in found if own == _compared(group[0]) and own), None)
+        group = next((group for group in found if _of_one_variant(run, group[0])), None)
         if group is None:
             found.append([run])
         else:
@@ -103,13 +103,28 @@ def _cell(values: NDArray[np.float64]) -> str:
     return f"{figure(values.mean())}{spread}"
 
 
-def _compared(run: Run) -> dict[str, Any]:
+def _of_one_variant(first: Run, second: Run) -> bool:
+    """Whether two runs differ in their seeds alone: their recipes, or, where both are evaluated, what decided their
+    artifacts, which says the same of recipes that were written down by different versions of the program."""
+    recipe = _seedless(first.recipe)
+    if recipe and recipe == _seedless(second.recipe):
+        return True
+    shared = first.artifacts.keys() & second.artifacts.keys()
+    decided = [
+        [_seedless(run.artifacts[stage].ingredients.get("recipe", {})) for stage in shared] for run in (first, second)
+    ]
+    return EVAL in shared and all(decided[0]) and decided[0] == decided[1] and _label(first) == _label(second)
+
+
+def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
     """A recipe without what only tells repetitions apart."""
     return {
-        name: _without_seed(name, value)
-        for name, value in run.recipe.items()
-        if name not in NAMING and name not in SEEDS
+        name: _without_seed(name, value) for name, value in recipe.items() if name not in NAMING and name not in SEEDS
     }
+
+
+def _label(run: Run) -> Any:
+    return run.recipe.get(EVAL, {}).get("label")
 
 
 def _without_seed(name: str, value: Any) -> Any:
