@@ -4,6 +4,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any, cast
 
 from made_up_trials import trials_of
 
@@ -13,6 +14,7 @@ from iowbc.commands.named import Named
 from iowbc.commands.swept import points_of
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.report.runs import Run, grouped
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -84,7 +86,9 @@ def test_a_second_training_shares_the_reference_generator(folder: Path, command:
 
 def evaluated(folder: Path, name: str, label: str, error: float, seed: int | None, steps: int) -> Named:
     """A run whose trials have these errors."""
-    artifact = SimpleNamespace(folder=folder / name, recipe={"eval": {"success": {"capacity_rate": 0.8}}}, metrics={})
+    artifact = SimpleNamespace(
+        folder=folder / name, recipe={"eval": {"success": {"capacity_rate": 0.8}}}, metrics={}, ingredients={}
+    )
     artifact.folder.mkdir()
     trials_of(label, "lifting", {0.0: 5, 4.0: 5}, error=error).to_parquet(artifact.folder / "trials.parquet")
     teacher = {"steps": steps} if seed is None else {"steps": steps, "seed": seed}
@@ -113,6 +117,17 @@ def test_trainings_that_differ_in_their_seeds_alone_are_one_variant(tmp_path: Pa
         "| longer | IO-WBC | 3 | 8,192 | – |",
         "| never | not evaluated yet | – | – | – |",
     ]
+
+
+def test_trainings_whose_recipes_different_versions_wrote_down_are_told_by_what_decided_them(tmp_path: Path) -> None:
+    older, newer, other = (evaluated(tmp_path, name, "IO-WBC", 0.1, None, 4096) for name in ("older", "newer", "other"))
+    cast(dict[str, Any], newer.recipe)["eval"]["added"] = "a default that the older version did not know"
+    for run, seed, gamma in ((older, 0, 0.99), (newer, 7, 0.99), (other, 0, 0.9)):
+        decided = {"recipe": {"seed": 3, "teacher": {"seed": seed, "gamma": gamma}}}
+        cast(SimpleNamespace, run.artifacts["eval"]).ingredients = decided
+    cast(dict[str, Any], other.recipe)["teacher"] = {"steps": 4096, "gamma": 0.9}
+    groups = grouped([Run(run.word, run.artifacts, run.recipe or {}) for run in (older, newer, other)])
+    assert [len(group.runs) for group in groups] == [2, 1]
 
 
 def test_the_film_of_a_comparison_is_found_by_its_runs_in_any_order(tmp_path: Path) -> None:
