@@ -15,7 +15,7 @@ from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
 from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.evaluation.trials.table import held_weight, measure_of
+from iowbc.evaluation.trials.table import carried_along, held_weight, measure_of
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
@@ -129,14 +129,10 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
         assert episode.script is not None
         weight = held_weight(recipe, episode, outcome)
         metrics = trial_metrics(outcome.trace, episode.script, measure, weight)
-        moved = [metrics["transport_robot"], metrics["transport_object"]]
         hands.append(metrics["weight_in_hands"])
-        ways.append(moved[0])
+        ways.append(metrics["transport_robot"])
         errors.append([metrics[name] for name in ERRORS])
-        carried = np.isnan(hands[-1]) or hands[-1] >= asked.weight_in_hands
-        transported = all(np.isnan(way) or way >= asked.transport for way in moved)
-        kept = not metrics["object_beside"] > asked.object_beside
-        passed += bool(outcome.survived and carried and kept and transported)
+        passed += outcome.survived and carried_along(asked, metrics)
     return Accepted(
         asked,
         survived=sum(outcome.survived for _, outcome in trials),

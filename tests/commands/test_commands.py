@@ -33,7 +33,7 @@ def test_help_answers_at_once() -> None:
 def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("teacher:\n  stebs: 3\n")
-    assert yardsticks("-m", "iowbc", "run", str(path), pairs=5) < 8, "5.3; torch or MuJoCo would take it far beyond"
+    assert yardsticks("-m", "iowbc", "run", str(path), pairs=5) < 6
 
 
 @pytest.mark.parametrize(

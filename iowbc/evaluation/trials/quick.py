@@ -93,6 +93,6 @@ def figures(rows: Sequence[dict[str, float]], fall: float = 1.0) -> dict[str, fl
         for values in [np.array([row[name] for row in rows])]
     }
     quality = [np.mean([1.0 / (1.0 + row[name] / SCALES[name]) for name in ERRORS]) for row in rows]
-    kept = [row["upright"] * (1.0 if row["survived"] else fall) for row in rows]
-    score = np.mean([one * part for one, part in zip(quality, kept, strict=True)])
+    lasted = [row["upright"] * (1.0 if row["survived"] else fall) for row in rows]
+    score = np.mean([one * part for one, part in zip(quality, lasted, strict=True)])
     return means | {"score": float(score)}

@@ -11,6 +11,7 @@ from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.recipe.evaluation.success import Success
+from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import GRAVITY
 from iowbc.task.episodes import Episode
@@ -76,12 +77,17 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
     push that is infeasible posture."""
     if kind == STAGNATION:
         return metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
+    return carried_along(success, metrics)
+
+
+def carried_along(asked: Success | Acceptance, metrics: dict[str, float]) -> bool:
+    """Whether robot and object cover enough of the way, with enough of the weight in the hands, and stay together."""
     shares = (
-        (metrics["transport_robot"], success.transport),
-        (metrics["transport_object"], success.transport),
-        (metrics["weight_in_hands"], success.weight_in_hands),
+        (metrics["transport_robot"], asked.transport),
+        (metrics["transport_object"], asked.transport),
+        (metrics["weight_in_hands"], asked.weight_in_hands),
     )
-    kept = not metrics["object_beside"] > success.object_beside
+    kept = not metrics["object_beside"] > asked.object_beside
     return kept and all(np.isnan(share) or share >= least for share, least in shares)
 
 
