@@ -1,7 +1,7 @@
 """`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ from iowbc.pipeline.writability import require_writable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from iowbc.report.curves import Panel
     from iowbc.report.runs import Group
 
 CURVE_WIDTH = 40
@@ -41,10 +42,11 @@ def compare(
     film: bool = False,
     as_json: bool = False,
 ) -> None:
-    """Write `metrics.md`, and the report over all trials, under `output`; print the tables. Raises `UsageError`.
+    """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables.
 
     words: runs, two or more, or a recipe of recipes, of which those are compared that have finished. output: empty for
-    a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side.
+    a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
+    `UsageError`.
     """
     found = [named(store, word) for word in points_of(store, words)]
     members = [name for word in words for name in members_of(word)]
@@ -66,6 +68,7 @@ def compare(
             _film(store, *_of_each_recipe(tried, trials), output / FILM, filming)
     elif film:
         raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
+    curves = _learning_curves(found, output)
     if as_json:
         print_json(console, _data(found, output))
         return
@@ -73,7 +76,7 @@ def compare(
         cells = read_table(path.read_text(encoding="utf-8"))
         console.print(drawn(cells, console.width) if cells.rows else "no metric differs")
         console.print()
-    _print_curves(found, console)
+    _print_curves(curves, console)
     if missing:
         text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
         console.print(f"{text}that takes", markup=False, highlight=False, soft_wrap=True)
@@ -85,7 +88,8 @@ def _written(output: Path) -> list[str]:
     """A line for each file of a comparison, and one for each folder in it."""
     folders = {path: sum(1 for _ in path.rglob("*.*")) for path in sorted(output.iterdir()) if path.is_dir()}
     files = [shown_path(path) for path in sorted(output.glob("*.*"))]
-    return [*files, *(f"{shown_path(path)}/ ({count} files)" for path, count in folders.items())]
+    counts = {path: f"{count} file{'s' if count != 1 else ''}" for path, count in folders.items()}
+    return [*files, *(f"{shown_path(path)}/ ({count})" for path, count in counts.items())]
 
 
 def metrics_table(found: Sequence[Named]) -> str:
@@ -118,13 +122,22 @@ def _groups(found: Sequence[Named]) -> "list[Group]":
     return grouped([Run(run.word, run.artifacts, run.recipe or {}) for run in found])
 
 
-def _print_curves(found: Sequence[Named], console: Console) -> None:
-    """The main learning curves of each recipe, one line each; `iowbc report` has them at full size."""
+def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[Panel]]":
+    """The main learning curves of all recipes by stage; also drawn under `output`, a picture a stage."""
     from iowbc.report.curves import LEARNING, learning_panels
+    from iowbc.report.learning_figure import POINTS, write_learning_figure
 
     groups = _groups(found)
-    for stage in LEARNING:
-        for panel in learning_panels(groups, stage)[0]:
+    curves = {stage: panels for stage in LEARNING if (panels := learning_panels(groups, stage, POINTS)[0])}
+    for stage, panels in curves.items():
+        write_learning_figure(panels, stage, output / "figures" / f"learning_{stage}.png")
+    return curves
+
+
+def _print_curves(curves: "Mapping[str, Sequence[Panel]]", console: Console) -> None:
+    """The main learning curves of each recipe, one line each; `iowbc report` has them to look into."""
+    for stage, panels in curves.items():
+        for panel in panels:
             console.print(f"{stage}: {panel.title}", markup=False, highlight=False)
             for trace in panel.traces:
                 values = [value for value in trace["y"] if value is not None]

@@ -65,8 +65,10 @@ class Panel:
         return {"data": self.traces, "layout": layout}
 
 
-def learning_panels(groups: Sequence[Group], stage: str) -> tuple[list[Panel], list[Panel]]:
-    """The main learning curves of a stage, and all others."""
+def learning_panels(
+    groups: Sequence[Group], stage: str, most_points: int = MOST_POINTS
+) -> tuple[list[Panel], list[Panel]]:
+    """The main learning curves of a stage, and all others; one of more than `most_points` is averaged to that many."""
     found = [
         [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
     ]
@@ -75,7 +77,8 @@ def learning_panels(groups: Sequence[Group], stage: str) -> tuple[list[Panel], l
     panels = {name: Panel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
-            curves = [_thinned(columns["step"] / 1e6, columns[name]) for columns in runs if name in columns]
+            having = [columns for columns in runs if name in columns]
+            curves = [_thinned(columns["step"] / 1e6, columns[name], most_points) for columns in having]
             panel.traces += _band(group.label, place, *_joined(curves)) if curves else []
     return [panel for name, panel in panels.items() if name in first], [
         panel for name, panel in panels.items() if name not in first
@@ -136,13 +139,13 @@ def _numbers(rows: Sequence[Mapping[str, str]], name: str) -> Values:
     return np.array([float(row.get(name) or "nan") for row in rows])
 
 
-def _thinned(across: Values, values: Values) -> tuple[Values, Values]:
+def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:
     """A curve of few points: means of neighbours, without what is missing."""
     known = np.isfinite(values)
     across, values = across[known], values[known]
-    if len(values) <= MOST_POINTS:
+    if len(values) <= most_points:
         return across, values
-    parts = [np.array_split(row, MOST_POINTS) for row in (across, values)]
+    parts = [np.array_split(row, most_points) for row in (across, values)]
     return np.array([part.mean() for part in parts[0]]), np.array([part.mean() for part in parts[1]])
 
 

@@ -143,7 +143,9 @@ def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves
     assert table.splitlines()[0] == "| stage | metric | first | second | Δ second |"
     assert table.splitlines()[2:] == ["| teacher | count | 3 | 5 | +2 |"]
     assert "|" not in done.stdout
-    assert done.stdout.splitlines()[-2:] == ["runs/compare/metrics.md", "runs/compare/runs.json"]
+    written = ["runs/compare/metrics.md", "runs/compare/runs.json", "runs/compare/figures/ (1 file)"]
+    assert done.stdout.splitlines()[-3:] == written
+    assert (folder / "runs" / "compare" / "figures" / "learning_teacher.png").read_bytes().startswith(b"\x89PNG")
     assert done.stdout.index("teacher: reward [1/s]") < done.stdout.index("▁█ 3  first")
     assert "▁█ 5  second" in done.stdout
 

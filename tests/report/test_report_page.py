@@ -16,6 +16,7 @@ from iowbc.pipeline.store.artifact import Manifest, write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.report.curves import MOST_POINTS, evaluation_panels, learning_panels
+from iowbc.report.learning_figure import learning_figure
 from iowbc.report.page import write_page
 from iowbc.report.runs import Run, grouped, metric_rows
 
@@ -106,6 +107,18 @@ def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) 
     assert len(mean["x"]) == MOST_POINTS
     np.testing.assert_allclose(mean["y"], 2.0 * 1e6 * np.array(mean["x"]), rtol=1e-4)
     np.testing.assert_allclose(high["y"], 3.0 * 1e6 * np.array(mean["x"]), rtol=1e-4)
+
+
+def test_the_picture_of_learning_curves_has_a_line_for_each_recipe_and_a_band_of_its_seeds(runs: list[Run]) -> None:
+    figure = learning_figure(learning_panels(grouped(runs), "teacher")[0], "teacher")
+    reward = figure.axes[0]
+    (mean, other), (band,) = reward.get_lines(), reward.collections
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["first (2 seeds)", "other"]
+    assert mean.get_ydata()[-1] == pytest.approx(2.0 * 1e6 * mean.get_xdata()[-1], rel=1e-4)
+    assert other.get_ydata()[-1] == pytest.approx(5.0 * 1e6 * other.get_xdata()[-1], rel=1e-4)
+    last = band.get_paths()[0].vertices
+    ends = last[last[:, 0] == last[:, 0].max(), 1]
+    np.testing.assert_allclose([ends.min(), ends.max()], 1e6 * last[:, 0].max() * np.array([1, 3]), rtol=1e-4)
 
 
 def test_every_curve_of_a_training_has_a_title_with_its_unit(runs: list[Run]) -> None:
