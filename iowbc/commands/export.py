@@ -8,13 +8,11 @@ from rich.console import Console
 from iowbc.commands.named import named
 from iowbc.commands.results import shown_path
 from iowbc.commands.training import require_training
+from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
-
-CONTRACT = "contract.json"
-"""Every exported folder has one."""
 
 
 def export_page(store: Store, console: Console, word: str, folder: Path) -> None:

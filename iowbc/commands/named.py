@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from iowbc.deploy.contract import SHORTEST_PREFIX
+from iowbc.deploy.exported_folder import SHORTEST_PREFIX
 from iowbc.errors import UsageError, nearest
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall

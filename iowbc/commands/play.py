@@ -13,6 +13,7 @@ from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
 from iowbc.commands.results import POLICIES
 from iowbc.commands.training import require_training
+from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
 from iowbc.pipeline.store.artifact import Artifact
@@ -21,9 +22,6 @@ from iowbc.pipeline.store.store import Store
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
-
-CONTRACT = "contract.json"
-"""Every exported folder has one."""
 
 
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:

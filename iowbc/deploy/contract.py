@@ -1,9 +1,7 @@
 """The contract of an exported policy: everything that a caller on the robot must know, as JSON beside the graph."""
 
 import hashlib
-import json
 import math
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from iowbc.control.command import COMMAND
 from iowbc.control.feasible_map import FEASIBLE
 from iowbc.control.generator import ARCHITECTURE, WEIGHTS
+from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, GRAPH, ROBOT
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.sensing import Sensing
@@ -22,20 +21,6 @@ from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import DESCRIPTION
 
-EXPORT = "export"
-"""Stage that writes such folders."""
-SHORTEST_PREFIX = 4
-"""Characters of a key that are enough to name an artifact, where they are unique."""
-CONTRACT = "contract.json"
-GRAPH = "policy.onnx"
-GOLDEN = "golden.npz"
-RECIPE = "recipe.json"
-"""The recipe's world: with it the policy can be played in the simulation that accepted it."""
-ROBOT = "robot"
-"""Folder with the robot's description inside the exported folder."""
-GENERATOR = "rg"
-"""Folder with the reference generator: its feasible map clamps commands; its network, which is in the graph, too, gives
-the posture for which the arms' references are computed."""
 LARGEST_CONTRACT = 1_000_000
 """Bytes of the largest contract that is read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
@@ -238,31 +223,6 @@ def readable(part: Path) -> Iterator[None]:
     except Exception as error:
         reason = shorten(f"{type(error).__name__}: {error}", 300)
         raise ContractBroken(f"{part}: cannot be used: {reason}; export again") from error
-
-
-def exported_folder(word: Path | str) -> Path:
-    """A folder as it is named, or what the recipe of that name exported into `IOWBC_RUNS`, else `./runs`; where it was
-    not run here, what came with the repository. `RECIPE/export` and the first characters of a key are names, too, as
-    in all commands. Raises ContractBroken where several keys begin like that."""
-    folder, runs = Path(word), Path(os.environ.get("IOWBC_RUNS") or "runs")
-    name = str(word).removesuffix(f"/{EXPORT}")
-    published = sorted(runs.glob(f"published/{EXPORT}/*"))
-    shipped = [place for place in published if _recipe_name(place) == name]
-    stored = {place.name: place for place in (*published, *runs.glob(f"store/{EXPORT}/*"))}
-    keyed = [place for key, place in stored.items() if len(name) >= SHORTEST_PREFIX and key.startswith(name)]
-    found = next((place for place in (folder, runs / name / EXPORT, *shipped) if (place / CONTRACT).is_file()), None)
-    if found is None and len(keyed) > 1:
-        raise ContractBroken(f"{name}: the keys of {len(keyed)} exports begin like that; give more characters")
-    return found or next(iter(keyed), folder)
-
-
-def _recipe_name(folder: Path) -> str | None:
-    """Name of the recipe that an exported folder was made by, if it can be read."""
-    try:
-        name = json.loads((folder / RECIPE).read_bytes())["name"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
-    return name if isinstance(name, str) else None
 
 
 def require_sealed(contract: Contract, folder: Path, *names: str) -> None:

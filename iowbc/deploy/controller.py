@@ -17,17 +17,8 @@ from iowbc.control import gait
 from iowbc.control.command import COMMAND, HEIGHT, YAW_RATE, approach, rate_limits
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import (
-    GENERATOR,
-    GRAPH,
-    ROBOT,
-    Contract,
-    exported_folder,
-    generator_folder,
-    read_contract,
-    readable,
-    require_sealed,
-)
+from iowbc.deploy.contract import Contract, generator_folder, read_contract, readable, require_sealed
+from iowbc.deploy.exported_folder import GENERATOR, GRAPH, ROBOT, exported_folder
 from iowbc.deploy.guard import TargetGuard
 from iowbc.deploy.session import Values, open_session, run
 from iowbc.errors import ContractBroken

@@ -8,8 +8,9 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import GOLDEN, exported_folder, readable
+from iowbc.deploy.contract import readable
 from iowbc.deploy.controller import Controller
+from iowbc.deploy.exported_folder import GOLDEN, exported_folder
 
 INPUT = "input/"
 """Prefix of the names of the graph's inputs among the golden vectors."""

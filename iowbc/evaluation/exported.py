@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from iowbc.control.sensors import Measured
-from iowbc.deploy import contract
+from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
 from iowbc.recipe.recipe import Recipe
@@ -21,15 +21,15 @@ def exported_world(folder: Path) -> Specification:
     Raises ContractBroken where the folder is not what its contract says.
     """
     said = Controller.load(folder).contract
-    contract.require_sealed(said, folder, contract.RECIPE)
-    path = folder / contract.RECIPE
+    contract.require_sealed(said, folder, exported_folder.RECIPE)
+    path = folder / exported_folder.RECIPE
     try:
         recipe = Recipe.model_validate_json(path.read_bytes())
     except ValidationError as error:
         raise ContractBroken(f"{path}: not a recipe of this version: {error}; export again") from error
     generator = contract.generator_folder(said, folder)
     with contract.readable(folder):
-        return Specification(recipe.deployed, folder / contract.ROBOT, generator)
+        return Specification(recipe.deployed, folder / exported_folder.ROBOT, generator)
 
 
 class ExportedPolicy:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.control.action import action_mirror
-from iowbc.deploy import contract
+from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
 from iowbc.errors import require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
@@ -37,7 +37,7 @@ class Source:
 
     def environment(self, episode: Episode) -> VectorEnv:
         """One environment, in this process, that plays an episode. Raises ContractBroken for a world that is none."""
-        exported = (self.policy / contract.CONTRACT).is_file()
+        exported = (self.policy / exported_folder.CONTRACT).is_file()
         with contract.readable(self.policy) if exported else nullcontext():
             return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
 
@@ -105,7 +105,7 @@ def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
 
 def open_policy(source: Source, environment: VectorEnv) -> Acting:
     """The policy of a source: an exported controller where there is a contract, else a network."""
-    if (source.policy / contract.CONTRACT).is_file():
+    if (source.policy / exported_folder.CONTRACT).is_file():
         return ExportedPolicy(Controller.load(source.policy, robots=environment.num_envs), environment)
     if source.policy.is_dir():
         return load_policy(source.policy)

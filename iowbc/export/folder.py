@@ -6,7 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from iowbc.control.command import COMMAND
-from iowbc.deploy import contract
+from iowbc.deploy import contract, exported_folder
 from iowbc.export.graph import ControllerGraph, Port
 from iowbc.export.onnx_graph import write_onnx
 from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -26,15 +26,15 @@ def write_folder(
     sources: artifact keys of what went into the graph, by stage.
     """
     robot, drawn = graph.robot, recipe.simulation.randomization
-    write_onnx(graph, out / contract.GRAPH, recipe.export.opset, {"recipe": recipe.name, **sources})
-    (out / contract.ROBOT).mkdir()
+    write_onnx(graph, out / exported_folder.GRAPH, recipe.export.opset, {"recipe": recipe.name, **sources})
+    (out / exported_folder.ROBOT).mkdir()
     for source in (robot.folder / DESCRIPTION, robot.mjcf):
-        shutil.copy(source, out / contract.ROBOT / source.name)
+        shutil.copy(source, out / exported_folder.ROBOT / source.name)
     if rg is not None:
-        (out / contract.GENERATOR).mkdir()
+        (out / exported_folder.GENERATOR).mkdir()
         for name in contract.GENERATOR_FILES:
-            shutil.copy(rg / name, out / contract.GENERATOR / name)
-    (out / contract.RECIPE).write_text(world_of(recipe).model_dump_json(indent=1) + "\n")
+            shutil.copy(rg / name, out / exported_folder.GENERATOR / name)
+    (out / exported_folder.RECIPE).write_text(world_of(recipe).model_dump_json(indent=1) + "\n")
     statement = contract.Contract(
         recipe=recipe.name,
         robot=robot.name,

@@ -23,7 +23,7 @@ def run(job: Job) -> None:
     from iowbc.control.action import action_scale
     from iowbc.control.generator import ReferenceNetwork
     from iowbc.control.observation import OBJECT, observation_layout
-    from iowbc.deploy import contract
+    from iowbc.deploy import contract, exported_folder
     from iowbc.deploy.session import open_session
     from iowbc.deploy.session import run as run_graph
     from iowbc.deploy.timing import step_seconds
@@ -71,9 +71,9 @@ def run(job: Job) -> None:
 
     inputs = golden.stacked(steps)
     expected = run_torch(graph, inputs)
-    session = open_session(job.out / contract.GRAPH)
+    session = open_session(job.out / exported_folder.GRAPH)
     differences = golden.largest_difference(expected, run_graph(session, inputs))
-    golden.write_golden(inputs, expected, job.out / contract.GOLDEN)
+    golden.write_golden(inputs, expected, job.out / exported_folder.GOLDEN)
     seconds = golden.inference_seconds(session, inputs, settings.timing_steps)
     step = step_seconds(job.out, settings.timing_steps)[:, 0]
 
@@ -84,7 +84,7 @@ def run(job: Job) -> None:
         "inference_p99_ms": float(1e3 * np.quantile(seconds, 0.99)),
         "step_ms": float(1e3 * np.median(step)),
         "step_p99_ms": float(1e3 * np.quantile(step, 0.99)),
-        "graph_kB": (job.out / contract.GRAPH).stat().st_size / 1e3,
+        "graph_kB": (job.out / exported_folder.GRAPH).stat().st_size / 1e3,
         "acceptance_trials": float(sum(each.asked.trials for each in played)),
         "acceptance_survived": float(sum(each.survived for each in played)),
         "acceptance_passed": float(sum(each.passed for each in played)),

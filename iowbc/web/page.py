@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from iowbc.control.feasible_map import FEASIBLE
-from iowbc.deploy import contract
+from iowbc.deploy import exported_folder
 from iowbc.evaluation.exported import exported_world
 from iowbc.robot.description import load_robot
 from iowbc.web.bundling import bundle, npm_parts
@@ -25,9 +25,9 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     parts = npm_parts(cache, say)
     world = exported_world(exported)
     out.mkdir(parents=True, exist_ok=True)
-    feasible = f"{contract.GENERATOR}/{FEASIBLE}"
-    taken = [name for name in (contract.GOLDEN, feasible) if (exported / name).is_file()]
-    for name in (contract.GRAPH, contract.CONTRACT, *taken):
+    feasible = f"{exported_folder.GENERATOR}/{FEASIBLE}"
+    taken = [name for name in (exported_folder.GOLDEN, feasible) if (exported / name).is_file()]
+    for name in (exported_folder.GRAPH, exported_folder.CONTRACT, *taken):
         shutil.copyfile(exported / name, out / Path(name).name)
     robot = load_robot(world.robot)
     about = {
@@ -35,7 +35,7 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
         "first": first_scene(world.recipe),
         "kinematics": kinematics(robot),
         "feasible": FEASIBLE if feasible in taken else None,
-        "golden": contract.GOLDEN if contract.GOLDEN in taken else None,
+        "golden": exported_folder.GOLDEN if exported_folder.GOLDEN in taken else None,
     }
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")
     bundle(parts, out)

@@ -13,7 +13,7 @@ from iowbc.commands import completion
 from iowbc.commands.export import exported_folder as exported_by
 from iowbc.commands.named import named
 from iowbc.commands.play import playable
-from iowbc.deploy.contract import exported_folder
+from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import ContractBroken
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store

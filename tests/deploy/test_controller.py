@@ -17,8 +17,9 @@ import onnx
 import pytest
 
 from iowbc.deploy import controller as controller_module
-from iowbc.deploy.contract import CONTRACT, GRAPH, Contract, read_contract, seal
+from iowbc.deploy.contract import Contract, read_contract, seal
 from iowbc.deploy.controller import Controller, Measured
+from iowbc.deploy.exported_folder import CONTRACT, GRAPH
 from iowbc.errors import ContractBroken
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot

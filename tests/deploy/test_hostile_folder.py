@@ -14,8 +14,9 @@ import yaml
 from own_parts import own_part
 
 from iowbc.control.generator import ReferenceNetwork
-from iowbc.deploy.contract import CONTRACT, Contract, read_contract, seal
+from iowbc.deploy.contract import Contract, read_contract, seal
 from iowbc.deploy.controller import Controller
+from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import ContractBroken
 from iowbc.evaluation.exported import exported_world
 from iowbc.evaluation.golden_rollout import golden_episode

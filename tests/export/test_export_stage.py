@@ -13,7 +13,8 @@ import pytest
 from network_watch import watched
 from stage_jobs import make_job
 
-from iowbc.deploy.contract import CONTRACT, GOLDEN, GRAPH, Contract, read_contract, seal
+from iowbc.deploy.contract import Contract, read_contract, seal
+from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, GRAPH
 from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.acceptance import try_out_network

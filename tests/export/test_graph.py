@@ -16,7 +16,7 @@ from iowbc.control.layout import Part
 from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured, quantities
 from iowbc.control.stride import Stride
-from iowbc.deploy.contract import GRAPH
+from iowbc.deploy.exported_folder import GRAPH
 from iowbc.deploy.session import open_session, run
 from iowbc.export.folder import write_folder
 from iowbc.export.golden import Values, largest_difference, read_golden, stacked, write_golden

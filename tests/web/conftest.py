@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from exported_policies import made_up_generator, untrained
 
-from iowbc.deploy import contract
+from iowbc.deploy import contract, exported_folder
 from iowbc.errors import UsageError
 from iowbc.evaluation.golden_rollout import golden_inputs
 from iowbc.export import golden
@@ -47,7 +47,7 @@ def exported(recipe: Recipe, robot: Robot, tmp_path_factory: pytest.TempPathFact
     graph = untrained(recipe, robot, rg)
     statement = write_folder(folder, graph, recipe, rg, {"rg-fit": "a" * 8})
     inputs = golden.stacked(golden_inputs(Specification(recipe, robot.folder, rg), folder, lambda: False))
-    golden.write_golden(inputs, run_torch(graph, inputs), folder / contract.GOLDEN)
+    golden.write_golden(inputs, run_torch(graph, inputs), folder / exported_folder.GOLDEN)
     contract.seal(statement, folder)
     return folder
 

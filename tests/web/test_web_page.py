@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import GOLDEN, exported_folder
 from iowbc.deploy.controller import Controller
+from iowbc.deploy.exported_folder import GOLDEN, exported_folder
 from iowbc.evaluation.exported import exported_world
 from iowbc.export.golden import read_golden
 from iowbc.recipe.recipe import Recipe
