@@ -14,7 +14,8 @@ from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.recipe.reading.sweep import Point, Sweep, written
 from iowbc.recipe.recipe import PIPELINE, SEEDS
-from iowbc.report.parallel import Line, parallel_coordinates, write_figure
+from iowbc.report.parallel import Line, parallel_coordinates
+from iowbc.report.picture_file import write_figure
 
 OUTCOMES_SHOWN = 6
 """Metrics in the table and in the figure at most: those of the last stages."""

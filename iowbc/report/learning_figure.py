@@ -1,7 +1,6 @@
 """The main learning curves of several runs as one picture, for papers and pages that nothing can be clicked in."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -15,7 +14,6 @@ COLUMNS = 3
 PANEL_SIZE = (4.0, 2.6)
 """Width and height of a panel [inch]."""
 BAND_OPACITY = 0.2
-DPI = 150
 
 
 def learning_figure(panels: Sequence[Panel], title: str) -> Figure:
@@ -33,12 +31,6 @@ def learning_figure(panels: Sequence[Panel], title: str) -> Figure:
         axes.grid(alpha=0.3)
     figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)
     return figure
-
-
-def write_learning_figure(panels: Sequence[Panel], title: str, path: Path) -> None:
-    """Save as PNG without the time of day in it, so that equal runs give equal files."""
-    path.parent.mkdir(exist_ok=True)
-    learning_figure(panels, title).savefig(path, dpi=DPI, metadata={"Software": None})
 
 
 def _draw(axes: Axes, traces: Sequence[dict[str, Any]]) -> dict[str, Any]:

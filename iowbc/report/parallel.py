@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -26,7 +25,6 @@ VALUES_NAMED = 8
 """Different values of a setting up to which each is named beside its axis."""
 AXIS_WIDTH = 1.9
 """Distance of two axes [inch]."""
-DPI = 150
 
 
 @dataclass(frozen=True)
@@ -75,11 +73,6 @@ def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines
         figure.legend(loc="outside lower center", ncols=min(3, len(lines)), fontsize=7, frameon=False)
     figure.suptitle(title, fontsize=9)
     return figure
-
-
-def write_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG."""
-    figure.savefig(path, dpi=DPI)
 
 
 @dataclass(frozen=True)
