@@ -120,6 +120,13 @@ class Learner(PPO):  # type: ignore[misc]
             own["log_density"].copy_(log_density(own["action"], own["mean"], policy.log_std))
             own["value"].copy_(policy.critic.head(policy.critic.hidden(own["observation"]))[:, 0])
 
+    def explore_anew(self) -> None:
+        """Brings exploration back where the recipe's restart comes before the next update, and only there."""
+        restart, passed = self.settings.restart, self.num_timesteps - self.n_steps * self.n_envs
+        if restart is not None and passed < restart.after <= self.num_timesteps:
+            with torch.no_grad():
+                self.policy.log_stds.fill_(float(np.log(restart.std)))
+
     def train(self) -> None:
         """Gradient steps on the rollout in the buffer."""
         with self._timed("learning"):
@@ -196,9 +203,13 @@ class Learner(PPO):  # type: ignore[misc]
 
 def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
     """Least and largest standard deviation of the action after some environment steps."""
-    if teacher.std_half_life is None:
+    restart = teacher.restart
+    if restart is not None and steps >= restart.after:
+        ceiling = restart.std * 0.5 ** ((steps - restart.after) / restart.half_life)
+    elif teacher.std_half_life is None:
         return teacher.std_floor, np.inf
-    ceiling = teacher.initial_std * 0.5 ** (steps / teacher.std_half_life)
+    else:
+        ceiling = teacher.initial_std * 0.5 ** (steps / teacher.std_half_life)
     return teacher.std_floor, max(ceiling, teacher.std_end)
 
 

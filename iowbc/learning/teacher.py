@@ -76,6 +76,7 @@ class TeacherTraining:
         if self._callback is None:
             _, self._callback = model._setup_learn(self.planned - self.steps, None, reset_num_timesteps=False)
         model.caution = self.best.caution
+        model.explore_anew()
         model.collect_rollouts(self.environments, self._callback, model.rollout_buffer, model.n_steps)
         model.train()
         training = {name: float(value) for name, value in model.logger.name_to_value.items()}

@@ -24,6 +24,20 @@ class HistoryNetwork(Section):
     """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
 
 
+class Restart(Section):
+    """A warm restart: exploration comes back once, and sinks anew. What a training of little exploration begins with it
+    keeps; what it meets then, it can still learn."""
+
+    after: int = Field(default=0, ge=0, le=10**12)
+    """Environment steps after which it comes; at 0 before the first, for a training that begins from a trained one
+    (`teacher.start`)."""
+    std: float = Field(default=0.3, gt=0)
+    """Standard deviation to which all return; at 0.3 a trained policy still walks, and its steps may be twice as
+    long at the same KL divergence."""
+    half_life: int = Field(default=4_000_000, ge=1)
+    """Environment steps in which the largest standard deviation halves from there on, down to `std_end`."""
+
+
 class Teacher(Section):
     """PPO with privileged information."""
 
@@ -70,6 +84,8 @@ class Teacher(Section):
     exploration shrinks even where the gradient does not ask for it. Empty sets no such bound."""
     std_end: float = Field(default=0.2, gt=0)
     """Where the largest standard deviation comes to rest."""
+    restart: Restart | None = Field(default=None, json_schema_extra=LATER)
+    """Brings exploration back once; see `Restart`. Empty lets it shrink for good."""
     std_floor: float = Field(default=0.05, gt=0)
     """Least standard deviation: a policy that arrives here explores no longer."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
@@ -128,6 +144,8 @@ class Teacher(Section):
         if not self.std_floor < self.std_end <= self.initial_std:
             stds = f"{self.std_floor:g}, {self.std_end:g}, {self.initial_std:g}"
             raise ValueError(f"std_floor, std_end and initial_std must ascend, got {stds}")
+        if self.restart is not None and self.restart.std < self.std_end:
+            raise ValueError(f"restart.std {self.restart.std:g} is below std_end {self.std_end:g}: nothing comes back")
         return self
 
     @model_validator(mode="after")

@@ -10,7 +10,7 @@ from iowbc.learning import ppo
 from iowbc.learning.gaussian import log_density
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
-from iowbc.recipe.teacher import Teacher
+from iowbc.recipe.teacher import Restart, Teacher
 
 
 def training(**changes: Any) -> TeacherTraining:
@@ -120,6 +120,26 @@ def test_exploration_shrinks_with_its_ceiling_and_never_below_its_floor() -> Non
     for _ in range(3):
         some.update()
     assert float(some.model.policy.log_std.exp().detach()) <= 0.2 * (1 + 1e-6)
+
+
+def test_a_restart_brings_exploration_back_once_and_lets_it_sink_anew() -> None:
+    settings = Teacher(std_half_life=100, std_end=0.1, restart=Restart(after=300, std=0.4, half_life=50))
+    assert ppo.deviation_bounds(settings, 299) == (0.05, 0.1)
+    assert ppo.deviation_bounds(settings, 300) == (0.05, 0.4)
+    assert ppo.deviation_bounds(settings, 350) == (0.05, 0.2)
+    some = training(initial_std=0.2, std_end=0.2, restart=Restart(after=16 * 8 + 1, std=0.4, half_life=10**9))
+    found = []
+    for _ in range(4):
+        some.update()
+        found.append(float(some.model.policy.log_std.exp().detach()))
+    assert max(found[:2]) <= 0.2 * (1 + 1e-6)
+    assert min(found[2:]) > 0.35
+
+
+def test_a_restart_before_the_first_update_is_one() -> None:
+    some = training(initial_std=0.2, std_end=0.2, restart=Restart(std=0.4, half_life=10**9))
+    some.update()
+    assert float(some.model.policy.log_std.exp().detach()) > 0.35
 
 
 def test_the_statistics_of_observations_are_kept_once_they_are_frozen() -> None:
