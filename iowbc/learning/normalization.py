@@ -44,6 +44,8 @@ class Normalization:
         """Σ discount^k · reward of each environment's episode so far."""
         self.frozen = False
         """Whether the statistics of observations are kept as they are."""
+        self.inherited: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
+        """Mean and standard deviation of the first inputs, where a trained policy came with them: they stay."""
 
     def observe(self, observations: NDArray[np.float32]) -> None:
         """Take observations, (n, size), into account."""
@@ -54,6 +56,10 @@ class Normalization:
         """Let the normaliser use what is known by now."""
         normalizer.mean.copy_(torch.from_numpy(self.observations.mean))
         normalizer.std.copy_(torch.from_numpy(np.sqrt(self.observations.var + VARIANCE_FLOOR)))
+        if self.inherited is not None:
+            mean, std = self.inherited
+            normalizer.mean[: len(mean)] = torch.from_numpy(mean)
+            normalizer.std[: len(std)] = torch.from_numpy(std)
 
     def reward(self, rewards: NDArray[np.float32], ended: NDArray[np.bool_]) -> NDArray[np.float32]:
         """Rewards (n,) of a step in standard deviations of the return; `ended`: environments whose episode ends."""
@@ -67,7 +73,9 @@ class Normalization:
     def arrays(self) -> Arrays:
         """Everything, for a checkpoint; `frozen` follows from the step."""
         moments = {"observation": self.observations, "return": self.returns}
+        inherited = {} if self.inherited is None else {"inherited": np.stack(self.inherited)}
         return {
+            **inherited,
             "discounted": self.discounted.copy(),
             **{f"{name}_mean": np.array(of.mean) for name, of in moments.items()},
             **{f"{name}_variance": np.array(of.var) for name, of in moments.items()},
@@ -77,6 +85,9 @@ class Normalization:
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `arrays`."""
         self.discounted = np.array(arrays["discounted"])
+        if "inherited" in arrays:
+            mean, std = np.array(arrays["inherited"])
+            self.inherited = mean, std
         for name, of in (("observation", self.observations), ("return", self.returns)):
             of.mean, of.var = np.array(arrays[f"{name}_mean"]), np.array(arrays[f"{name}_variance"])
             of.count = float(arrays[f"{name}_count"][0])

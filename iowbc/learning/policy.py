@@ -64,8 +64,8 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
             self.critic = NewestCritic(perceptron(newest, hidden, 1, activation, value), normalizer)
         self.actor.initialize(HIDDEN_GAIN, POLICY_GAIN)
         self.critic.initialize(HIDDEN_GAIN, VALUE_GAIN)
-        if value_only and isinstance(self.actor, VectorPerceptron):
-            self.actor.hide(value_only)
+        self._value_only = tuple(value_only)
+        self.hide()
         place = std_places(actions, None if both is None else both[1])
         self.log_stds = nn.Parameter(torch.full((place.max() + 1,), float(np.log(initial_std))))
         """One for each pair of actions that the mirror swaps, and one for each other."""
@@ -73,7 +73,8 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         rate = lr_schedule(1)
         self.optimizer = torch.optim.Adam(
             [
-                {"params": [*self.actor.parameters(), *self.critic.parameters()], "lr": rate},
+                {"params": list(self.actor.parameters()), "lr": rate},
+                {"params": list(self.critic.parameters()), "lr": rate},
                 {"params": [self.log_stds], "lr": std_learning_rate},
             ],
             eps=1e-5,
@@ -82,6 +83,11 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
 
     def _build(self, lr_schedule: Any) -> None:
         """Nothing of stable-baselines3's own networks."""
+
+    def hide(self) -> None:
+        """Takes the weights from what only the value is to see, where the policy is a network of s_t and s_priv."""
+        if self._value_only and isinstance(self.actor, VectorPerceptron):
+            self.actor.hide(self._value_only)
 
     @property
     def log_std(self) -> Tensor:

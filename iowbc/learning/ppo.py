@@ -54,6 +54,9 @@ class Learner(PPO):  # type: ignore[misc]
         """Time spent since they were last set back [s]."""
         self.caution = 1.0
         """What the desired KL divergence is multiplied by."""
+        self.value_alone = 0
+        """Environment steps up to which the value network alone learns: the optimiser's moments of the policy follow its
+        gradients, its step size is zero."""
 
     def _excluded_save_params(self) -> list[str]:
         own = ["settings", "normalization", "mirrored", "seconds", "side_by_side", "rollout_buffer"]
@@ -135,8 +138,11 @@ class Learner(PPO):  # type: ignore[misc]
     def _train(self) -> None:
         settings, rollout, optimizer = self.settings, self.rollout_buffer, self.policy.optimizer
         self.policy.set_training_mode(True)
-        rate = self.learning_rate
-        optimizer.param_groups[0]["lr"] = rate
+        rate = self.learning_rate if self._policy_learns else settings.learning_rate
+        moved = float(self._policy_learns)
+        rates = (moved * rate, rate, moved * settings.std_learning_rate)
+        for group, own in zip(optimizer.param_groups, rates, strict=True):
+            group["lr"] = own
         before = self.policy.log_std.detach().clone()
         samples = rollout.flat
         images = None if self.mirrored is None else self.mirrored.images(rollout, self.policy)
@@ -153,7 +159,12 @@ class Learner(PPO):  # type: ignore[misc]
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
         for name, value in values.items():
             self.logger.record(f"train/{name}", value)
-        self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
+        if self._policy_learns:
+            self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
+
+    @property
+    def _policy_learns(self) -> bool:
+        return bool(self.num_timesteps > self.value_alone)
 
     def _gradient_step(self, batch: Tensor, before: Tensor) -> Tensor:
         """One step of the optimiser on a minibatch of rows; returns `FIGURES`. `before`: log std before the update."""

@@ -18,7 +18,7 @@ from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
 from iowbc.learning.ppo import make_learner
 from iowbc.learning.storage import Network
-from iowbc.learning.trained import trained_network
+from iowbc.learning.trained import take_over, trained_network
 from iowbc.processes import keep_freed_memory
 from iowbc.recipe.teacher import Teacher
 
@@ -146,19 +146,23 @@ class TeacherTraining:
             "learning_rate": np.array([model.learning_rate]),
         }
 
-    def begin(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Starts from what another training had learnt when it was `arrays`, with its step size where that may move.
+    def begin(self, network: Network) -> None:
+        """Starts from a trained policy, with the statistics that it was trained with, which stay, and with the least
+        step size where that may move: what is trained is soon led astray.
 
         Raises StageFailed where its networks are of another shape.
         """
-        returns = {"normalization/discounted": self.model.normalization.discounted}
+        model = self.model
         try:
-            self._learn_again({**arrays, **returns})
-        except (RuntimeError, KeyError) as error:
-            names = "teacher.hidden, activation, symmetry, value_only and history"
+            take_over(model.policy, network)
+        except RuntimeError as error:
+            names = "teacher.hidden, activation, symmetry and history"
             raise StageFailed(f"teacher.start: that teacher's networks are other ones; {names} say which") from error
+        model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
+        model.normalization.move(model.policy.normalizer)
+        model.value_alone = self.settings.value_first
         if self.settings.desired_kl is not None:
-            self.model.learning_rate = float(np.clip(arrays["learning_rate"][0], *self.settings.learning_rate_range))
+            model.learning_rate = min(self.settings.learning_rate_range)
         self.best = Best(self.settings.check, self._learnt())
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -1,4 +1,4 @@
-"""The network that a PPO training leaves: its policy without exploration, value and optimiser."""
+"""The network that a PPO training leaves, its policy without exploration, value and optimiser; and back."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from iowbc.learning.gaussian import std_places
-from iowbc.learning.history_actor import student_architecture
+from iowbc.learning.history_actor import HistoryActor, student_architecture
 from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork, mirror_as_json
+from iowbc.learning.policy import ActorCritic
 from iowbc.learning.storage import Network
 from iowbc.recipe.teacher import Teacher
 
@@ -43,6 +44,19 @@ def trained_network(
     network.log_std.copy_(arrays["log_stds"][torch.from_numpy(std_places(actions, mirrors[1] if symmetric else None))])
     network.requires_grad_(False)
     return network.eval(), architecture
+
+
+def take_over(policy: ActorCritic, network: Network) -> None:
+    """Inverse of `trained_network` for what acts: mean action and standard deviation; the value stays as it is.
+
+    Raises RuntimeError where the policy's networks are other ones.
+    """
+    learnt = network.state_dict() if isinstance(network, StudentNetwork) else network.body.state_dict()
+    actor = policy.actor.network if isinstance(policy.actor, HistoryActor) else policy.actor
+    actor.load_state_dict(learnt)
+    policy.hide()
+    with torch.no_grad():
+        policy.log_stds[policy.std_place] = network.log_std
 
 
 def _part(beginning: str, arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -183,13 +183,6 @@ class Planner:
         options = replace(self.options, until=stage.name, force=frozenset())
         return Planner(loaded, registry, self.store, self.robot, options, above)
 
-    def _require_beginning(self, stage: Stage, inputs: Mapping[str, Artifact | None]) -> None:
-        """Raises `RecipeError` where what a stage begins from was published without the files that it takes."""
-        start = inputs.get(START)
-        lacking = [] if start is None else [name for name in stage.extends_from if name in start.manifest.omitted]
-        if lacking:
-            raise self._wrong_start(stage, f"was published without {', '.join(lacking)}; make it here, or take another")
-
     def _wrong_start(self, stage: Stage, text: str) -> RecipeError:
         path = stage.starts_from or ""
         return RecipeError(
@@ -257,7 +250,6 @@ class Planner:
             notes.extend(self._looks(stage, artifact))
         predecessor = None
         if found:
-            self._require_beginning(stage, inputs)
             notes.extend(self._checkpoint(stage, key))
             expected = self._rest(stage, key, expected)
             predecessor = None if stage.name in self.options.force else self._predecessor(stage, ingredients)

@@ -108,15 +108,13 @@ def run(job: Job) -> None:
 
 
 def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) -> None:
-    """Gives a training what another one ended with. Raises StageFailed where that sees or does something else."""
-    from safetensors.numpy import load_file
-
+    """Gives a training what another one has learnt. Raises StageFailed where that sees or does something else."""
     from iowbc.learning.storage import load_network
 
-    _, about = load_network(start)
+    network, about = load_network(start)
     if about["layout"] != environments.layout.describe():
         raise StageFailed("teacher.start: that teacher observes something else; leave the observation as it was")
-    training.begin(load_file(start / STATE))
+    training.begin(network)
     environments.set_curriculum(about["curriculum"])
 
 

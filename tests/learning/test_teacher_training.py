@@ -57,6 +57,48 @@ def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
 
 
 @pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+def test_what_begins_from_a_trained_policy_lets_its_value_learn_first(symmetry: Any) -> None:
+    given, _ = finish(training(symmetry=symmetry)).network()
+    rows = torch.randn(20, 3)
+
+    def begun() -> TeacherTraining:
+        some = training(symmetry=symmetry, value_first=2 * 16 * 8)
+        some.begin(given)
+        return some
+
+    def acts(some: TeacherTraining) -> torch.Tensor:
+        with torch.no_grad():
+            return some.network()[0](rows)
+
+    some = begun()
+    rate, value = some.model.learning_rate, some.model.policy.predict_values(rows).detach()
+    for _ in range(2):
+        some.update()
+        torch.testing.assert_close(acts(some), given(rows), rtol=0, atol=0)
+    torch.testing.assert_close(some.model.policy.log_std, given.log_std, rtol=0, atol=1e-6)
+    assert some.model.learning_rate == rate, "a divergence of nothing says nothing"
+    assert float((some.model.policy.predict_values(rows).detach() - value).abs().max()) > 1e-2
+    kept = some.arrays()
+    finish(some)
+    assert float((acts(some) - given(rows)).abs().max()) > 1e-3
+    resumed = begun()
+    resumed.restore(kept)
+    torch.testing.assert_close(acts(finish(resumed)), acts(some), rtol=0, atol=0)
+
+
+def test_what_the_value_alone_is_told_is_hidden_from_a_policy_that_knew_it() -> None:
+    given, _ = finish(training()).network()
+    some = TeacherTraining(SETTINGS, PointMasses(), MIRRORS, seed=3, value_only=[2])
+    some.begin(given)
+    network, _ = some.network()
+    rows = torch.randn(20, 3)
+    told = rows + torch.tensor([0.0, 0.0, 0.5])
+    with torch.no_grad():
+        torch.testing.assert_close(network(told), network(rows), rtol=0, atol=0)
+        assert float((given(told) - given(rows)).abs().max()) > 1e-3
+
+
+@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
 def test_training_learns_to_bring_masses_to_rest(symmetry: str) -> None:
     some = training(steps=16 * 8 * 60, symmetry=symmetry)
     first = some.update()["reward"]
