@@ -55,8 +55,8 @@ class Learner(PPO):  # type: ignore[misc]
         self.caution = 1.0
         """What the desired KL divergence is multiplied by."""
         self.value_alone = 0
-        """Environment steps up to which the value network alone learns: the optimiser's moments of the policy follow its
-        gradients, its step size is zero."""
+        """Environment steps up to which the value network alone learns; the optimiser's moments of the policy follow
+        its gradients, its step size is zero."""
 
     def _excluded_save_params(self) -> list[str]:
         own = ["settings", "normalization", "mirrored", "seconds", "side_by_side", "rollout_buffer"]

@@ -12,6 +12,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
+from iowbc.learning.average import PolicyAverage
 from iowbc.learning.best import Best
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
@@ -53,6 +54,10 @@ class TeacherTraining:
         self.score = score if settings.check.every is not None else None
         self.say = say
         self.model = make_learner(settings, environments, seed, mirrors, cores, value_only)
+        self.average: PolicyAverage | None = None
+        if settings.average_half_life is not None:
+            updates = settings.average_half_life / (settings.environments * settings.rollout)
+            self.average = PolicyAverage(self.model.policy, updates)
         self.best = Best(settings.check, self._learnt())
         self._callback: BaseCallback | None = None
 
@@ -79,6 +84,8 @@ class TeacherTraining:
         model.explore_anew()
         model.collect_rollouts(self.environments, self._callback, model.rollout_buffer, model.n_steps)
         model.train()
+        if self.average is not None:
+            self.average.take(model.policy)
         training = {name: float(value) for name, value in model.logger.name_to_value.items()}
         figures = self.environments.statistics() | self._judged(training)
         seconds = {f"seconds/{part}": spent for part, spent in model.seconds.items()}
@@ -100,7 +107,7 @@ class TeacherTraining:
             if self.best.collapsed(found["check/score"]):
                 why = f"the score fell from {self.best.score:.3f} to {found['check/score']:.3f}"
             else:
-                self.best.offer(found["check/score"], self._learnt())
+                self.best.offer(found["check/score"], self._scored())
         if why:
             self._learn_again(self.best.go_back(f"{why} at {self.steps:,} steps"))
             low, _ = self.settings.learning_rate_range
@@ -115,7 +122,7 @@ class TeacherTraining:
     def keep_best(self) -> None:
         """Ends the training: what it has learnt is from now on what scored best, the last policy being scored, too."""
         if self.score is not None:
-            self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._learnt())
+            self.best.offer(float(self.score(policy_of(*self.network()))["score"]), self._scored())
             self._learn_again(self.best.learner)
 
     def _learnt(self) -> Arrays:
@@ -126,8 +133,18 @@ class TeacherTraining:
             **prefixed("normalization", self.model.normalization.arrays()),
         }
 
+    def _acting(self) -> Arrays:
+        """Parameters and buffers of the policy, what acts being the mean of policies where there is one."""
+        return checkpoint.module_arrays(self.model.policy) | ({} if self.average is None else self.average.arrays)
+
+    def _scored(self) -> Arrays:
+        """What the learner has learnt, its policy being the one that a check scores."""
+        return {**self._learnt(), **prefixed("policy", self._acting())}
+
     def _learn_again(self, learnt: Mapping[str, NDArray[Any]]) -> None:
         """Inverse of `_learnt`."""
+        if self.average is not None:
+            self.average.restore(under("policy", learnt))
         checkpoint.restore_module(self.model.policy, under("policy", learnt))
         checkpoint.restore_optimizer(self.model.policy.optimizer, under("optimizer", learnt))
         self.model.normalization.restore(under("normalization", learnt))
@@ -144,6 +161,7 @@ class TeacherTraining:
             "observation": np.array(model._last_obs),
             "counters": np.array([model.num_timesteps, model._n_updates]),
             "learning_rate": np.array([model.learning_rate]),
+            **({} if self.average is None else prefixed("average", self.average.arrays)),
         }
 
     def begin(self, network: Network) -> None:
@@ -160,6 +178,8 @@ class TeacherTraining:
             raise StageFailed(f"teacher.start: that teacher's networks are other ones; {names} say which") from error
         model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
         model.normalization.move(model.policy.normalizer)
+        if self.average is not None:
+            self.average.restore(checkpoint.module_arrays(model.policy))
         model.value_alone = self.settings.value_first
         if self.settings.desired_kl is not None:
             model.learning_rate = min(self.settings.learning_rate_range)
@@ -169,6 +189,8 @@ class TeacherTraining:
         """Inverse of `arrays`, on a training made from the same recipe."""
         model = self.model
         self._learn_again(arrays)
+        if self.average is not None:
+            self.average.restore(under("average", arrays))
         self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
         model._last_obs = np.array(arrays["observation"])
@@ -178,4 +200,4 @@ class TeacherTraining:
 
     def network(self) -> tuple[Network, dict[str, Any]]:
         """The deterministic policy with its normalisation, and the arguments that rebuild it."""
-        return trained_network(checkpoint.module_arrays(self.model.policy), self.settings, self.mirrors)
+        return trained_network(self._acting(), self.settings, self.mirrors)

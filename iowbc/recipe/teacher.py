@@ -86,6 +86,10 @@ class Teacher(Section):
     """Where the largest standard deviation comes to rest."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Brings exploration back once; see `Restart`. Empty lets it shrink for good."""
+    average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)
+    """Environment steps in which the weight of a policy halves in a running mean of all of them. With it that mean is
+    what checks score and the stage leaves: the newest policy has also learnt what the last rollouts happened to hold.
+    Empty takes the newest."""
     std_floor: float = Field(default=0.05, gt=0)
     """Least standard deviation: a policy that arrives here explores no longer."""
     activation: Literal["elu", "relu", "tanh"] = "elu"

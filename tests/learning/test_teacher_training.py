@@ -23,16 +23,17 @@ def finish(some: TeacherTraining) -> TeacherTraining:
     return some
 
 
+@pytest.mark.parametrize("average", [None, 16 * 8 * 2])
 @pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
-def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry: str) -> None:
-    unbroken = finish(training(symmetry=symmetry))
-    broken = training(symmetry=symmetry)
+def test_a_resumed_training_ends_bit_for_bit_where_an_unbroken_one_does(symmetry: str, average: int | None) -> None:
+    unbroken = finish(training(symmetry=symmetry, average_half_life=average))
+    broken = training(symmetry=symmetry, average_half_life=average)
     for _ in range(3):
         broken.update()
     kept = {name: value.copy() for name, value in broken.arrays().items()}
     np.random.seed(99)  # noqa: NPY002 - SB3 draws from the global generator
     torch.manual_seed(99)
-    resumed = training(symmetry=symmetry)
+    resumed = training(symmetry=symmetry, average_half_life=average)
     resumed.restore(kept)
     assert resumed.steps == 3 * 16 * 8
     finish(resumed)
@@ -54,6 +55,44 @@ def test_what_the_value_alone_is_told_moves_no_action(symmetry: Any) -> None:
         torch.testing.assert_close(network(told), network(rows), rtol=0, atol=0)
         torch.testing.assert_close(policy(told, deterministic=True)[0], network(rows), rtol=0, atol=1e-5)
         assert float((policy.predict_values(told) - policy.predict_values(rows)).abs().max()) > 1e-3
+
+
+@pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
+def test_the_mean_of_its_policies_is_what_a_training_leaves_and_changes_nothing_else(symmetry: Any) -> None:
+    newest = training(symmetry=symmetry)
+    expected = {name: value.numpy().copy() for name, value in newest.model.policy.state_dict().items()}
+    for _ in range(4):
+        newest.update()
+        for name, value in newest.model.policy.state_dict().items():
+            expected[name] = 0.5 * expected[name] + 0.5 * value.numpy()
+    mean = training(symmetry=symmetry, average_half_life=16 * 8)
+    for _ in range(4):
+        mean.update()
+    for name, value in newest.model.policy.state_dict().items():
+        np.testing.assert_array_equal(mean.model.policy.state_dict()[name], value, err_msg=name)
+    network, _ = mean.network()
+    for name, value in network.body.state_dict().items():
+        np.testing.assert_allclose(value, expected[f"actor.{name}"], rtol=1e-5, atol=1e-6, err_msg=name)
+
+
+def test_what_a_check_of_the_mean_finds_best_is_kept_as_it_was() -> None:
+    scores = iter([1.0, 0.5])
+    settings = SETTINGS.model_copy(
+        update={
+            "average_half_life": 16 * 8,
+            "check": SETTINGS.check.model_copy(update={"every": 2}),
+            "steps": 16 * 8 * 3,
+        }
+    )
+    some = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, score=lambda _: {"score": next(scores)})
+    some.update()
+    some.update()
+    rows = torch.randn(20, 3)
+    best = some.network()[0](rows)
+    some.update()
+    assert float((some.network()[0](rows) - best).abs().max()) > 1e-4
+    some.keep_best()
+    torch.testing.assert_close(some.network()[0](rows), best, rtol=0, atol=0)
 
 
 @pytest.mark.parametrize("symmetry", ["construction", "augment", "none"])
