@@ -231,6 +231,12 @@ def test_the_quick_evaluation_plays_the_same_trials_again(recipe: Recipe, studen
     assert first == second
     assert {"score", "upright", "survived", "transport", *ERRORS} <= set(first)
     assert 0 < first["score"] < 1
+    loads = {name.split("/")[0] for name in first if "/" in name}
+    assert loads == {"lift_0_kg", "lift_4_kg"}
+    for error in ERRORS:
+        own = [first[f"{load}/{error}"] for load in sorted(loads)]
+        assert own[0] != own[1]
+        assert np.mean(own) == pytest.approx(first[error])
 
 
 def test_the_score_of_a_quick_evaluation_is_one_without_error_and_a_half_at_the_papers() -> None:

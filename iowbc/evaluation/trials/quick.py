@@ -26,6 +26,8 @@ FIGURES = {
     "weight_in_hands": "weight_in_hands",
 }
 """Columns of the long table that are told, and their names here."""
+BY_LOAD = ("survived", "succeeded", *ERRORS)
+"""Figures that are also told of each load."""
 
 
 def quick_trials(world: Specification, scene: str, masses: Sequence[float], count: int, seed: int) -> list[Trial]:
@@ -56,10 +58,14 @@ class QuickEvaluation:
         return self.trials[(len(self.trials) - 1) // 2]
 
     def play(self, policy: Acting) -> dict[str, float]:
-        """Means over all trials: see `figures`."""
+        """Means over all trials, see `figures`, and over those of each load: `push_30_kg/survived`, `…/E_v`."""
         outcomes = play_in(self._environment, policy)
         rows = [self._row(trial, outcome) for trial, outcome in zip(self.trials, outcomes, strict=True)]
-        return figures(rows, self._fall)
+        loads: dict[str, list[dict[str, float]]] = {}
+        for trial, row in zip(self.trials, rows, strict=True):
+            loads.setdefault(f"{trial.case}_{trial.mass:g}_kg", []).append(row)
+        told = {load: figures(own, self._fall) for load, own in loads.items()}
+        return figures(rows, self._fall) | {f"{load}/{name}": told[load][name] for load in told for name in BY_LOAD}
 
     def _row(self, trial: Trial, outcome: Outcome) -> dict[str, float]:
         row = trial_row(self.recipe, self._measure, trial, outcome)
