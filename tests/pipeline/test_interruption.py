@@ -8,7 +8,7 @@ import pytest
 from fake_stages import STARTED
 from workplace import Workplace, until
 
-SLOW = {"teacher": {"steps": 40, "pause": 0.05}}
+SLOW = {"teacher": {"steps": 120, "pause": 0.05}}
 
 
 def started_at(workplace: Workplace, stage: str) -> int:
