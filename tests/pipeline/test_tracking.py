@@ -16,7 +16,7 @@ from iowbc.pipeline.tracking.delivery import let_files_move
 from iowbc.pipeline.tracking.journal import Journal, close_orphaned, statuses, unsent
 from iowbc.pipeline.tracking.tracker import backlog
 
-SLOW = {"teacher": {"steps": 40, "pause": 0.05}}
+SLOW = {"teacher": {"steps": 120, "pause": 0.05}}
 TRACKED = RECIPE.replace("track: false", "tracking_patience: 30")
 
 
