@@ -9,11 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from workplace import COMMAND, RECIPE, Workplace, until
+from workplace import COMMAND, RECIPE, SLOW, Workplace, until
 
 from iowbc.full_disk import nothing_fits, what_is_full
-
-SLOW = {"teacher": {"steps": 60, "pause": 0.05}}
 
 
 def assert_told(errors: str, command: str = "iowbc run small.yaml") -> None:

@@ -6,9 +6,7 @@ import signal
 
 import pytest
 from fake_stages import STARTED
-from workplace import Workplace, until
-
-SLOW = {"teacher": {"steps": 120, "pause": 0.05}}
+from workplace import SLOW, Workplace, until
 
 
 def started_at(workplace: Workplace, stage: str) -> int:

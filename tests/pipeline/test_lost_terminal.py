@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-from workplace import COMMAND, Workplace, until
+from workplace import COMMAND, SLOW, Workplace, until
 
-SLOW = {"teacher": {"steps": 120, "pause": 0.05}}
 LEADER = "import subprocess, sys; subprocess.run(sys.argv[1:])"
 """A shell that ends with its terminal: the kernel then tells what it started a second time."""
 

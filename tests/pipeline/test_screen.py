@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pyte
 import pytest
-from workplace import COMMAND, Workplace, until
+from workplace import COMMAND, SLOW, Workplace, until
 
-BEHAVIOUR = {"teacher": {"steps": 40, "pause": 0.05}}
 CTRL_C = b"\x03"
 
 
@@ -25,7 +24,7 @@ class Terminal:
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
         words = ["setsid", "--ctty", sys.executable, str(COMMAND), "run", "small.yaml"]
         settings = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
-        settings |= {"FAKE_BEHAVIOUR": json.dumps(BEHAVIOUR), "TERM": "xterm-256color"}
+        settings |= {"FAKE_BEHAVIOUR": json.dumps(SLOW), "TERM": "xterm-256color"}
         self.process = subprocess.Popen(words, cwd=folder, env=settings, stdin=theirs, stdout=theirs, stderr=theirs)
         os.close(theirs)
         os.set_blocking(self.ours, False)

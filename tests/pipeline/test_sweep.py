@@ -6,13 +6,12 @@ import shlex
 import signal
 
 from fake_stages import STARTED
-from workplace import Workplace, until
+from workplace import SLOW, Workplace, until
 
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.tracking.journal import events
 
 GRID = ("--set", "seed=0,1", "--set", "teacher.steps=4096,8192")
-SLOW = {"teacher": {"steps": 30, "pause": 0.1}}
 
 
 def counts(workplace: Workplace) -> dict[str, int]:
@@ -69,7 +68,7 @@ def test_a_kill_and_ctrl_c_lose_nothing_and_the_last_line_goes_on(workplace: Wor
     until(lambda: not any(holder(workplace.store.runs, path.name) for path in checkpoints.iterdir()))
 
     asked = workplace.start(*words, behaviour=SLOW)
-    until(lambda: "goes on from attempt 1" in asked.output + logs(workplace))
+    until(lambda: logs(workplace).count("goes on from attempt 1") == 2)
     asked.signal(signal.SIGINT)
     assert asked.finish() == 130
     assert "(0 of 2 done, 2 stopped)" in asked.output

@@ -9,14 +9,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from workplace import RECIPE, Workplace, until
+from workplace import RECIPE, SLOW, Workplace, until
 
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import let_files_move
 from iowbc.pipeline.tracking.journal import Journal, close_orphaned, statuses, unsent
 from iowbc.pipeline.tracking.tracker import backlog
 
-SLOW = {"teacher": {"steps": 120, "pause": 0.05}}
 TRACKED = RECIPE.replace("track: false", "tracking_patience: 30")
 
 

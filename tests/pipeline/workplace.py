@@ -25,6 +25,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
 
 COMMAND = Path(fake_stages.__file__)
+SLOW = {"teacher": {"steps": 120, "pause": 0.05}}  # to be disturbed, with time for a slow machine to do so
 RECIPE = "seed: 3\nteacher:\n  steps: 4096\nexecution: {track: false, line_interval: 0.1}\n"
 
 
@@ -146,7 +147,7 @@ class Command:
         return self.errors_path.read_text()
 
 
-def until(condition: Callable[[], Any], patience: float = 60.0) -> None:
+def until(condition: Callable[[], Any], patience: float = 180.0) -> None:
     """Wait for something that another process does."""
     limit = time.monotonic() + patience
     while not condition():
