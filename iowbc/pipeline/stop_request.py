@@ -1,7 +1,8 @@
 """SIGINT, SIGTERM and SIGHUP: the first asks the stage to stop after a checkpoint, the second aborts.
 
 SIGHUP says that the terminal is gone. It never aborts, for it comes twice where a shell passes it on and then ends, and
-it means nothing to a run that was started to go on without a terminal (`nohup`).
+it means nothing to a run that was started to go on without a terminal (`nohup`). After one, later ones are ignored to
+the end of the process: the second may come while what was stopped is written down.
 """
 
 import contextlib
@@ -21,6 +22,7 @@ class StopRequest:
         self.shown = shown
         self.signal: signal.Signals | None = None
         self._former: dict[signal.Signals, object] = {}
+        self._hung_up = False
 
     def __call__(self) -> bool:
         """True once a stop was asked for."""
@@ -43,10 +45,12 @@ class StopRequest:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         for number, former in self._former.items():
-            signal.signal(number, former)  # type: ignore[arg-type]
+            gone = number == signal.SIGHUP and self._hung_up
+            signal.signal(number, signal.SIG_IGN if gone else former)  # type: ignore[arg-type]
 
     def _received(self, number: int, frame: FrameType | None) -> None:
         """Writes past Python's buffers, which the interrupted code may be using."""
+        self._hung_up |= number == signal.SIGHUP
         if number == signal.SIGHUP and self.signal is not None:
             return
         if self.signal not in (None, signal.SIGHUP):

@@ -67,7 +67,7 @@ def test_nohup_protects_a_run(workplace: Workplace) -> None:
 
 
 def test_a_hangup_that_comes_twice_or_before_a_request_does_not_abort(workplace: Workplace) -> None:
-    command = workplace.start("run", "small.yaml", behaviour={"teacher": {"steps": 3, "pause": 2.5}})
+    command = workplace.start("run", "small.yaml", behaviour={"teacher": {"steps": 3, "pause": 5.0}})
     until(lambda: workplace.progress("teacher"))
     for number in (signal.SIGHUP, signal.SIGHUP, signal.SIGTERM, signal.SIGHUP):
         command.signal(number)
@@ -75,6 +75,25 @@ def test_a_hangup_that_comes_twice_or_before_a_request_does_not_abort(workplace:
     assert command.finish() == 130
     assert "checkpoint written" in command.errors
     assert "aborting" not in command.errors
+
+
+def test_a_second_hangup_while_what_was_stopped_is_written_down_is_ignored() -> None:
+    """In a process of its own: it is ignored to the end of the process."""
+    program = """
+import os, signal
+from iowbc.pipeline.stop_request import StopRequest
+for number in (signal.SIGTERM, signal.SIGHUP):
+    with StopRequest() as request:
+        os.kill(os.getpid(), number)
+    assert request(), number
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    assert ignored == (number == signal.SIGHUP), number
+os.kill(os.getpid(), signal.SIGHUP)
+print("written down")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+    assert done.stdout == "written down\n", done.stderr
 
 
 @pytest.mark.parametrize("target", ["/dev/full", "a terminal without its other end"])
