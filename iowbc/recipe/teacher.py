@@ -108,8 +108,8 @@ class Teacher(Section):
     in training they move by less than a percent, and each move shifts what the policy has learnt."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """Numbers in which the hidden layers learn. `auto`: bfloat16 where the processor multiplies in it (avx512_bf16,
-    amx), which is up to twice as fast; rollouts, values and the last layers are float32 in any case. Rounding alone is a
-    divergence of 0.0014 at a std of 0.15, and grows as that shrinks: with a `desired_kl` below 0.01 take float32."""
+    amx), which is up to twice as fast; rollouts, values and the last layers are float32 in any case. Rounding alone is
+    a divergence of 0.0014 at a std of 0.15, and grows as that shrinks: with a `desired_kl` below 0.01 take float32."""
     parts: int = Field(default=2, ge=1, le=1000)
     """Parts of a minibatch that cores work on side by side while the environments rest; where there are fewer cores,
     one after another, with the same result."""
