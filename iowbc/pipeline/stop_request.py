@@ -21,8 +21,7 @@ class StopRequest:
         """shown: somebody else shows `text`, as the live table does; nothing is written here."""
         self.shown = shown
         self.signal: signal.Signals | None = None
-        self._former: dict[signal.Signals, object] = {}
-        self._hung_up = False
+        self._afterwards: dict[signal.Signals, object] = {}
 
     def __call__(self) -> bool:
         """True once a stop was asked for."""
@@ -38,21 +37,21 @@ class StopRequest:
     def __enter__(self) -> Self:
         for number in SIGNALS:
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-                self._former[number] = signal.signal(number, self._received)
+                self._afterwards[number] = signal.signal(number, self._received)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for number, former in self._former.items():
-            gone = number == signal.SIGHUP and self._hung_up
-            signal.signal(number, signal.SIG_IGN if gone else former)  # type: ignore[arg-type]
+        for number, action in self._afterwards.items():
+            signal.signal(number, action)  # type: ignore[arg-type]
 
     def _received(self, number: int, frame: FrameType | None) -> None:
         """Writes past Python's buffers, which the interrupted code may be using."""
-        self._hung_up |= number == signal.SIGHUP
-        if number == signal.SIGHUP and self.signal is not None:
-            return
+        if number == signal.SIGHUP:
+            self._afterwards[signal.SIGHUP] = signal.SIG_IGN
+            if self.signal is not None:
+                return
         if self.signal not in (None, signal.SIGHUP):
             self._write("aborting")
             raise KeyboardInterrupt
