@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
-from iowbc.pipeline.ingredients import changed_code, deciding_slices, slice_value, stage_code
+from iowbc.pipeline.code import changed_code, stage_code
+from iowbc.pipeline.ingredients import key_values, slice_value
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import START, Stage
 from iowbc.pipeline.store.artifact import Artifact
@@ -203,7 +204,7 @@ class Planner:
         ingredients = {
             "stage": stage.name,
             "version": stage.version,
-            "recipe": deciding_slices(self.deciding, stage),
+            "recipe": key_values(self.loaded.recipe, self.deciding, stage),
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
+from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
-from iowbc.pipeline.ingredients import changed_code
 from iowbc.pipeline.machine import host, versions
 from iowbc.pipeline.planner import Planner, Step
 from iowbc.pipeline.reporting import StageReport

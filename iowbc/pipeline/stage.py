@@ -126,6 +126,10 @@ def _none(recipe: Recipe) -> Iterator[tuple[str, str]]:
     return iter(())
 
 
+def _empty(recipe: Recipe) -> Mapping[str, Any]:
+    return {}
+
+
 def _never(recipe: Recipe) -> bool:
     return False
 
@@ -152,8 +156,8 @@ class Stage:
     records: curves, times, pictures, convenience."""
     problems: Callable[[Recipe], Iterator[tuple[str, str]]] = _none
     """What a recipe asks that this stage cannot do, known before it runs: dotted paths, and what is wrong there."""
-    packages: tuple[str, ...] = ()
-    """Subpackages whose code digest is recorded with the artifact, e.g. ("reference", "robot")."""
+    defaults: Callable[[Recipe], Mapping[str, Any]] = _empty
+    """Values of the program that decide the result where a recipe has none: JSON data by dotted path, for the key."""
     extends: str | None = None
     """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
     differs in nothing but a smaller one, as if it had never stopped."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
 
 PANELS = (
@@ -87,7 +87,6 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("student.safetensors", "student.json"),
-    packages=("stages.distill", "stages.training", "learning", "rollouts", *ENVIRONMENTS),
     counts=("distill.steps",),
     spreads=rolls_elsewhere,
 )

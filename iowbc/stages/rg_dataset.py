@@ -6,7 +6,7 @@ from functools import partial
 
 from iowbc.errors import StageFailed
 from iowbc.pipeline.stage import Job, Stage, always
-from iowbc.stages.spreading import label_everywhere
+from iowbc.stages.labelling import label_everywhere
 
 LABELLED = "labelled.npz"
 """The map of commands that have labels; `feasible.npz` of rg-fit is the part of it where the network moves gently."""
@@ -127,7 +127,6 @@ STAGE = Stage(
     reads=lambda recipe: (),
     run=run,
     results=("dataset.npz", LABELLED),
-    packages=("reference", "control", "robot"),
     counts=("rg.sampling.samples",),
     spreads=always,
 )

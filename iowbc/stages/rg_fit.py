@@ -87,6 +87,5 @@ STAGE = Stage(
     reads=lambda recipe: ("rg-dataset",),
     run=run,
     results=("rg.safetensors", "rg.json", "feasible.npz"),
-    packages=("reference", "control", "robot"),
     counts=("rg.sampling.samples", "rg.fit.epochs"),
 )

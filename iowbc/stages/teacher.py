@@ -10,7 +10,7 @@ from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
 from iowbc.pipeline.stage import START, Job, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
 
 if TYPE_CHECKING:
@@ -176,7 +176,6 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("teacher.safetensors", "teacher.json"),
-    packages=("stages.teacher", "stages.training", "learning", "rollouts", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",
     extends_from=(STATE, TABLE),
     starts_from="teacher.start",

@@ -28,7 +28,7 @@ from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import evaluate
-from iowbc.stages.spreading import play_everywhere
+from iowbc.stages.evaluate import play_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 
