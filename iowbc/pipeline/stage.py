@@ -140,6 +140,24 @@ def always(recipe: Recipe) -> bool:
 
 
 @dataclass(frozen=True)
+class Presentation:
+    """How artifacts of a stage are shown, and what other commands find in them."""
+
+    headline: tuple[str, ...] = ()
+    """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
+    columns: tuple[str, ...] = ()
+    """Metrics that are columns of MLflow's page."""
+    pictures: tuple[str, ...] = ()
+    """Names of figures that a report shows at once; all others can be unfolded."""
+    curves: tuple[str, ...] = ()
+    """Learning curves that a report always shows; all others can be unfolded."""
+    trained_by: str = ""
+    """Name of the method whose steps `<stage>.steps` counts; empty for a stage that does not train."""
+    leaves_policy: bool = False
+    """Whether its artifact holds a policy that can be played."""
+
+
+@dataclass(frozen=True)
 class Stage:
     """A step of the pipeline: what makes its key, and the function that does the work."""
 
@@ -168,5 +186,6 @@ class Stage:
     by whatever recipe, which is then read as `START`. It needs the files `extends_from`, too."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
+    presentation: Presentation = Presentation()
     spreads: Callable[[Recipe], bool] = _never
     """Whether it leaves its heavy work to `Job.spread` where there is one, for a given recipe."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from iowbc.errors import Interrupted, StageFailed
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
@@ -131,4 +131,7 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("policy.onnx", "contract.json", "golden.npz"),
+    presentation=Presentation(
+        headline=("parity", "inference_ms", "acceptance_survived"), columns=("parity",), leaves_policy=True
+    ),
 )

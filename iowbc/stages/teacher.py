@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import START, Job, Stage
+from iowbc.pipeline.stage import START, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
@@ -180,5 +180,12 @@ STAGE = Stage(
     extends_from=(STATE, TABLE),
     starts_from="teacher.start",
     counts=("teacher.steps",),
+    presentation=Presentation(
+        headline=("best_score", "check/survived", "episode_seconds"),
+        columns=("best_score",),
+        curves=("reward", "episode_seconds", "terminations/fallen", "curriculum_level", "check/score", "check/E_v"),
+        trained_by="PPO",
+        leaves_policy=True,
+    ),
     spreads=rolls_elsewhere,
 )

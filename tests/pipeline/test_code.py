@@ -56,7 +56,7 @@ def test_a_stage_outside_of_the_package_records_none(package: Path) -> None:
 @pytest.mark.parametrize(
     ("stage", "module"),
     [
-        ("evaluate", "recipe.evaluation.sequences"),
+        ("eval", "recipe.evaluation.sequences"),
         ("teacher", "evaluation.paper"),
         ("teacher", "stages.environments"),
         ("distill", "stages.environments"),

@@ -10,7 +10,7 @@ from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import Section, deciding
-from iowbc.stages import evaluate
+from iowbc.stages import eval as evaluate
 from iowbc.stages.registry import STAGES
 
 SIMULATING = {"teacher", "distill", "eval", "export"}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Spread, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Spread, Stage, always
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
@@ -197,5 +197,8 @@ STAGE = Stage(
     defaults=defaults,
     results=("*.parquet",),
     counts=("eval.trials",),
+    presentation=Presentation(
+        headline=("trials", "survived", "succeeded"), columns=("succeeded", "trials"), pictures=("comparison.png",)
+    ),
     spreads=always,
 )
