@@ -55,6 +55,7 @@ def run(job: Job) -> None:
     """Train the teacher; leave its best network, normalisation, curves, and an SB3 zip for users' own code."""
     from iowbc.control.action import action_mirror
     from iowbc.learning.history_environments import HistoryEnvironments
+    from iowbc.learning.side_by_side import prepare_process
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
@@ -62,6 +63,7 @@ def run(job: Job) -> None:
     from iowbc.stages.environments import training_environments
     from iowbc.task.specification import Specification
 
+    prepare_process()
     recipe, settings = job.recipe, job.recipe.teacher
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
