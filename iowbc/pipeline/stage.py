@@ -34,7 +34,7 @@ class Report(Protocol):
 class Member(Protocol):
     """An object that works for a stage on another machine, and can be remade there or elsewhere."""
 
-    def ask(self, request: str, arguments: tuple[Any, ...]) -> Any:
+    def ask(self, message: Any) -> Any:
         """Do what is asked; the answer."""
 
     def state(self) -> Any:
@@ -51,10 +51,8 @@ class Crew(Protocol):
     def states(self) -> list[Any]:
         """The state of each member after the last request that changed it."""
 
-    def ask(
-        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
-    ) -> None:
-        """Begin a request of every member, each with its own arguments. `changes`: whether it changes states;
+    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
+        """Send each member its message. `changes`: whether that changes states;
         `patience`: seconds after which a member that has not answered counts as lost."""
 
     def answers(self) -> list[Any]:
