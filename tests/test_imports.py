@@ -42,7 +42,7 @@ MAY_IMPORT = {
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
     | {"live", "web", "stages"},
-    "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
+    "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
 ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "sklearn", "mlflow", "matplotlib"}

@@ -13,7 +13,8 @@ from iowbc.commands.as_json import print_json
 from iowbc.commands.tables import plain_table
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.ingredients import key_values
-from iowbc.pipeline.planner import Planner, Step
+from iowbc.pipeline.planner import Planner
+from iowbc.pipeline.step import Step
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.reading.sweep import Sweep
 

@@ -12,9 +12,10 @@ from iowbc.commands.results import headline, next_commands, policy_stages
 from iowbc.commands.trainings import trainings_table
 from iowbc.commands.ui import view
 from iowbc.learning.curves import Curves
-from iowbc.pipeline.planner import Options, Planner
+from iowbc.pipeline.planner import planner_for
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.pipeline.step import Options
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe import recipe as recipes
 from iowbc.recipe.reading.loading import load_recipe
@@ -66,7 +67,7 @@ def run(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> Run:
     recipe = JugglersRecipe(name="small")
     loaded = replace(load_recipe(workplace.recipe), recipe=recipe)
     registry = workplace.registry | {"juggle": STAGE}
-    planner = Planner(loaded, registry, workplace.store, workplace.robot, Options())
+    planner = planner_for(loaded, registry, workplace.store, workplace.robot, Options())
     made = Runner(planner, workplace.robot, workplace.display, None, lambda: False).run()
     return Run("small", made, recipe.model_dump(mode="json"))
 
