@@ -11,7 +11,7 @@ from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
-from iowbc.commands.results import POLICIES
+from iowbc.commands.results import policy_stages
 from iowbc.commands.training import require_training
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
@@ -92,11 +92,11 @@ def _whole_source(store: Store, artifact: Artifact) -> "Source":
 def playable(store: Store, word: str, stage: str | None) -> Artifact:
     """The policy that a word and `--stage` name. Raises `UsageError`."""
     found = named(store, word).usable
-    ready = [name for name in POLICIES if name in found]
+    ready = [name for name in policy_stages() if name in found]
     if not ready or (stage is not None and stage not in ready):
         raise UsageError(
             f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
-            f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found) or 'none'}"
+            f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
         )
     return found[stage or ready[0]]
 
