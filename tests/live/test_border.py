@@ -3,6 +3,7 @@
 import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import msgspec.msgpack
@@ -161,9 +162,10 @@ def test_other_messages_of_a_browser_keep_nothing_and_end_nothing(page: Page) ->
     for junk in (b"", b"\xff", msgspec.msgpack.encode({"type": "Nothing"}), b"x" * (border.LARGEST_MESSAGE + 1)):
         with visitor(page) as client:
             client.send(junk)
-            with pytest.raises(ConnectionClosed):
-                while True:
-                    client.recv(timeout=30.0)
+            with suppress(ConnectionClosed):
+                for _ in client:
+                    """What the server had sent before."""
+            assert client.close_code is not None
     with visitor(page) as client:
         update(client, panel.speed, value=0.6)
         turned(page, 60.0, until=lambda: bool(panel.speed.value == 0.6))
