@@ -46,6 +46,6 @@ def context(width: int, height: int) -> Any:
     except Exception as error:
         other = "osmesa" if chosen == "egl" else "egl"
         raise NoRenderer(
-            f"drawing with {chosen} failed ({type(error).__name__}: {error}); set MUJOCO_GL={other}, or unset it, and start again"
+            f"drawing with {chosen} failed ({type(error).__name__}: {error}); set MUJOCO_GL={other} and start again"
         ) from error
     return made
