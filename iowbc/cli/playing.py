@@ -24,7 +24,7 @@ def play(
     partner_share: Annotated[
         float, typer.Option(help="Part of the weight that a partner bears.", min=0.0, max=1.0)
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0)] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
     disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses and pushes.")] = False,
     video: Annotated[Path | None, typer.Option(help="Make a film instead of opening a window.", metavar="MP4")] = None,
     web: Annotated[bool, typer.Option("--web", help="Drive it in the browser; needs no display.")] = False,

@@ -4,12 +4,14 @@ import dataclasses
 import json
 import os
 import shutil
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from workplace import Workplace
 
+from iowbc import files
 from iowbc.errors import Damaged, Interrupted, PipelineFailed
 from iowbc.pipeline.store.artifact import MANIFEST
 from iowbc.pipeline.store.store import Store
@@ -170,3 +172,49 @@ def test_no_flipped_bit_of_a_progress_stops_a_plan(workplace: Workplace) -> None
         flipped[place] ^= 1 << place % 8
         path.write_bytes(flipped)
         assert not planner.plan()[0].cached
+
+
+@pytest.fixture
+def elsewhere() -> Iterator[Path]:
+    """A folder on another file system than temporary files."""
+    memory = Path("/dev/shm")
+    if not memory.is_dir() or memory.stat().st_dev == Path(tempfile.gettempdir()).stat().st_dev:
+        pytest.skip("no second file system here")
+    with tempfile.TemporaryDirectory(dir=memory) as folder:
+        yield Path(folder)
+
+
+@pytest.mark.parametrize("part", ["store", "damaged", "work"])
+def test_any_part_of_the_runs_may_be_on_another_file_system(workplace: Workplace, elsewhere: Path, part: str) -> None:
+    workplace.store.runs.root.mkdir(exist_ok=True)
+    (workplace.store.runs.root / part).symlink_to(elsewhere)
+    folder = workplace.run()["teacher"].folder
+    shorten(folder / "result.json")
+    workplace.run()["teacher"].verify()
+    workplace.run(force=frozenset({"teacher"}))["teacher"].verify()
+    assert len(list(workplace.store.runs.damaged.iterdir())) == 1
+    assert not list(workplace.store.runs.store.glob("*/.*"))
+    workplace.ran()
+    workplace.run()
+    assert workplace.ran() == []
+
+
+def test_a_death_between_two_renames_loses_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    old, new = tmp_path / "name", tmp_path / "fresh"
+    for folder, text in ((old, "old"), (new, "new")):
+        folder.mkdir()
+        (folder / "file").write_text(text)
+
+    def dies(source: Path, target: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(files, "move_folder", dies)
+    with pytest.raises(KeyboardInterrupt):
+        files.replace_folder(new, old)
+    monkeypatch.undo()
+    assert (tmp_path / ".name.old" / "file").read_text() == "old"
+    files.restore_folder(tmp_path / ".name.old")
+    assert (old / "file").read_text() == "old"
+    files.replace_folder(new, old)
+    assert (old / "file").read_text() == "new"
+    assert not list(tmp_path.glob(".*"))
