@@ -6,6 +6,12 @@ from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.distribution import Distribution
 
 
+TRAINED = ("path", "follower", "leader", "stopping")
+"""Behaviours that training may draw."""
+BEHAVIOURS = (*TRAINED, "tugging", "lagging")
+"""All behaviours; a trial holds `partner_behaviour` at a place in this list. The last two are for evaluation alone."""
+
+
 class Partner(Section):
     """A compliant carrier: a spring, a damper and a preload at the far handle, on the path and at the height that the
     commands describe from where the episode began."""
