@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 
 from iowbc.arrays import Array
+from iowbc.evaluation.trials.contact_force import contact_forces, push_time
+from iowbc.evaluation.trials.errors import given_commands, moving
 from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
@@ -16,7 +18,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import GRAVITY
 from iowbc.task.episodes import Episode
 
-STAGNATION = "stagnation"
+COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
 def measure_of(recipe: Recipe, joints: tuple[str, ...]) -> Measure:
@@ -37,6 +39,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
     if episode.script is None:
         raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
     metrics = trial_metrics(outcome.trace, episode.script, measure, held_weight(recipe, episode, outcome))
+    metrics |= contact_forces(outcome.trace) | {"push_time": _push_time(recipe.eval.success, measure, episode, outcome)}
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
@@ -48,6 +51,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "mass": trial.mass,
         "impulse": trial.impulse,
         "trial": trial.number,
+        "split": recipe.eval.split,
         "seed": episode.seed,
         "duration": episode.duration,
         "height": recipe.rg.height,
@@ -55,7 +59,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "partner_share": fixed.get("partner_share", np.nan),
         "rolling_resistance": fixed.get("object_ground_friction", np.nan),
         "survived": alive,
-        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics),
+        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics, blocked=_blocked(outcome)),
         "carried": metrics["weight_in_hands"] >= recipe.eval.success.weight_in_hands,
         "kept": metrics["object_beside"] <= recipe.eval.success.object_beside,
         "end": outcome.ending,
@@ -72,19 +76,35 @@ def survived(success: Success, outcome: Outcome) -> bool:
     return outcome.survived and not slipped
 
 
-def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
-    """Whether a trial that was survived is a success: transport of what the hands carry or do not lose, or in a
-    push that is infeasible posture."""
+def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked: bool = False) -> bool:
+    """Whether a trial that was survived is a success: transport of what the hands carry or do not lose, with bounded
+    force in trials of compliance; where a push is infeasible posture and a push that goes on, in the one kind with at
+    least a force and on feet that stay, in the other with at most one.
+
+    blocked: whether what is pushed cannot be moved.
+    """
+    posture = metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
     if kind == STAGNATION:
-        return metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
+        pushes = metrics["push_time"] >= success.push_time
+        return posture and pushes and metrics["foot_slip"] <= success.foot_slide
+    if kind == COMPLIANCE and blocked:
+        touches = metrics["slip_share"] <= 1.0 - success.push_time
+        return posture and touches and metrics["hand_force_p95"] <= success.hand_force
+    if kind == COMPLIANCE:
+        bounded = metrics["handle_force_p95"] <= success.handle_force
+        return bounded and carried_along(success, metrics, success.compliance_transport)
     return carried_along(success, metrics)
 
 
-def carried_along(asked: Success | Acceptance, metrics: dict[str, float]) -> bool:
-    """Whether robot and object cover enough of the way, with enough of the weight in the hands, and stay together."""
+def carried_along(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
+    """Whether robot and object cover enough of the way, with enough of the weight in the hands, and stay together.
+
+    transport: part of the way that is enough, by default that of `asked`.
+    """
+    least = asked.transport if transport is None else transport
     shares = (
-        (metrics["transport_robot"], asked.transport),
-        (metrics["transport_object"], asked.transport),
+        (metrics["transport_robot"], least),
+        (metrics["transport_object"], least),
         (metrics["weight_in_hands"], asked.weight_in_hands),
     )
     kept = not metrics["object_beside"] > asked.object_beside
@@ -94,6 +114,26 @@ def carried_along(asked: Success | Acceptance, metrics: dict[str, float]) -> boo
 def replayed(row: "pd.Series[Any]") -> Episode:
     """The episode of a row of the long table, to be played again."""
     return Episode.from_json(json.loads(row["episode"]))
+
+
+def _blocked(outcome: Outcome) -> bool:
+    """Whether a crate resists with more than the greatest force that the feet could push with."""
+    drawn, trace = outcome.drawn, outcome.trace
+    hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
+    return float(drawn["rolling_resistance"][0]) > hold
+
+
+def _push_time(success: Success, measure: Measure, episode: Episode, outcome: Outcome) -> float:
+    assert episode.script is not None
+    trace, drawn = outcome.trace, outcome.drawn
+    return push_time(
+        trace,
+        moving(given_commands(episode.script, len(trace), trace.dt), measure.gait),
+        friction=float(drawn["ground_friction"][0]),
+        resistance=float(drawn["rolling_resistance"][0]),
+        part=success.push_force,
+        window=measure.window,
+    )
 
 
 def _plain(values: Array) -> float | list[float]:
