@@ -40,6 +40,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
     metrics = trial_metrics(outcome.trace, episode.script, measure, held_weight(recipe, episode, outcome))
     metrics |= contact_forces(outcome.trace) | {"push_time": _push_time(recipe.eval.success, measure, episode, outcome)}
+    metrics["seconds"] = outcome.seconds
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
@@ -63,7 +64,6 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "carried": metrics["weight_in_hands"] >= recipe.eval.success.weight_in_hands,
         "kept": metrics["object_beside"] <= recipe.eval.success.object_beside,
         "end": outcome.ending,
-        "seconds": outcome.seconds,
         **metrics,
         **{f"drawn_{name}": _plain(values) for name, values in outcome.drawn.items()},
         "episode": json.dumps(episode.as_json()),
@@ -86,7 +86,7 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
     posture = metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
     if kind == STAGNATION:
         pushes = metrics["push_time"] >= success.push_time
-        return posture and pushes and metrics["foot_slip"] <= success.foot_slide
+        return posture and pushes and metrics["foot_slip"] <= success.foot_slide * metrics["seconds"]
     if kind == COMPLIANCE and blocked:
         touches = metrics["slip_share"] <= 1.0 - success.push_time
         return posture and touches and metrics["hand_force_p95"] <= success.hand_force
