@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import VARIANTS
-from iowbc.evaluation.report.statistics import mean_half_width, wilson_interval
+from iowbc.evaluation.report.statistics import design_effect, mean_half_width, wilson_interval
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
 PARTS = ("", "_moving", "_clamped")
@@ -46,6 +46,9 @@ JOINT_COSTS = ("peak_torque/", "saturated/")
 """Beginnings of columns with a value a joint, averaged over the surviving trials."""
 TRAINING = "training_seed"
 """Column that tells the trainings of one variant apart; where it is absent, there is one."""
+WORLD = "trial"
+"""Column that tells worlds apart: trials of one number have the same draws and commands at every mass, in every suite
+and with every training, and count as one where intervals are concerned."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
@@ -55,8 +58,8 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
     in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
     `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving trials and
-    `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. NaN where no trial survived (or one
-    alone, for the half widths): "Fails" in the tables.
+    `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. Intervals take `WORLD` as clusters. NaN
+    where no trial survived (or one alone, for the half widths): "Fails" in the tables.
     """
     trials = with_trainings(trials)
     rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
@@ -75,7 +78,8 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
     survivors = group[group["survived"]]
     succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
     pushed = group["object_beside"].notna() & ~held
-    low, high = wilson_interval(succeeded, len(group))
+    design = design_effect(group["succeeded"].to_numpy(bool), group[WORLD].to_numpy())
+    low, high = wilson_interval(succeeded, len(group), design)
     row: dict[str, object] = {
         **key,
         "trainings": group[TRAINING].nunique(),
@@ -91,9 +95,9 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
         "rate_high": high,
     }
     for name in ALL_ERRORS:
-        values = survivors[name].dropna().to_numpy(np.float64)
-        row[name] = float(values.mean()) if len(values) else np.nan
-        row[f"{name}_half"] = mean_half_width(values)
+        told = survivors[[WORLD, name]].dropna()
+        row[name] = float(told[name].mean()) if len(told) else np.nan
+        row[f"{name}_half"] = mean_half_width(told[name].to_numpy(np.float64), told[WORLD].to_numpy())
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
     joints = [name for name in group.columns if name.startswith(JOINT_COSTS)]
     for name in (*COSTS, *joints):

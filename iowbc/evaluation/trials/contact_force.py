@@ -21,9 +21,7 @@ def contact_forces(trace: Trace) -> dict[str, float]:
     }
 
 
-def push_time(
-    trace: Trace, moving: Mask, *, friction: float, resistance: float, part: float, window: int
-) -> float:
+def push_time(trace: Trace, moving: Mask, *, friction: float, resistance: float, part: float, window: int) -> float:
     """Part of the time in which steps are commanded (T,) for which the hands push as much as asked; NaN without such
     time, or without a crate.
 

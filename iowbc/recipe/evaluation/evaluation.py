@@ -16,7 +16,6 @@ from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
 from iowbc.recipe.simulation.simulation import Simulation
 
-
 SceneName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 
 
