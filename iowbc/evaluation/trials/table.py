@@ -7,28 +7,41 @@ import numpy as np
 import pandas as pd
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.metrics import Measure, trial_metrics
+from iowbc.evaluation.trials.metrics import Measure, Met, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.recipe.evaluation.success import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import GRAVITY
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.task.episodes import Episode
 
 STAGNATION = "stagnation"
+PUSH_PART = 0.5
 
 
-def measure_of(recipe: Recipe, joints: tuple[str, ...]) -> Measure:
-    """How the trials of a recipe are measured; `joints`: their names."""
+def measure_of(recipe: Recipe, robot: Robot) -> Measure:
+    """How the trials of a recipe are measured."""
     task = recipe.task
-    return Measure(task.control_frequency, task.references.gait, task.commands, recipe.eval.foot_load, joints)
+    return Measure(
+        control_frequency=task.control_frequency,
+        gait=task.references.gait,
+        commands=task.commands,
+        foot_load=recipe.eval.foot_load,
+        push_part=PUSH_PART,
+        efforts=dict(zip(robot.joints, robot.effort.tolist(), strict=True)),
+    )
 
 
-def held_weight(recipe: Recipe, episode: Episode, outcome: Outcome) -> float:
-    """Weight of the object in the hands [N]; 0 without one."""
-    held = getattr(recipe.simulation.scenes, episode.scene).kind == "lift"
-    return GRAVITY * float(outcome.drawn["object_mass"][0]) if held else 0.0
+def met(recipe: Recipe, episode: Episode, outcome: Outcome) -> Met:
+    """What a trial met."""
+    kind = getattr(recipe.simulation.scenes, episode.scene).kind
+    drawn = {name: float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")}
+    return Met(
+        held_weight=GRAVITY * drawn["object_mass"] if kind == "lift" else 0.0,
+        ground_friction=drawn["ground_friction"],
+        rolling_resistance=drawn["rolling_resistance"] if kind == "push" else np.inf,
+    )
 
 
 def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) -> dict[str, Any]:
@@ -36,7 +49,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
     episode, fixed = trial.episode, trial.episode.fixed
     if episode.script is None:
         raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
-    metrics = trial_metrics(outcome.trace, episode.script, measure, held_weight(recipe, episode, outcome))
+    metrics = trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
