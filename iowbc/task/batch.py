@@ -23,7 +23,7 @@ from iowbc.task.layout import full_layout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.observer import Observer
-from iowbc.task.planned_pushes import PlannedPushes
+from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.record.divergences import keep_divergences
 from iowbc.task.record.recorder import count_endings, count_pushes, count_step, write_signals, write_trial_signals
 from iowbc.task.schedule import Schedule
@@ -91,6 +91,7 @@ class Batch:
             period=period,
         )
         self._pushes = PlannedPushes(schedule.pushes, period)
+        self._pulls = PlannedPulls(schedule.pulls, period)
         self.observer = Observer(self.robot, self.layout, self.simulation, self.memory)
         self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
         self._divergences = divergences
@@ -134,6 +135,8 @@ class Batch:
         simulation.feed[:, 3] = memory.command[:, HEIGHT] + 0.5 * (left + right)
         if self._pushes.any:
             simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)
+        if self._pulls.any:
+            simulation.planned_impulse[:] = self._pulls.force(memory.steps, memory.heading_reference)
         simulation.step()
         memory.steps += 1
         self.guidance.turn(memory)

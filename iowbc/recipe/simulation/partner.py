@@ -80,6 +80,12 @@ class Lagging(Section):
     """Part of the drawn damping that it has."""
 
 
+TRAINED = ("path", "follower", "leader", "stopping")
+"""Behaviours that training may draw."""
+BEHAVIOURS = (*TRAINED, "tugging", "lagging")
+"""All behaviours; a trial holds `partner_behaviour` at a place in this list. The last two are for evaluation alone."""
+
+
 class Partner(Section):
     """A compliant carrier: a spring, a damper and a preload at the far handle. Its behaviour decides where it goes."""
 
