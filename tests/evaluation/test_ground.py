@@ -43,7 +43,7 @@ def test_margins_count_loaded_feet_by_what_they_bear() -> None:
     load[:] = (300.0, 100.0)
     margin[:] = (0.03, 0.01)
     shear[:] = (30.0, 50.0)
-    margin[50:, 1], load[50:, 1] = np.nan, 0.0  # in the air
+    margin[50:, 1], load[50:, 1] = 0.0, 0.0  # in the air
     metrics = ground_metrics(replace(signals, foot_load=load, foot_margin=margin, foot_shear=shear), 50.0, 0.5)
     borne = 300.0 * 100 + 100.0 * 50
     assert metrics["pressure_margin"] == pytest.approx((0.03 * 300.0 * 100 + 0.01 * 100.0 * 50) / borne)

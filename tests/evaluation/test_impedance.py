@@ -1,20 +1,29 @@
 """Mechanical impedance, of masses, springs and dampers whose motion is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from made_up_trials import DT, trace
 
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.impedance import apparent, impedance, impedance_metrics
+from iowbc.task.episodes import PlannedPull
 
-DT = 0.02
 STIFFNESS, DAMPING, MASS = 400.0, 60.0, 12.0
 
 
-def pulled(frequency: float, seconds: float = 12.0) -> tuple[Array, Array]:
+def pulled(
+    frequency: float,
+    seconds: float = 12.0,
+    stiffness: float = STIFFNESS,
+    damping: float = DAMPING,
+    mass: float = MASS,
+) -> tuple[Array, Array]:
     """A pull of 10 N, and the steady motion of a mass on spring and damper at the end of each control period."""
     angular = 2 * np.pi * frequency
     middle = DT * (np.arange(round(seconds / DT)) + 0.5)
-    answer = 10.0 / (STIFFNESS - MASS * angular**2 + 1j * angular * DAMPING)
+    answer = 10.0 / (stiffness - mass * angular**2 + 1j * angular * damping)
     return 10.0 * np.cos(angular * middle), np.real(answer * np.exp(1j * angular * (middle + 0.5 * DT)))
 
 
@@ -32,12 +41,28 @@ def test_drift_and_noise_of_a_balancing_robot_hardly_matter() -> None:
     assert impedance(force, position + 0.03 * time - 0.002 * time**2 + noise, 0.5, DT) == pytest.approx(clean, rel=0.02)
 
 
-def test_phase_tells_spring_damper_and_mass_apart() -> None:
-    time = DT * (np.arange(600) + 0.5)
-    angle = np.pi * time
-    late = np.pi * (time + 0.5 * DT)
-    for position, phase in ((np.cos(late), -np.pi / 2), (np.sin(late), 0.0), (-np.cos(late), np.pi / 2)):
-        assert impedance_metrics(np.cos(angle), position, 0.5, DT)["impedance_phase"] == pytest.approx(phase, abs=1e-3)
+def test_a_pull_is_measured_in_its_own_direction_while_it_lasts_without_its_first_period() -> None:
+    force, position = pulled(0.5, seconds=6.0)  # three periods from 1 s on, to the left of a robot that heads along y
+    empty = trace(500)
+    forces, positions = np.zeros((500, 3)), np.tile([0.4, 0.0, 0.8], (500, 1))
+    forces[50:350, 0], positions[50:350, 0] = -force, -position
+    positions[50:150] += 1.0
+    pull = PlannedPull(1.0, 6.0, 0.5, (0.0, 10.0))
+    signals = replace(
+        empty, external_force=forces, object_position=positions, heading_reference=np.full(500, np.pi / 2)
+    )
+    metrics = impedance_metrics(signals, pull)
+    value = impedance(force, position, 0.5, DT)
+    assert metrics["impedance_real"] == pytest.approx(value.real)
+    assert metrics["impedance_imag"] == pytest.approx(value.imag)
+    assert np.isnan([*impedance_metrics(signals, None).values()]).all()
+    assert np.isnan([*impedance_metrics(empty, PlannedPull(5.0, 6.0, 0.5, (10.0, 0.0))).values()]).all(), "it fell"
+
+
+@pytest.mark.parametrize(("stiffness", "damping", "mass", "phase"), [(1, 0, 0, -0.5), (0, 1, 0, 0.0), (0, 0, 1, 0.5)])
+def test_phase_tells_spring_damper_and_mass_apart(stiffness: float, damping: float, mass: float, phase: float) -> None:
+    value = impedance(*pulled(0.5, stiffness=stiffness, damping=damping, mass=mass), 0.5, DT)
+    assert np.angle(value) == pytest.approx(phase * np.pi, abs=1e-3)
 
 
 def test_stiffness_damping_and_mass_follow_from_several_frequencies() -> None:

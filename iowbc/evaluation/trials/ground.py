@@ -30,7 +30,7 @@ def ground_metrics(trace: Trace, load: float, friction: float) -> dict[str, floa
         for swing in runs(trace.foot_contact[:, foot] == 0)
         if swing.stop - swing.start >= shortest and swing.stop < len(trace)
     ]
-    loaded = (trace.foot_load >= load) & np.isfinite(trace.foot_margin)
+    loaded = trace.foot_load >= load
     borne, margin = trace.foot_load[loaded], trace.foot_margin[loaded]
     use = trace.foot_shear[loaded] / (friction * borne)
     return {

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.evaluation.trials.trace import Trace
+from iowbc.task.episodes import PlannedPull
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,23 @@ def impedance(force: Array, position: Array, frequency: float, dt: float) -> com
     return complex(pulled / (2j * np.pi * frequency * moved))
 
 
-def impedance_metrics(force: Array, position: Array, frequency: float, dt: float) -> dict[str, float]:
-    """`impedance_real`, `impedance_imag`, `impedance_magnitude` [N·s/m] and `impedance_phase` [rad], from -π/2 (spring)
-    over 0 (damper) to π/2 (mass)."""
-    value = impedance(force, position, frequency, dt)
+def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float]:
+    """Of the object's centre to a pull: `impedance_real`, `impedance_imag`, `impedance_magnitude` [N·s/m] and
+    `impedance_phase` [rad], from -π/2 (spring) over 0 (damper) to π/2 (mass).
+
+    The first period, in which the motion builds up, is left out. NaN without a pull, and where the trial ended before.
+    """
+    value = complex(np.nan, np.nan)
+    if pull is not None:
+        first, last = (
+            round(time / trace.dt) for time in (pull.begin + 1.0 / pull.frequency, pull.begin + pull.duration)
+        )
+        if last - first >= round(1.0 / pull.frequency / trace.dt) and len(trace) >= last:
+            yaw, (forward, left) = trace.heading_reference[first], pull.force
+            along = np.array([np.cos(yaw) * forward - np.sin(yaw) * left, np.sin(yaw) * forward + np.cos(yaw) * left])
+            along /= np.linalg.norm(along)
+            force, position = trace.external_force[first:last, :2], trace.object_position[first:last, :2]
+            value = impedance(force @ along, position @ along, pull.frequency, trace.dt)
     return {
         "impedance_real": value.real,
         "impedance_imag": value.imag,

@@ -17,6 +17,7 @@ from iowbc.evaluation.trials.errors import (
 )
 from iowbc.evaluation.trials.feet import foot_metrics
 from iowbc.evaluation.trials.ground import ground_metrics
+from iowbc.evaluation.trials.impedance import impedance_metrics
 from iowbc.evaluation.trials.interaction import Push, interaction_metrics, push_metrics
 from iowbc.evaluation.trials.load import load_metrics
 from iowbc.evaluation.trials.trace import Trace
@@ -24,6 +25,7 @@ from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.task.commands.script import CommandScript
+from iowbc.task.episodes import PlannedPull
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ class Met:
     """Coefficient between feet and ground."""
     rolling_resistance: float = np.inf
     """Of a pushed object [N]."""
+    pull: PlannedPull | None = None
+    """Sinusoidal force on the object."""
 
 
 def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Met) -> dict[str, float]:
@@ -93,6 +97,7 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Me
         **load_metrics(trace, met.held_weight),
         **interaction_metrics(trace, measure.window),
         **push_metrics(trace, directions, measure.window, push),
+        **impedance_metrics(trace, met.pull),
         **effort_metrics(trace, measure.efforts),
     }
 

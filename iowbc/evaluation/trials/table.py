@@ -17,7 +17,6 @@ from iowbc.robot.description import GRAVITY, Robot
 from iowbc.task.episodes import Episode
 
 STAGNATION = "stagnation"
-PUSH_PART = 0.5
 
 
 def measure_of(recipe: Recipe, robot: Robot) -> Measure:
@@ -28,7 +27,7 @@ def measure_of(recipe: Recipe, robot: Robot) -> Measure:
         gait=task.references.gait,
         commands=task.commands,
         foot_load=recipe.eval.foot_load,
-        push_part=PUSH_PART,
+        push_part=recipe.eval.success.push_force,
         efforts=dict(zip(robot.joints, robot.effort.tolist(), strict=True)),
     )
 
@@ -41,6 +40,7 @@ def met(recipe: Recipe, episode: Episode, outcome: Outcome) -> Met:
         held_weight=GRAVITY * drawn["object_mass"] if kind == "lift" else 0.0,
         ground_friction=drawn["ground_friction"],
         rolling_resistance=drawn["rolling_resistance"] if kind == "push" else np.inf,
+        pull=episode.pull,
     )
 
 
@@ -66,6 +66,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "height": recipe.rg.height,
         "gait_period": 1.0 / measure.gait.frequency,
         "partner_share": fixed.get("partner_share", np.nan),
+        "pull_frequency": np.nan if episode.pull is None else episode.pull.frequency,
         "rolling_resistance": fixed.get("object_ground_friction", np.nan),
         "survived": alive,
         "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics),

@@ -56,7 +56,7 @@ class Trace:
     foot_slide: Array
     """Horizontal speed of the soles at their centres of pressure, shape (T, 2) [m/s]."""
     foot_margin: Array
-    """Distance of each foot's centre of pressure from the edge of its sole, NaN in the air, shape (T, 2) [m]."""
+    """Distance of each foot's centre of pressure from the edge of its sole, zero in the air, shape (T, 2) [m]."""
     foot_sink: Array
     """Downward speed of the lowest corner of each sole, shape (T, 2) [m/s]."""
     foot_peak: Array
