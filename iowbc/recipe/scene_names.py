@@ -78,9 +78,8 @@ def _trained(teacher: Teacher, export: Export) -> Iterator[tuple[str, str]]:
 
 def _evaluated(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
     """Places that name a scene of the world of trials."""
-    for path, sweep in (("lifting", evaluation.lifting), ("pushing", evaluation.pushing)):
-        if sweep is not None:
-            yield f"eval.{path}.scene", sweep.scene
+    for path, sweep in evaluation.sweeps.items():
+        yield f"eval.{path}.scene", sweep.scene
     suites = {
         "heavy": evaluation.heavy,
         "stagnation.cases": () if evaluation.stagnation is None else evaluation.stagnation.cases,

@@ -27,8 +27,8 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
 
     window: control steps of a gait period.
 
-    `hand_force_mean`, `_p95`, `_peak`: horizontal force between object and a hand, over both hands [N]; NaN without an
-    object. `handle_force_mean`, `_p95`, `_peak`: of the partner at the far handle [N]; `partner_work`: horizontal work
+    `hand_force_mean`, `_p95`, `_peak`: horizontal force between object and a hand, of the hand with more [N]; NaN
+    without an object. `handle_force_mean`, `_p95`, `_peak`: of the partner at the far handle [N]; `partner_work`: horizontal work
     done on the partner [J]; `E_v_partner`: mean planar deviation of the handle's velocity, averaged over a gait period,
     from the one that the partner intends [m/s]; NaN without a partner.
     """
@@ -72,8 +72,9 @@ def hand_forces(trace: Trace) -> Array:
 
 
 def _spread(name: str, sizes: Array) -> dict[str, float]:
+    """Of the sizes of one force (T,), or of the greater of several (T, k)."""
     return {
-        f"{name}_mean": float(np.mean(sizes)),
-        f"{name}_p95": float(np.percentile(sizes, HIGH)),
+        f"{name}_mean": float(np.mean(sizes, axis=0).max()),
+        f"{name}_p95": float(np.percentile(sizes, HIGH, axis=0).max()),
         f"{name}_peak": float(np.max(sizes)),
     }

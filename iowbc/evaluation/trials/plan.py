@@ -34,7 +34,7 @@ class Trial:
     """One trial: where it stands in the tables, and the episode it plays."""
 
     kind: str
-    """"lifting", "pushing", "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance", "map", or another
+    """"lifting", "pushing", "squeezing", "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance", "map", or another
     word for what is asked."""
     suite: str
     """The table it belongs to: the kind, with what partner, and whether undisturbed beside disturbed ones."""
@@ -207,13 +207,9 @@ def trials_of(
 
 
 def planned_sweeps(recipe: Recipe) -> list[PlannedSweep]:
-    """The sweeps of lifting and pushing, each with every share of the partner's, then those without disturbances."""
-    evaluation = recipe.eval
-    asked = {"lifting": evaluation.lifting, "pushing": evaluation.pushing}
-    planned = []
-    for kind, sweep in asked.items():
-        if sweep is None:
-            continue
+    """The sweeps, each with every share of the partner's, then those without disturbances."""
+    evaluation, planned = recipe.eval, []
+    for kind, sweep in evaluation.sweeps.items():
         alone = 0.0 if 0.0 in sweep.partner_shares else sweep.partner_shares[0]
         for share in sweep.partner_shares:
             no_object = sweep.no_object and share == alone

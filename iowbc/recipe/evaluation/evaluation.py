@@ -11,7 +11,7 @@ from iowbc.recipe.evaluation.scripts import DrawnScripts
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.success import Success
 from iowbc.recipe.evaluation.suites import HeavyCase, Robustness, Stagnation, Sweep
-from iowbc.recipe.evaluation.trial_scenes import TrialScene
+from iowbc.recipe.evaluation.trial_scenes import SIZES, TrialScene
 from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
 from iowbc.recipe.simulation.simulation import Simulation
@@ -43,7 +43,7 @@ class Evaluation(Section):
     simulation: Simulation | None = None
     """The world of all trials; empty is the training's. Pinned (`{}` to the default), variants that were trained
     in other worlds meet the same trials."""
-    scenes: dict[SceneName, TrialScene] = Field(default_factory=dict)
+    scenes: dict[SceneName, TrialScene] = Field(default=SIZES)
     """Further scenes of the trials, by name: other objects, sizes and grasps for a policy that is trained already."""
     batch: int = Field(default=64, ge=1, le=10_000)
     """Trials played at once, over all workers. A policy computes in the shape of a whole batch, so that a trial is the
@@ -54,6 +54,8 @@ class Evaluation(Section):
     """Masses lifted (paper's Table II); empty leaves the sweep out."""
     pushing: Sweep | None = None
     """Masses pushed (paper's Table III), with a rolling resistance; empty leaves the sweep out."""
+    squeezing: Sweep | None = None
+    """Masses held between the palms by friction alone, in a scene such as `squeeze`; empty leaves the sweep out."""
     heavy: tuple[HeavyCase, ...] = ()
     """The paper's heavy tasks: 7 kg box, 18 kg tyre, 65 kg crate with a partner."""
     stagnation: Stagnation | None = None
@@ -92,13 +94,18 @@ class Evaluation(Section):
     def _something_to_do(self) -> Self:
         if not (self.measured or self.probe):
             raise ValueError(
-                "nothing to evaluate: give lifting, pushing, heavy, stagnation, robustness, compliance, map or probe, "
-                "or leave eval out of the stages"
+                "nothing to evaluate: give lifting, pushing, squeezing, heavy, stagnation, robustness, compliance, map "
+                "or probe, or leave eval out of the stages"
             )
         return self
 
     @property
+    def sweeps(self) -> dict[str, Sweep]:
+        """The sweeps, by what is done with the objects."""
+        asked = {"lifting": self.lifting, "pushing": self.pushing, "squeezing": self.squeezing}
+        return {kind: sweep for kind, sweep in asked.items() if sweep is not None}
+
+    @property
     def measured(self) -> bool:
         """Whether there are trials whose errors are measured: a probe has none."""
-        named = (self.lifting, self.pushing, self.heavy, self.stagnation, self.robustness, self.compliance, self.map)
-        return any(named)
+        return any((self.sweeps, self.heavy, self.stagnation, self.robustness, self.compliance, self.map))

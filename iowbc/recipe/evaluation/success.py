@@ -26,16 +26,16 @@ class Success(Section):
     both forces are averaged over a gait period."""
     push_time: float = Field(default=0.5, ge=0, le=1)
     """Part of the time in which steps are commanded for which they have to push so."""
-    foot_slide: float = Field(default=0.3, gt=0)
-    """Furthest that the loaded soles slide, both feet together, in a stagnating push that is a success [m]: a foot that
-    slides by 2 cm in each of seven strides."""
+    foot_slide: float = Field(default=0.1, gt=0)
+    """Largest mean speed at which the loaded soles slide, both feet together, in a stagnating push that is a success
+    [m/s]: twice that of a robot that walks."""
     handle_force: float = Field(default=50.0, gt=0)
     """Largest 95th percentile of the horizontal force between partner and object in a trial of compliance that is a
     success [N]: a little above the 40 N of a firm pull of one arm, well below the 80 N at which the partner's own
     arms give in."""
-    hand_force: float = Field(default=100.0, gt=0)
-    """Largest 95th percentile of the horizontal force at either hand before a blocked crate in such a trial [N]. Both
-    together then push with less than foot friction allows, and with more than half of it."""
+    hand_force: float = Field(default=70.0, gt=0)
+    """Largest 95th percentile of the horizontal force at either hand before a blocked crate in such a trial [N]. Two
+    hands may then push with 140 N, where foot friction of 0.5 allows 164 N."""
     compliance_transport: float = Field(default=0.25, ge=0, le=1)
     """Part of the commanded displacement that robot and object must cover in such a trial: half of `transport`, for the
     partner stops, lags and leads elsewhere."""

@@ -40,7 +40,7 @@ class Leader(Section):
     turning: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
     """Yaw rate that is added to the commanded one while walking [rad/s]: up to half a radian of drift in a trial."""
     sideways: Distribution = Distribution(low=-0.1, high=0.1, nominal=0.0)
-    """Velocity to the left that is added to the commanded one while walking [m/s]: half of the largest commanded one."""
+    """Velocity to the left that is added while walking [m/s]; up to half of the largest commanded one."""
     rise: Distribution = Distribution(low=0.0, high=0.06, nominal=0.0)
     """Amplitude of its own height profile, a sine [m]; hands rise and sink by this in a natural gait with a load."""
     rise_period: float = Field(default=4.0, gt=0.0)
@@ -78,12 +78,6 @@ class Lagging(Section):
     """Time by which it lags behind the commanded motion [s]: twice the largest that training draws."""
     damping: float = Field(default=0.25, ge=0.0)
     """Part of the drawn damping that it has."""
-
-
-TRAINED = ("path", "follower", "leader", "stopping")
-"""Behaviours that training may draw."""
-BEHAVIOURS = (*TRAINED, "tugging", "lagging")
-"""All behaviours; a trial holds `partner_behaviour` at a place in this list. The last two are for evaluation alone."""
 
 
 class Partner(Section):
