@@ -1,8 +1,8 @@
 """The second carrier: a spring, a damper and a preload at the object's far handle, on a path of its own.
 
-The path is that of the command, integrated from where the episode began, and changed by the partner's behaviour. But a
-follower goes where the handle goes. All is real sums, products and roots, which round alike however many environments there are; NumPy's complex
-products do not.
+The path is that of the command, integrated from where the episode began, and changed by the partner's behaviour; a
+follower goes where the handle goes. All is real sums, products and roots, which round alike however many environments
+there are; NumPy's complex products do not.
 """
 
 import numpy as np
@@ -196,7 +196,7 @@ class Partner:
         return velocity
 
     def _lead(self, which: Indices, wanted: Array, velocity: Array) -> Array:
-        """Adds the drift and the height profile of leaders (k,) to their velocity; the yaw rate to add, (n,) [rad/s]."""
+        """Adds drift and height profile of leaders (k,) to their velocity; returns yaw rates to add, (n,) [rad/s]."""
         walking = wanted[which, :2].any(axis=1)
         aside = walking * self._sideways[which]
         velocity[which, 0] -= self._heading[which, 1] * aside

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices, as_slice
+from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
 from iowbc.robot.description import load_robot
@@ -92,7 +93,8 @@ class Batch:
         self._pushes = PlannedPushes(schedule.pushes, period)
         self._pulls = PlannedPulls(schedule.pulls, period)
         self.observer = Observer(self.robot, self.layout, self.simulation, self.memory)
-        self._bound, self._divergences = task.action.bound, divergences
+        self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
+        self._divergences = divergences
 
     @property
     def command(self) -> Array:
@@ -148,7 +150,7 @@ class Batch:
         )
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
         if self._schedule.repeats:
-            write_trial_signals(self.buffers, simulation.state, simulation.foot_slide)
+            write_trial_signals(self.buffers, simulation, action * self._scale)
         memory.action[:] = action
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from changes import changed
+from pydantic import TypeAdapter, ValidationError
 
 from iowbc.recipe.simulation.holding import HOLDABLE, Held
 from iowbc.recipe.simulation.partner import BEHAVIOURS, TRAINED, Behaviours
@@ -11,12 +12,11 @@ from iowbc.recipe.simulation.simulation import Simulation
 from iowbc.sim.episode_draws import Draws
 from iowbc.sim.partner import Partner
 from iowbc.sim.state import SimulationState
-from pydantic import TypeAdapter, ValidationError
 
 PERIOD = 0.02
 MASS = 7.0
 LEAD = 6.0
-"""Force of a spring of 600 N/m at most whose aim is at the end of a period of 0.5 m/s, and the handle at its start [N]."""
+"""Largest force of a spring whose aim is at the end of a period at 0.5 m/s, and the handle at its start [N]."""
 
 
 class Handle:

@@ -83,7 +83,7 @@ class Protocol:
         self.work, self.workers = work, workers
         self.interrupted, self.progress = interrupted, progress
         self.elsewhere = elsewhere
-        self.measure = measure_of(world.recipe, load_robot(world.robot).joints)
+        self.measure = measure_of(world.recipe, load_robot(world.robot))
         self.done, self.total = 0, 0
 
     def run(self) -> pd.DataFrame:

@@ -50,7 +50,7 @@ class QuickEvaluation:
         """`check`: see `figures`; `workers`: processes, on which no figure depends; 0 steps the trials in this one."""
         self._check = check or Check()
         self.world, self.trials, self.recipe = world, tuple(trials), world.recipe
-        self._measure = measure_of(world.recipe, load_robot(world.robot).joints)
+        self._measure = measure_of(world.recipe, load_robot(world.robot))
         episodes = [trial.episode for trial in trials]
         self._environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=episodes)
 

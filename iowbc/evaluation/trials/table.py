@@ -7,30 +7,41 @@ import numpy as np
 import pandas as pd
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.contact_force import contact_forces, push_time
-from iowbc.evaluation.trials.errors import given_commands, moving
-from iowbc.evaluation.trials.metrics import Measure, trial_metrics
+from iowbc.evaluation.trials.metrics import Measure, Met, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.recipe.evaluation.success import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import GRAVITY
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.task.episodes import Episode
 
 COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
-def measure_of(recipe: Recipe, joints: tuple[str, ...]) -> Measure:
-    """How the trials of a recipe are measured; `joints`: their names."""
+def measure_of(recipe: Recipe, robot: Robot) -> Measure:
+    """How the trials of a recipe are measured."""
     task = recipe.task
-    return Measure(task.control_frequency, task.references.gait, task.commands, recipe.eval.foot_load, joints)
+    return Measure(
+        control_frequency=task.control_frequency,
+        gait=task.references.gait,
+        commands=task.commands,
+        foot_load=recipe.eval.foot_load,
+        push_part=recipe.eval.success.push_force,
+        efforts=dict(zip(robot.joints, robot.effort.tolist(), strict=True)),
+    )
 
 
-def held_weight(recipe: Recipe, episode: Episode, outcome: Outcome) -> float:
-    """Weight of the object in the hands [N]; 0 without one."""
-    held = getattr(recipe.simulation.scenes, episode.scene).kind == "lift"
-    return GRAVITY * float(outcome.drawn["object_mass"][0]) if held else 0.0
+def met(recipe: Recipe, episode: Episode, outcome: Outcome) -> Met:
+    """What a trial met."""
+    kind = getattr(recipe.simulation.scenes, episode.scene).kind
+    drawn = {name: float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")}
+    return Met(
+        held_weight=GRAVITY * drawn["object_mass"] if kind == "lift" else 0.0,
+        ground_friction=drawn["ground_friction"],
+        rolling_resistance=drawn["rolling_resistance"] if kind == "push" else np.inf,
+        pull=episode.pull,
+    )
 
 
 def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) -> dict[str, Any]:
@@ -38,8 +49,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
     episode, fixed = trial.episode, trial.episode.fixed
     if episode.script is None:
         raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
-    metrics = trial_metrics(outcome.trace, episode.script, measure, held_weight(recipe, episode, outcome))
-    metrics |= contact_forces(outcome.trace) | {"push_time": _push_time(recipe.eval.success, measure, episode, outcome)}
+    metrics = trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
     metrics["seconds"] = outcome.seconds
     alive = survived(recipe.eval.success, outcome)
     return {
@@ -58,6 +68,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "height": recipe.rg.height,
         "gait_period": 1.0 / measure.gait.frequency,
         "partner_share": fixed.get("partner_share", np.nan),
+        "pull_frequency": np.nan if episode.pull is None else episode.pull.frequency,
         "rolling_resistance": fixed.get("object_ground_friction", np.nan),
         "survived": alive,
         "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics, blocked=_blocked(outcome)),
@@ -85,13 +96,13 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
     """
     posture = metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
     if kind == STAGNATION:
-        pushes = metrics["push_time"] >= success.push_time
+        pushes = metrics["push_force_share"] >= success.push_time
         return posture and pushes and metrics["foot_slip"] <= success.foot_slide * metrics["seconds"]
     if kind == COMPLIANCE and blocked:
         touches = metrics["slip_share"] <= 1.0 - success.push_time
         return posture and touches and metrics["hand_force_p95"] <= success.hand_force
     if kind == COMPLIANCE:
-        bounded = metrics["handle_force_p95"] <= success.handle_force
+        bounded = not metrics["handle_force_p95"] > success.handle_force
         return bounded and carried_along(success, metrics, success.compliance_transport)
     return carried_along(success, metrics)
 
@@ -121,19 +132,6 @@ def _blocked(outcome: Outcome) -> bool:
     drawn, trace = outcome.drawn, outcome.trace
     hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
     return float(drawn["rolling_resistance"][0]) > hold
-
-
-def _push_time(success: Success, measure: Measure, episode: Episode, outcome: Outcome) -> float:
-    assert episode.script is not None
-    trace, drawn = outcome.trace, outcome.drawn
-    return push_time(
-        trace,
-        moving(given_commands(episode.script, len(trace), trace.dt), measure.gait),
-        friction=float(drawn["ground_friction"][0]),
-        resistance=float(drawn["rolling_resistance"][0]),
-        part=success.push_force,
-        window=measure.window,
-    )
 
 
 def _plain(values: Array) -> float | list[float]:
