@@ -161,12 +161,14 @@ class Simulation:
         return acting
 
     @property
-    def foot_slide(self) -> Array:
-        """Speed at which loaded soles slide over the ground, left and right, (n, 2) [m/s]."""
-        speed = np.empty((self.n, 2))
-        for world in self.worlds:
-            speed[world.place] = world.foot_slide()
-        return speed
+    def soles(self) -> dict[str, Array]:
+        """What the left and right sole do, by name, (n, 2) each; see `iowbc.sim.soles.Soles`."""
+        parts = [(world.place, world.soles.arrays()) for world in self.worlds]
+        gathered = {name: np.empty((self.n, 2)) for name in parts[0][1]}
+        for place, arrays in parts:
+            for name, values in arrays.items():
+                gathered[name][place] = values
+        return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
         """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Keeps what is held

@@ -189,7 +189,7 @@ def _load(row: "pd.Series[Any]") -> str:
 
 STAGE = Stage(
     name="eval",
-    version=5,
+    version=6,
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,

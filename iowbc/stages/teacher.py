@@ -127,7 +127,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
     from iowbc.task.specification import Specification
 
     check, shares = world.recipe.teacher.check, world.recipe.task.scenes
-    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence)})
+    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence, scripts=check.scripts)})
     own = Specification(recipe, world.robot, world.rg)
     played = {"lift": check.lifting, "push": check.pushing} | check.others
     trials = [
@@ -137,7 +137,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
         for trial in quick_trials(own, scene, masses, check.trials, check.seed)
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
-    return QuickEvaluation(own, trials, fall=check.fall, workers=min(workers, len(trials)))
+    return QuickEvaluation(own, trials, check=check, workers=min(workers, len(trials)))
 
 
 def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":

@@ -11,7 +11,7 @@ from iowbc.recipe.task.task import Task
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty, initial_levels, next_levels, played_levels
 from iowbc.task.endings import Ending
-from iowbc.task.episodes import Episode, PlannedPush
+from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
 from iowbc.task.memory import Memory
 from iowbc.task.progress import course
 
@@ -58,6 +58,11 @@ class Schedule:
     def pushes(self) -> list[PlannedPush | None]:
         """The push planned for each environment, if there is one."""
         return [None] * len(self.key) if self._trials is None else [episode.push for episode in self._trials]
+
+    @property
+    def pulls(self) -> list[PlannedPull | None]:
+        """The pull planned for each environment, if there is one."""
+        return [None] * len(self.key) if self._trials is None else [episode.pull for episode in self._trials]
 
     @property
     def repeats(self) -> bool:

@@ -1,6 +1,6 @@
 """Terms and weights of the reward."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -182,6 +182,8 @@ class Reward(Section):
     """Gait constraint."""
     yielding: Yielding = Field(default=Yielding(), json_schema_extra=LATER)
     """Compliance of hands and velocity."""
+    without: tuple[Literal["sync", "object", "smooth", "gait"], ...] = Field(default=(), json_schema_extra=LATER)
+    """Groups of terms that count nothing, whatever their weights: ablations of r_sync, r_obj, r_smooth, r_gait."""
     alive: float = 0.5
     """Reward a second for not having fallen."""
     termination: float = -3.0

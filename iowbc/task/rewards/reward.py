@@ -60,8 +60,10 @@ class RewardFunction:
         execute the recipe's own terms, which else count nothing. Raises StageFailed for one that cannot be used."""
         table = TERMS if terms is None else terms
         self._columns = len(table) + len(recipe.own_terms)
+        seconds = {path: 1.0 if path in ONCE else period for path in table}
+        seconds |= {path: 0.0 for path in table if path.partition(".")[0] in recipe.without}
         weighted = {
-            path: _weighted(column, function, attrgetter(path)(recipe), 1.0 if path in ONCE else period)
+            path: _weighted(column, function, attrgetter(path)(recipe), seconds[path])
             for column, (path, function) in enumerate(table.items())
         }
         if own:
@@ -77,7 +79,7 @@ class RewardFunction:
         self._later = recipe.later
         for path, weight in (recipe.later.weights if recipe.later else {}).items():
             changed = weighted[path]
-            self._change[changed.column] = weight * (1.0 if path in ONCE else period) - changed.weight
+            self._change[changed.column] = weight * seconds[path] - changed.weight
             if changed not in self._terms:
                 self._terms.append(changed)
 
