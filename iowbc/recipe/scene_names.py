@@ -1,6 +1,7 @@
 """Whether all that goes by scene names one that there is, and whether a recipe's own scenes have all they need."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from iowbc.errors import nearest
 from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -88,14 +89,9 @@ def _evaluated(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
     for path, cases in suites.items():
         for number, case in enumerate(cases):
             yield f"eval.{path}.{number}.scene", case.scene
-    robustness, compliance = evaluation.robustness, evaluation.compliance
-    parts = {
-        "robustness.pushes": robustness and robustness.pushes,
-        "robustness.walking_pushes": robustness and robustness.walking_pushes,
-        "compliance": compliance,
-        "compliance.blocked": compliance and compliance.blocked,
-        "compliance.impedance": compliance and compliance.impedance,
-        "map": evaluation.map,
-        "probe": evaluation.probe,
-    }
+    parts: dict[str, Any] = {"compliance": evaluation.compliance, "map": evaluation.map, "probe": evaluation.probe}
+    if (robustness := evaluation.robustness) is not None:
+        parts |= {"robustness.pushes": robustness.pushes, "robustness.walking_pushes": robustness.walking_pushes}
+    if (compliance := evaluation.compliance) is not None:
+        parts |= {"compliance.blocked": compliance.blocked, "compliance.impedance": compliance.impedance}
     yield from ((f"eval.{path}.scene", part.scene) for path, part in parts.items() if part is not None)

@@ -297,12 +297,26 @@ def test_errors_differ_in_pairs_of_the_same_trial() -> None:
 
 
 def test_significance_is_that_of_the_textbooks() -> None:
-    mean, half, p = mean_difference(pd.Series([0.1, 0.2, 0.3, 0.4, 0.5]))
+    differences = pd.Series([0.1, 0.2, 0.3, 0.4, 0.5])
+    mean, half, p = mean_difference(differences, pd.Series(range(5)))
     assert (mean, half) == pytest.approx((0.3, 0.1963), abs=1e-4)
     assert p == pytest.approx(0.01324, abs=1e-4)
-    assert all(map(np.isnan, mean_difference(pd.Series([], dtype=float))))
-    better = pd.DataFrame({"succeeded_variant": [True] * 6, "succeeded_reference": [False] * 6})
+    assert all(map(np.isnan, mean_difference(pd.Series([], dtype=float), pd.Series([], dtype=int))))
+    better = pd.DataFrame({"trial": range(6), "succeeded_variant": [True] * 6, "succeeded_reference": [False] * 6})
     assert success_p(better) == pytest.approx(2 * 0.5**6)
+
+
+def test_ten_masses_in_the_same_five_worlds_are_five_worlds() -> None:
+    trials = [trials_of(name, "lifting", {float(mass): 5 for mass in range(1, 11)}) for name in ("IO-WBC", "WBC")]
+    trials[1]["E_v"] += 0.1 + 0.02 * trials[1]["trial"]
+    trials[1]["succeeded"] = False
+    table = difference_table(pd.concat(trials))
+    assert table is not None
+    row = table.numbers.iloc[0]
+    worlds = 0.1 + 0.02 * np.arange(5)
+    assert row["E_v"] == pytest.approx(worlds.mean())
+    assert row["E_v_p"] == pytest.approx(mean_difference(pd.Series(worlds), pd.Series(range(5)))[2])
+    assert row["success_p"] == pytest.approx(2 * 0.5**5), "of fifty pairs it would be 2e-15"
 
 
 def test_the_largest_push_survived_is_told_by_direction() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import VARIANTS
-from iowbc.evaluation.report.statistics import mean_half_width, wilson_interval
+from iowbc.evaluation.report.statistics import design_effect, mean_half_width, wilson_interval
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
 PARTS = ("", "_moving", "_clamped")
@@ -73,6 +73,9 @@ JOINT_COSTS = ("peak_torque/", "saturated/", f"{TORQUE}/")
 """Beginnings of columns with a value a joint, averaged over the surviving trials."""
 TRAINING = "training_seed"
 """Column that tells the trainings of one variant apart; where it is absent, there is one."""
+WORLD = "trial"
+"""Column that tells worlds apart: trials of one number have the same draws and commands at every mass, in every suite
+and with every training, and count as one where intervals are concerned."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
@@ -83,8 +86,8 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
     `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving trials and
     `<error>_half`, half its 95 % interval; `norm`, the norm of the four means; `torque_rms` of the worst joint by the
-    means of all, and its name `torque_rms_joint`. NaN where no trial survived (or one alone, for the half widths):
-    "Fails" in the tables; and in columns that trials of an earlier version do not have.
+    means of all, and its name `torque_rms_joint`. Intervals take `WORLD` as clusters. NaN where no trial survived (or
+    one alone, for the half widths): "Fails" in the tables; and in columns that trials of an earlier version do not have.
     """
     missing = [name for name in (*COSTS, *SETTINGS) if name not in trials]
     trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
@@ -104,7 +107,8 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
     survivors = group[group["survived"]]
     succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
     pushed = group["object_beside"].notna() & ~held
-    low, high = wilson_interval(succeeded, len(group))
+    design = design_effect(group["succeeded"].to_numpy(bool), group[WORLD].to_numpy())
+    low, high = wilson_interval(succeeded, len(group), design)
     row: dict[str, Any] = {
         **key,
         "trainings": group[TRAINING].nunique(),
@@ -120,9 +124,9 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
         "rate_high": high,
     }
     for name in ALL_ERRORS:
-        values = survivors[name].dropna().to_numpy(np.float64)
-        row[name] = float(values.mean()) if len(values) else np.nan
-        row[f"{name}_half"] = mean_half_width(values)
+        told = survivors[[WORLD, name]].dropna()
+        row[name] = float(told[name].mean()) if len(told) else np.nan
+        row[f"{name}_half"] = mean_half_width(told[name].to_numpy(np.float64), told[WORLD].to_numpy())
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
     joints = [name for name in group.columns if name.startswith(JOINT_COSTS)]
     for name in (*COSTS, *joints):

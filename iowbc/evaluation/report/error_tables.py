@@ -22,6 +22,8 @@ TOLD = {name: HEADS.get(name, "E_v raw [m/s]") for name in ("E_alpha", "E_h", "E
 LATEX_TOLD = {name: LATEX_HEADS.get(name, "$E_{v}$ raw") for name in TOLD}
 """Heads of the errors with it."""
 NUMBERS = {"lifting": "II", "pushing": "III"}
+SWEPT = (*NUMBERS, "squeezing")
+"""Kinds of suites that go over masses; the paper has no table of the last."""
 STANDS_STILL = "stands still"
 """The row of a robot that does nothing, computed from the script: who scores no better has done nothing."""
 ANY_MASS = "any"
@@ -38,9 +40,9 @@ def error_table(
     """
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
-    swept = kind in NUMBERS
+    swept = kind in SWEPT
     known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
-    with_paper = swept and known and asks_for_steps(chosen)
+    with_paper = kind in NUMBERS and known and asks_for_steps(chosen)
     rows = []
     for first, group in _groups(chosen, swept):
         for _, row in group.iterrows():
@@ -69,7 +71,7 @@ def error_table(
 def moving_table(summary: pd.DataFrame, suite: str) -> Table:
     """The errors over the part of the trials in which steps are asked for."""
     chosen = summary[summary["suite"] == suite]
-    swept = str(chosen["kind"].iloc[0]) in NUMBERS
+    swept = str(chosen["kind"].iloc[0]) in SWEPT
     rows = []
     for first, group in _groups(chosen, swept):
         rows += [(first, str(row["variant"]), *_errors(row, "_moving")) for _, row in group.iterrows()]
@@ -166,11 +168,14 @@ def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> 
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
-    swept = kind in NUMBERS
-    like = f" (paper's Table {NUMBERS[kind]})" if swept and asks_for_steps(chosen) else ""
-    title = f"{_with_whom(chosen, kind)}{like}" if swept else f"the suite {kind}"
+    like = f" (paper's Table {NUMBERS[kind]})" if kind in NUMBERS and asks_for_steps(chosen) else ""
+    title = f"{_with_whom(chosen, kind)}{like}" if kind in SWEPT else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
-    aim = " Success here is survival in posture, for the push is infeasible." if kind == "stagnation" else ""
+    aim = (
+        " Success here is survival in posture on feet that stay, with a push that goes on: the crate cannot move."
+        if kind == "stagnation"
+        else ""
+    )
     beside = (
         " Right, what the paper reports for its own commands, in brackets ours divided by it." if with_paper else ""
     )

@@ -9,7 +9,7 @@ from iowbc.evaluation.paper import TYRE_SUCCESS
 from iowbc.evaluation.report.aggregate import GROUP, TORQUE, suites_of, variants_of
 from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
 from iowbc.evaluation.report.captions import conditions
-from iowbc.evaluation.report.error_tables import NO_LABELS, STANDS_STILL
+from iowbc.evaluation.report.error_tables import NO_LABELS, STANDS_STILL, SWEPT
 from iowbc.evaluation.report.tables import ABSENT, Table
 
 TYRE_MASS = 18.0
@@ -59,7 +59,7 @@ def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) 
 
 def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
     """The largest mass that each variant carries and pushes with the success rate asked for."""
-    suites = suites_of(summary, "lifting", "pushing")
+    suites = suites_of(summary, *SWEPT)
     found = {
         variant: [load_capacity(summary, suite, variant, rate) for suite in suites] for variant in variants_of(summary)
     }

@@ -9,7 +9,7 @@ from iowbc.evaluation.report.aggregate import TRAINING, aggregate, asks_for_step
 from iowbc.evaluation.report.beside_paper import paper_table
 from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
-from iowbc.evaluation.report.error_tables import NO_LABELS, error_table, moving_table, slug
+from iowbc.evaluation.report.error_tables import NO_LABELS, SWEPT, error_table, moving_table, slug
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, write_figure
 from iowbc.evaluation.report.interquartile import interquartile_table
 from iowbc.evaluation.report.other_tables import (
@@ -40,9 +40,9 @@ def write_report(
     summary = aggregate(trials)
     for table in report_tables(trials, summary, capacity_rate, labels):
         write_table(table, tables)
-    for suite in suites_of(summary, "lifting", "pushing"):
+    for suite in suites_of(summary, *SWEPT):
         write_figure(errors_against_mass(summary, suite), figures / f"{slug(suite)}_errors.png")
-    if suites_of(summary, "lifting", "pushing", "heavy"):
+    if suites_of(summary, *SWEPT, "heavy"):
         write_figure(comparison(summary, capacity_rate), figures / "comparison.png")
     if suites_of(summary, "robustness", "stagnation", "pushes"):
         write_figure(robustness(summary, capacity_rate), figures / "robustness.png")
@@ -58,7 +58,7 @@ def report_tables(
     trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str]
 ) -> list[Table]:
     """All tables that the trials give; of walking and of joints only where somebody was to walk, or survived."""
-    swept, kinds = suites_of(summary, "lifting", "pushing"), set(summary["kind"])
+    swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])
     tables = [error_table(summary, suite, labels) for suite in swept]
     beside = paper_table(summary, labels)
     tables += [] if beside is None else [beside]

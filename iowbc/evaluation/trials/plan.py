@@ -23,7 +23,9 @@ SPLITS = {"development": 0, "test": 2**33}
 """What is added to the seeds of each split: no seed of a recipe is as great, so that the two never meet."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """Factors on the impulses on the object and the pushes on the base."""
-DIRECTIONS = {name: (math.cos(place * math.pi / 4), math.sin(place * math.pi / 4)) for place, name in enumerate(EIGHT)}
+DIRECTIONS: dict[str, tuple[float, float]] = {
+    name: (math.cos(place * math.pi / 4), math.sin(place * math.pi / 4)) for place, name in enumerate(EIGHT)
+}
 """Of pushes on the base, heading frame: forward, and on to the left by an eighth of a turn each."""
 AXES = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
 """Of pulls on the object, heading frame."""
@@ -34,8 +36,8 @@ class Trial:
     """One trial: where it stands in the tables, and the episode it plays."""
 
     kind: str
-    """"lifting", "pushing", "squeezing", "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance", "map", or another
-    word for what is asked."""
+    """"lifting", "pushing", "squeezing", "heavy", "stagnation", "robustness", "pushes", "compliance", "impedance",
+    "map", or another word for what is asked."""
     suite: str
     """The table it belongs to: the kind, with what partner, and whether undisturbed beside disturbed ones."""
     case: str
@@ -76,7 +78,9 @@ def sequence_for(recipe: Recipe, scene: str, own: Sequence[Segment] = ()) -> tup
     return tuple(own) or recipe.eval.sequence or (PUSHING if _pushed(recipe, scene) else LIFTING)
 
 
-def script_for(recipe: Recipe, scene: str, seed: int, own: Sequence[Segment] = (), repetitions: int = 1) -> CommandScript:
+def script_for(
+    recipe: Recipe, scene: str, seed: int, own: Sequence[Segment] = (), repetitions: int = 1
+) -> CommandScript:
     """The commands of the trial with a seed: fixed ones where a sequence is given or no scripts are drawn, else those
     drawn from the seed."""
     scripts, commands = recipe.eval.scripts, recipe.task.commands
@@ -239,7 +243,9 @@ def case_trials(recipe: Recipe) -> list[Trial]:
     ]
 
 
-def _trials_of_case(recipe: Recipe, kind: str, case: Case, *, disturbed: bool, trials: int | None = None) -> list[Trial]:
+def _trials_of_case(
+    recipe: Recipe, kind: str, case: Case, *, disturbed: bool, trials: int | None = None
+) -> list[Trial]:
     fixed = held_fixed(case, case.partner_share, disturbed=disturbed)
     return trials_of(
         recipe,

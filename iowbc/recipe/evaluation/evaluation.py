@@ -16,7 +16,6 @@ from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
 from iowbc.recipe.simulation.simulation import Simulation
 
-
 SceneName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 
 
@@ -69,8 +68,8 @@ class Evaluation(Section):
     probe: Probe | None = Field(default=None, json_schema_extra=LATER)
     """A linear probe of what the policy's history knows of the object's mass; empty leaves it out."""
     disturbances: bool = False
-    """Keep the impulses on the object and the pushes on the base during trials, at their nominal strength; the trials of
-    `compliance` and those of planned pushes are without."""
+    """Keep the impulses on the object and the pushes on the base during trials, at their nominal strength. Trials of
+    `compliance` and those of planned pushes are without them."""
     success: Success = Success()
     """When a trial counts as survived."""
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)

@@ -188,7 +188,7 @@ class Robustness(Section):
     )
     """Conditions with a 4 kg box: twice the training's largest bias of encoders [rad], inertial unit [rad], gyroscope
     [rad/s], twice its change of gains and loss of strength, the least that the linkages give in training besides,
-    actions and sensors late by one and a half control periods each, less than training's least friction, crates of 30 kg
+    actions and sensors late by one and a half control periods each, less than training's least friction, 30 kg crates
     at both ends of the rolling resistance, boxes narrower and wider than training's 0.25 m, loads further from the
     middle than training's 3 cm, palms that hold the box by nothing but friction, the paper's deepest bow, three
     sequences in a row."""
