@@ -52,7 +52,7 @@ def impedance_table(summary: pd.DataFrame) -> Table:
     chosen = summary[summary["kind"] == "impedance"]
     rows, numbers = [], []
     for direction, within in chosen.groupby("pull_direction", sort=False):
-        for frequency, group in within.groupby("pull_frequency", sort=False):
+        for frequency, group in within.groupby("pull_frequency"):
             rows += [
                 (f"{direction}, {frequency:g} Hz", str(row["variant"]), _survived(row), *_polar(_impedance(row)))
                 for _, row in group.iterrows()
