@@ -151,7 +151,7 @@ class Batch:
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
         if self._schedule.repeats:
             write_trial_signals(self.buffers, simulation, action * self._scale)
-        memory.action[:] = action
+        memory.earlier_action[:], memory.action[:] = memory.action, action
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)
 
@@ -189,7 +189,7 @@ class Batch:
         joints, pitch = self.guidance.start(which, memory, key)
         memory.clear(which)
         self.simulation.hold(self._schedule.scales(which, key), which)
-        self.simulation.reset(which, joints, base_pitch=pitch)
+        self.simulation.reset(which, joints, base_pitch=pitch, key=key)
         memory.infeasible[which] = self.simulation.infeasible[which]
         count_pushes(self.buffers, self._pushing, memory, which)
         moved = self.judge.motion(self.simulation.state)

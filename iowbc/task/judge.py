@@ -99,6 +99,7 @@ class Judge:
             heading_error=error,
             action=action,
             previous_action=memory.action,
+            earlier_action=memory.earlier_action,
             swing_profile=gait.swing_height(np, foot_phase, self._task.references.gait),
             stepping=memory.stepping,
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
@@ -107,7 +108,8 @@ class Judge:
             object_place=place,
             ended=ending.failed,
         )
-        return Judgement(moved, ending, self._reward(step, ending.diverged), memory.command.copy(), error)
+        scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
+        return Judgement(moved, ending, scored, memory.command.copy(), error)
 
     def _filter(self, memory: Memory, moved: Motion, needed: Array) -> None:
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]

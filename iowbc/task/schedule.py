@@ -77,7 +77,7 @@ class Schedule:
         """Begins new episodes: their keys, (k,)."""
         memory = self._memory
         memory.episode[which] += 1
-        key = random.absorb(self.key[which], memory.episode[which])
+        key = self._replayed(which, random.absorb(self.key[which], memory.episode[which]))
         self.episode_key[which] = key
         memory.steps[which] = 0
         memory.limit[which] = self._time_limits(which, key)
@@ -85,6 +85,15 @@ class Schedule:
         memory.walking[which] = ~standing
         memory.played[which] = played_levels(self._task.curriculum, memory.level[which], ~standing)
         return key
+
+    def _replayed(self, which: Indices, key: Keys) -> Keys:
+        """Keys of new episodes (k,), some replaced by that of the environment's failed episode."""
+        chance = self._task.curriculum.replay
+        if chance == 0.0 or self._trials is not None:
+            return key
+        memory = self._memory
+        again = memory.failed[which] & (random.uniform(key, "episode/replay", 1)[:, 0] < chance)
+        return np.where(again, memory.failed_key[which], key)
 
     def scales(self, which: Indices, key: Keys) -> dict[str, Array]:
         """How hard the simulation is to make new episodes, by name, (k,); trials say it themselves."""
@@ -123,6 +132,9 @@ class Schedule:
         moved = next_levels(curriculum, memory.level, memory.played, went)
         chosen = which[~ending.diverged[which]]
         memory.level[chosen] = moved[chosen]
+        lost, same = ending.failed[chosen], memory.failed_key[chosen] == self.episode_key[chosen]
+        memory.failed_key[chosen[lost]] = self.episode_key[chosen[lost]]
+        memory.failed[chosen] = lost | (memory.failed[chosen] & ~same)
 
     def set_levels(self, levels: Array) -> None:
         """Sets the curriculum levels (n, axes), from the next episodes on."""
