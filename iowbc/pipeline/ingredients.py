@@ -1,6 +1,7 @@
 """What the key of a stage is made of beside its inputs: its part of the recipe; and its code, which no key holds."""
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from iowbc.pipeline.stage import Stage
@@ -29,7 +30,8 @@ def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
 
 
-def stage_code(stage: Stage) -> dict[str, str]:
+@cache
+def stage_code(stage: Stage) -> Mapping[str, str]:
     """Digests of a stage's own module and of the parts of the package that it declares."""
     module = stage.run.__module__.removeprefix("iowbc.")
     own = {module} if module != stage.run.__module__ else set()
