@@ -9,6 +9,7 @@ from rich.console import Console
 
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
+from iowbc.commands.interrupt import close_on_termination
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
 from iowbc.commands.results import POLICIES
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
+    close_on_termination()
     source = named_source(store, console, word, stage, request.scene)
 
     from iowbc.evaluation.play import play
