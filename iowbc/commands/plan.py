@@ -11,8 +11,8 @@ from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned
 from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
-from iowbc.pipeline.planner import Step
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Step
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""

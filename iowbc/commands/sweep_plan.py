@@ -12,8 +12,9 @@ from rich.text import Text
 from iowbc.commands.as_json import print_json
 from iowbc.commands.tables import plain_table
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.ingredients import deciding_slices
-from iowbc.pipeline.planner import Planner, Step
+from iowbc.pipeline.ingredients import key_values
+from iowbc.pipeline.planner import Planner
+from iowbc.pipeline.step import Step
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.reading.sweep import Sweep
 
@@ -52,7 +53,7 @@ def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
         return step.key
     ingredients = {
         "stage": step.stage.name,
-        "recipe": deciding_slices(planner.deciding, step.stage),
+        "recipe": key_values(planner.loaded.recipe, planner.deciding, step.stage),
         "robot": planner.robot_digest,
         "inputs": {name: before[name] for name in planner.reads(step.stage)},
         "start": step.stage.starts_from and attrgetter(step.stage.starts_from)(planner.loaded.recipe),

@@ -26,7 +26,7 @@ QUALITY = 7
 """Of imageio-ffmpeg, 0 to 10; 20 s of 640 x 480 take about 2 MB."""
 LINES_PER_FRAME = 26
 """Height of the text: this many lines would fill the frame."""
-UNSEEN = ("robustness", "pushes")
+UNSEEN = ("robustness", "pushes", "impedance", "map")
 """Kinds of trials that look like others, and are not filmed."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 

@@ -16,7 +16,6 @@ from iowbc.learning.distillation import Experience, mirror_half, spread
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
-from iowbc.processes import keep_freed_memory
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
 from iowbc.rollouts.blocks import block_size
@@ -57,9 +56,7 @@ class StudentTraining:
     ) -> None:
         """`teachers`: arguments that rebuild the teacher; `symmetry`: as the teacher's. Observations are normalised as
         the teacher's are."""
-        torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
         torch.manual_seed(seed)
-        keep_freed_memory()
         self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
         self.teacher = teacher_policy(teacher)
         size, actions = rows.observation.stop, environments.action_space.shape[0]

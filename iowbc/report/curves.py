@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from iowbc.learning.curve_titles import title_of
 from iowbc.learning.curves import TABLE
 from iowbc.report.runs import Group
+from iowbc.stages.registry import STAGES
 
 Values = NDArray[np.float64]
 
@@ -22,18 +23,6 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 """Colours that colour-blind readers tell apart (Okabe and Ito), one for each group."""
 BAND = "33"
 """Opacity of a band, as the last two digits of its colour."""
-LEARNING: Mapping[str, tuple[str, ...]] = {
-    "teacher": (
-        "reward",
-        "episode_seconds",
-        "terminations/fallen",
-        "curriculum_level",
-        "check/score",
-        "check/E_v",
-    ),
-    "distill": ("kl", "action_agreement", "episode_seconds"),
-}
-"""The curves of each stage that are always shown; all others can be unfolded."""
 ERRORS = {
     "rate": "success rate",
     "E_v": "E_v [m/s]",
@@ -75,7 +64,7 @@ def learning_panels(
         [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
     ]
     names = dict.fromkeys(name for group in found for columns in group for name in columns if name != "step")
-    first = LEARNING.get(stage, ())
+    first = STAGES[stage].presentation.curves
     panels = {name: Panel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):

@@ -14,12 +14,9 @@ from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.report.curves import Panel, evaluation_panels, learning_panels
 from iowbc.report.runs import Group, Run, metric_rows
+from iowbc.stages.registry import STAGES
 
-TRAINED = ("teacher", "distill")
-"""Stages with learning curves."""
 KINDS = {".png": "image/png", ".mp4": "video/mp4"}
-FIRST_PICTURES = ("postures.png", "comparison.png")
-"""Pictures that are shown at once; all others can be unfolded."""
 
 
 def write_page(
@@ -44,7 +41,7 @@ def write_page(
     )
     curves: dict[str, Panel] = {}
     learning = []
-    for stage in TRAINED:
+    for stage in (name for name, one in STAGES.items() if one.presentation.trained_by):
         main, others = learning_panels(groups, stage)
         learning.append((stage, _numbered(curves, main), _numbered(curves, others)))
     evaluation = _numbered(curves, evaluation_panels(groups))
@@ -61,7 +58,7 @@ def write_page(
         evaluation=evaluation,
         films=[*_together(together, ".mp4"), *_media(runs, "videos")],
         pictures=[*_together(together, ".png"), *_media(runs, "figures")],
-        first_pictures=FIRST_PICTURES,
+        first_pictures=[name for stage in STAGES.values() for name in stage.presentation.pictures],
         differences=differences,
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
         key_shown=KEY_LENGTH,

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
 
 PANELS = (
@@ -36,12 +36,14 @@ def run(job: Job) -> None:
     """Distil the teacher; leave the student's network, normalisation and curves."""
     from iowbc.control.action import action_mirror
     from iowbc.control.observation import observation_layout
+    from iowbc.learning.side_by_side import prepare_process
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
     from iowbc.stages.environments import training_environments
 
+    prepare_process()
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
     seed = recipe.seed if settings.seed is None else settings.seed
     teacher, about = load_teacher(job.inputs["teacher"])
@@ -87,7 +89,13 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("student.safetensors", "student.json"),
-    packages=("stages.distill", "stages.training", "learning", "rollouts", *ENVIRONMENTS),
     counts=("distill.steps",),
+    presentation=Presentation(
+        headline=("kl", "action_agreement", "episode_seconds"),
+        columns=("action_agreement",),
+        curves=("kl", "action_agreement", "episode_seconds"),
+        trained_by="distillation",
+        leaves_policy=True,
+    ),
     spreads=rolls_elsewhere,
 )

@@ -27,8 +27,8 @@ from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.stages import evaluate
-from iowbc.stages.spreading import play_everywhere
+from iowbc.stages import eval as evaluate
+from iowbc.stages.eval import play_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 

@@ -21,6 +21,7 @@ from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.tracking import tracker as tracking
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import DESCRIPTION
+from iowbc.stages import registry as real
 
 CHECKPOINT = "checkpoint.one"
 STARTED = "started_at.json"
@@ -89,8 +90,17 @@ def stage(
     def known(recipe: Recipe) -> tuple[str, ...]:
         return tuple(read for read in reads if read in recipe.stages)
 
-    run, results = counting(name), ("result.json",)
-    return Stage(name, 1, slice, reads=known, run=run, results=results, counts=counts, starts_from=starts_from)
+    return Stage(
+        name,
+        1,
+        slice,
+        reads=known,
+        run=counting(name),
+        results=("result.json",),
+        counts=counts,
+        starts_from=starts_from,
+        presentation=real.STAGES[name].presentation,
+    )
 
 
 STAGES = {

@@ -27,12 +27,14 @@ from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.stages import distill, evaluate, export, teacher
+from iowbc.stages import distill, export, teacher
+from iowbc.stages import eval as evaluate
 from iowbc.stages.environments import WRITTEN, Group
 from iowbc.stages.inputs import leaves_student
 from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
+from iowbc.task.vector.requests import Reset
 from iowbc.task.vector.setup import Setup
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -77,7 +79,7 @@ def test_a_group_on_another_machine_reads_what_lies_there() -> None:
     world = Specification(small_recipe(), there / "g1", there / "rg")
     group = Group(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
     written = {name: group.state()[f"buffer/{name}"] for name in WRITTEN}
-    answer, files = group.ask("reset", (written,))
+    answer, files = group.ask((written, Reset()))
     assert (answer, files) == (None, {})
     assert len(group.state()["buffer/observation"]) == 2
 
