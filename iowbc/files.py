@@ -22,7 +22,7 @@ OLD = ".old"
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yields a path beside `path` to write a file to, which is then on disk and takes the place of `path`.
+    """Yields a path beside `path` to write a file or folder to, which is then on disk and takes the place of `path`.
 
     Where the block raises, `path` stays as it was.
     """
@@ -33,7 +33,7 @@ def replacing(path: Path) -> Iterator[Path]:
         synchronise(fresh)
         os.replace(fresh, path)
     except BaseException:
-        fresh.unlink(missing_ok=True)
+        shutil.rmtree(fresh) if fresh.is_dir() else fresh.unlink(missing_ok=True)
         raise
 
 

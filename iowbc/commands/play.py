@@ -10,6 +10,7 @@ from rich.console import Console
 
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
+from iowbc.commands.interrupt import close_on_termination
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
 from iowbc.commands.request import Request, prepared
@@ -41,6 +42,7 @@ def play_word(
 ) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
+    close_on_termination()
     source = named_source(store, console, word, stage, request.scene, registry)
 
     from iowbc.evaluation.play import play

@@ -1,12 +1,12 @@
 """`iowbc play --web`: a policy to be driven by hand in the browser, and the trials of its evaluation."""
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from iowbc.commands.evaluated import evaluated_actor
+from iowbc.commands.interrupt import close_on_termination
 from iowbc.commands.named import named
 from iowbc.commands.origins import policy_of
 from iowbc.commands.play import NO_STAGES, Registry, artifact_source, named_source
@@ -40,7 +40,7 @@ def play_on_web(
     require_training("play")
     require_viewer()
     require_free(port)
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    close_on_termination()
     evaluation = _evaluation(store, word)
     source = _source(store, console, word, stage, evaluation, registry)
 

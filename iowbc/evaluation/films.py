@@ -65,10 +65,11 @@ class Film:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.close()
-        if kind is None:
-            self._unfinished.replace(self.path)
-        else:
+        try:
+            self._writer.close()
+            if kind is None:
+                self._unfinished.replace(self.path)
+        finally:
             self._unfinished.unlink(missing_ok=True)
 
 

@@ -15,10 +15,15 @@ IN_KEYS = "recipe.recipe"
 names itself count."""
 
 
-def stage_code(stage: Stage) -> dict[str, str]:
+def stage_code(stage: Stage) -> Mapping[str, str]:
     """Digest of the stage's own module and, by room, of the modules of the package that it imports, however deep."""
     own = stage.run.__module__.removeprefix(f"{PACKAGE.name}.")
-    modules = module_closure(own) if own != stage.run.__module__ else frozenset()
+    return _code_of(own) if own != stage.run.__module__ else {}
+
+
+@functools.cache
+def _code_of(own: str) -> Mapping[str, str]:
+    modules = module_closure(own)
     parts = {name: name if name == own else name.split(".")[0] for name in modules}
     return {
         part: content_digest({name: syntax_digest(_source(name)) for name in modules if parts[name] == part})

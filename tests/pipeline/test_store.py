@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from workplace import Workplace
@@ -14,6 +15,7 @@ from workplace import Workplace
 from iowbc import files
 from iowbc.errors import Damaged, Interrupted, PipelineFailed
 from iowbc.pipeline.store.artifact import MANIFEST
+from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import PROGRESS, Workspace
 
@@ -218,3 +220,21 @@ def test_a_death_between_two_renames_loses_nothing(monkeypatch: pytest.MonkeyPat
     files.replace_folder(new, old)
     assert (old / "file").read_text() == "new"
     assert not list(tmp_path.glob(".*"))
+
+
+def rewritten(folder: Path, sealed: bool, **entries: Any) -> None:
+    """The manifest with other entries, as a newer version may write it."""
+    found = json.loads((folder / MANIFEST).read_text()) | entries
+    seal = found.pop("seal")
+    (folder / MANIFEST).write_text(json.dumps(found | {"seal": data_digest(found) if sealed else seal}))
+
+
+def test_a_manifest_with_more_entries_is_read_and_one_of_another_form_is_called_newer(workplace: Workplace) -> None:
+    made = workplace.run()
+    rewritten(made["teacher"].folder, True, cost=3.5)
+    assert workplace.plan()["teacher"].cached
+    rewritten(made["teacher"].folder, False, cost=4.0)
+    assert "differs from its seal" in workplace.plan()["teacher"].reasons[0]
+    rewritten(made["eval"].folder, True, results={"result.json": "deciding"})
+    with pytest.raises(Damaged, match="was written by a newer version of iowbc"):
+        workplace.store.find("eval", made["eval"].manifest.key)
