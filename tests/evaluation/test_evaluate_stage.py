@@ -13,18 +13,20 @@ import torch
 from stage_jobs import Backwards, make_job
 
 from iowbc.errors import Interrupted
+from iowbc.evaluation.paper import LIFTING
 from iowbc.evaluation.report.aggregate import COSTS
 from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.plan import planned_sweeps
 from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-from iowbc.evaluation.trials.quick import FIGURES, SCALES, QuickEvaluation, figures, quick_trials
+from iowbc.evaluation.trials.quick import FIGURES, QuickEvaluation, figures, quick_trials
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
+from iowbc.recipe.check import Check
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import evaluate
@@ -48,8 +50,14 @@ QUESTION = {
         "trials": 2,
         "label": "w/o RG",
         "sequence": [{"duration": 0.3, "ramp": 0.0}, {"duration": 0.1, "velocity": [0.3, 0, 0], "ramp": 0.1}],
-        "lifting": {"masses": [0, 4], "partner_shares": [0]},
-        "pushing": {"scene": "push", "masses": [20], "rolling_resistance": 0.05, "partner_shares": [0]},
+        "lifting": {"masses": [4], "partner_shares": [0]},
+        "pushing": {
+            "scene": "push",
+            "masses": [20],
+            "rolling_resistance": 0.05,
+            "partner_shares": [0],
+            "no_object": False,
+        },
         "batch": 4,
         "heavy": [{"name": "18 kg tyre", "scene": "tyre", "mass": 18.0}],
         "video": {"count": 1, "width": 96, "height": 64, "fps": 10, "duration": 1.0},
@@ -239,15 +247,19 @@ def test_the_quick_evaluation_plays_the_same_trials_again(recipe: Recipe, studen
         assert np.mean(own) == pytest.approx(first[error])
 
 
-def test_the_score_of_a_quick_evaluation_is_one_without_error_and_a_half_at_the_papers() -> None:
+def test_the_score_of_a_quick_evaluation_is_one_without_error_and_a_half_at_its_scales() -> None:
+    check = Check()
+    assert check.scales == LIFTING[0.0]["IO-WBC"], "the paper's own without a load"
     perfect = {**dict.fromkeys(FIGURES, 1.0), **dict.fromkeys(ERRORS, 0.0), "upright": 1.0}
-    assert figures([perfect])["score"] == 1.0
-    assert figures([perfect | SCALES])["score"] == pytest.approx(0.5)
-    assert figures([perfect, perfect | {"upright": 0.0}])["score"] == 0.5
-    assert figures([perfect | {"transport_robot": np.nan}])["transport"] == 0.0
+    assert figures([perfect], check)["score"] == 1.0
+    assert figures([perfect | dict(zip(ERRORS, check.scales, strict=True))], check)["score"] == pytest.approx(0.5)
+    coarse = Check(scales=(1.0, 1.0, 1.0, 1.0))
+    assert figures([perfect | dict.fromkeys(ERRORS, 1.0)], coarse)["score"] == pytest.approx(0.5)
+    assert figures([perfect, perfect | {"upright": 0.0}], check)["score"] == 0.5
+    assert figures([perfect | {"transport_robot": np.nan}], check)["transport"] == 0.0
     fallen = perfect | {"survived": 0.0, "upright": 0.9}
-    assert figures([fallen])["score"] == pytest.approx(0.9)
-    assert figures([perfect, fallen], fall=0.5)["score"] == pytest.approx((1.0 + 0.45) / 2)
+    assert figures([fallen], check)["score"] == pytest.approx(0.9)
+    assert figures([perfect, fallen], Check(fall=0.5))["score"] == pytest.approx((1.0 + 0.45) / 2)
 
 
 def test_progress_grows_within_a_batch(recipe: Recipe, student: Path, done: Job, tmp_path: Path) -> None:
