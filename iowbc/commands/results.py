@@ -29,9 +29,12 @@ HEADLINES: Mapping[str, tuple[str, ...]] = {
 """Patterns of the metrics that are shown of each stage, the most telling first; `show` has all."""
 METRICS_SHOWN = 3
 """Metrics of a stage that are shown at most."""
-TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "trainings", "probe")
+TABLES = (
+    *("lifting", "pushing", "paper", "heavy", "compliance", "impedance", "push_map"),
+    *("capacity", "interquartile", "trainings", "probe"),
+)
 """The main tables, in their order."""
-DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
+DRAWN = ("lifting", "pushing", "heavy", "compliance", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
 EXPORTED = "policy.onnx"
 POLICIES = ("export", "distill", "teacher")

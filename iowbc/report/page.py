@@ -19,7 +19,7 @@ from iowbc.report.runs import Group, Run, metric_rows
 TRAINED = ("teacher", "distill")
 """Stages with learning curves."""
 KINDS = {".png": "image/png", ".mp4": "video/mp4"}
-FIRST_PICTURES = ("postures.png", "comparison.png")
+FIRST_PICTURES = ("postures.png", "comparison.png", "compliance.png", "push_map.png")
 """Pictures that are shown at once; all others can be unfolded."""
 
 

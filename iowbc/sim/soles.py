@@ -68,7 +68,8 @@ class Soles:
     def _velocity(self, place: Array) -> Array:
         """Velocity of points of the feet, given from the robot's centre of mass, (n, 2, 3) [m/s]."""
         spatial = self._spatial[:, self._layout.feet]
-        return spatial[..., 3:] + rotations.cross(spatial[..., :3], place)
+        velocity: Array = spatial[..., 3:] + rotations.cross(spatial[..., :3], place)
+        return velocity
 
     def _margin(self, loaded: Array, pressure: Array) -> Array:
         """Distance of the centres of pressure from the edge of the sole [m]; zero in the air.
@@ -77,8 +78,8 @@ class Soles:
         """
         away = pressure + self._com - self._sites[:, self._layout.soles]
         place = rotations.rotate_inverse(self._quaternion[:, self._layout.feet], away)[..., :2]
-        margin = np.min(self._distances - np.einsum("fsk,nfk->nfs", self._normals, place), axis=-1)
-        return np.maximum(margin, 0.0) * loaded
+        margin: Array = np.min(self._distances - np.einsum("fsk,nfk->nfs", self._normals, place), axis=-1)
+        return margin.clip(0.0) * loaded
 
     def _sink(self) -> Array:
         """Downward speed of the lowest corner of each sole [m/s]."""

@@ -32,6 +32,12 @@ class PlannedPull:
     force: tuple[float, float]
     """Amplitude, forward and to the left of the commanded heading [N]."""
 
+    @property
+    def direction(self) -> str:
+        """The nearer axis: "forward" or "left"."""
+        forward, left = self.force
+        return "forward" if abs(forward) >= abs(left) else "left"
+
 
 @dataclass(frozen=True)
 class Episode:

@@ -62,7 +62,10 @@ COSTS = (
 """Other columns averaged over the surviving trials."""
 WAYS = ("transport_robot", "transport_object")
 """Columns averaged over all trials."""
-SETTINGS = ("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "height", "gait_period")
+SETTINGS = (
+    *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
+    *("height", "gait_period"),
+)
 """Columns that are the same for all trials of a row."""
 TORQUE = "torque_rms"
 """Root mean square of a joint's torque as a part of its limit: the worst joint's, and of each after a slash."""

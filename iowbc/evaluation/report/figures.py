@@ -6,6 +6,7 @@ Beside them what the paper does not show: success under harder conditions, and p
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_lowercase
 
 import numpy as np
 import pandas as pd
@@ -217,6 +218,7 @@ def _capacity_bars(axes: Axes, found: dict[str, list[Capacity | None]], names: l
 
 
 def draw_bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:
+    """Bars of each variant, side by side over each name."""
     width = 0.8 / max(len(groups), 3)
     for place, (variant, bars) in enumerate(groups.items()):
         positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
@@ -273,7 +275,8 @@ def _still_line(axes: Axes, value: float) -> None:
 
 
 def letter(panels: list[Axes]) -> None:
-    for axes, letter in zip(panels, "abcdef", strict=False):
+    """Letters before the titles of panels."""
+    for axes, letter in zip(panels, ascii_lowercase, strict=False):
         axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
 
 
@@ -283,11 +286,13 @@ def broken(text: str) -> str:
 
 
 def legend(figure: Figure, axes: Axes) -> None:
+    """One legend below all panels, with what a panel shows."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=9, ncols=len(labels), loc="outside lower center", frameon=False)
 
 
 def tidy(axes: Axes) -> None:
+    """From zero, with a grid, without a frame."""
     _from_zero(axes)
     axes.grid(True, color="0.9")
     axes.spines[["top", "right"]].set_visible(False)

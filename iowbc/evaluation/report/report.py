@@ -7,11 +7,20 @@ import pandas as pd
 
 from iowbc.evaluation.report.aggregate import TRAINING, aggregate, asks_for_steps, suites_of, with_trainings
 from iowbc.evaluation.report.beside_paper import paper_table
+from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
 from iowbc.evaluation.report.error_tables import NO_LABELS, SWEPT, error_table, moving_table, slug
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, write_figure
 from iowbc.evaluation.report.interquartile import interquartile_table
-from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
+from iowbc.evaluation.report.other_tables import (
+    capacity_table,
+    contact_table,
+    heaviest,
+    joint_table,
+    push_table,
+    success_table,
+)
+from iowbc.evaluation.report.push_map import MAP, map_figure, map_table
 from iowbc.evaluation.report.tables import Table, write_table
 
 
@@ -37,6 +46,10 @@ def write_report(
         write_figure(comparison(summary, capacity_rate), figures / "comparison.png")
     if suites_of(summary, "robustness", "stagnation", "pushes"):
         write_figure(robustness(summary, capacity_rate), figures / "robustness.png")
+    if suites_of(summary, "compliance", "impedance"):
+        write_figure(compliance_figure(summary), figures / "compliance.png")
+    if suites_of(summary, MAP):
+        write_figure(map_figure(summary), figures / "push_map.png")
     summary.to_csv(tables / "summary.csv", index=False)
     return summary
 
@@ -57,8 +70,10 @@ def report_tables(
         tables.append(capacity_table(summary, capacity_rate))
     if "pushes" in kinds:
         tables.append(push_table(summary, capacity_rate))
-    if (summary["survived"] > 0).any():
-        tables.append(joint_table(summary))
+    special = {"compliance": compliance_table, "impedance": impedance_table, MAP: map_table}
+    tables += [table(summary) for kind, table in special.items() if kind in kinds]
+    if not heaviest(summary).empty:
+        tables += [joint_table(summary), contact_table(summary)]
     several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1
     together = [difference_table(trials), interquartile_table(trials)] if several else []
     return [*tables, *(table for table in together if table is not None)]

@@ -69,6 +69,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "gait_period": 1.0 / measure.gait.frequency,
         "partner_share": fixed.get("partner_share", np.nan),
         "pull_frequency": np.nan if episode.pull is None else episode.pull.frequency,
+        "pull_direction": "" if episode.pull is None else episode.pull.direction,
         "rolling_resistance": fixed.get("object_ground_friction", np.nan),
         "survived": alive,
         "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics, blocked=_blocked(outcome)),
