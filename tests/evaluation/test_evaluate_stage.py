@@ -41,8 +41,14 @@ SOMETIMES = (
     "partner_weight_share",
     "weight_in_hands",
     "object_jerk",
+    "E_v_partner",
+    "partner_work",
+    *(f"{place}_force_{part}" for place in ("hand", "handle") for part in ("mean", "p95", "peak")),
+    *("push_force", "push_force_share", "impedance_real", "impedance_imag"),
+    *("touchdown_speed", "touchdown_speed_peak", "pressure_margin", "pressure_margin_low"),
+    *("friction_use", "friction_use_high"),
 )
-"""Figures that a trial without a walk, or without an object in the hands for a second, does not have."""
+"""Figures that a trial without a walk, an object in the hands for a second, a partner or a pull does not have."""
 QUESTION = {
     "name": "test",
     "task": {"references": {"use_rg": False}},
@@ -199,7 +205,7 @@ def test_a_sweep_goes_on_after_its_last_finished_mass(done: Job, recipe: Recipe,
 
 
 def test_a_trial_does_not_depend_on_the_batch_it_is_played_in(recipe: Recipe, student: Path, done: Job) -> None:
-    trials = [trial for sweep in planned_sweeps(recipe) for trial in sweep.trials(sweep.sweep.masses)]
+    trials = [trial for sweep in planned_sweeps(recipe) for trial in sweep.named()]
     table = pd.read_parquet(done.out / "trials.parquet")
     world = Specification(recipe, done.robot)
     for place, row in enumerate(table.query("kind != 'heavy'").to_dict("records")):
@@ -304,7 +310,7 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
     save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
     finished = job(recipe, tmp_path, tmp_path / "job")
     evaluate.run(finished)
-    assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"]
+    assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"] * 2
 
 
 def test_a_student_that_no_stage_trains_is_refused_before_anything_runs() -> None:
@@ -318,7 +324,7 @@ def test_a_student_that_no_stage_trains_is_refused_before_anything_runs() -> Non
 def test_a_sweep_goes_on_while_something_survives(recipe: Recipe, student: Path, tmp_path: Path) -> None:
     asked = {
         **QUESTION["eval"],  # type: ignore[dict-item]
-        "lifting": {"masses": [1], "beyond": {"step": 1, "limit": 3}, "partner_shares": [0, 0.5]},
+        "lifting": {"masses": [1], "beyond": {"step": 1, "limit": 3}, "partner_shares": [0, 0.5], "no_object": False},
         "pushing": None,
         "heavy": [],
         "trials": 1,

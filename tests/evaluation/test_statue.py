@@ -37,14 +37,14 @@ SUITES = {
 
 def statue(trial: Trial, joints: int) -> tuple[Trace, Met]:
     """What is recorded of a robot that stands in the nominal posture for the whole trial, with the object's weight in
-    its hands, where it trembles by some hundredths of a millimetre, or its palms at a crate that they do not push."""
+    its hands, where it trembles by a tenth of a millimetre, or its palms at a crate that they do not push."""
     steps = round(trial.episode.duration / DT)
     commands, kind = RECIPE.task.commands, getattr(RECIPE.simulation.scenes, trial.episode.scene).kind
     carried = GRAVITY * trial.mass if kind == "lift" else 0.0
     grips = np.zeros((steps, 6))
     grips[:, [2, 5]] = -carried / 2
     ahead = np.tile([0.3, 0.0, 1.0] if kind != "free" else np.zeros(3), (steps, 1))
-    ahead *= 1.0 + 1e-4 * np.sin(DT * np.arange(steps))[:, None]
+    ahead += 1e-4 * ahead.any() * np.sin(DT * np.arange(steps))[:, None]
     recorded = replace(
         trace(steps),
         pelvis_height=np.full(steps, commands.nominal_height),
@@ -87,10 +87,11 @@ def test_what_a_statue_lacks_is_motion_and_push_alone() -> None:
 def test_compliance_fails_above_its_bounds_of_force() -> None:
     success = RECIPE.eval.success
     along = {"transport_robot": 0.3, "transport_object": 0.3, "weight_in_hands": 1.0, "object_beside": 0.1}
-    along |= {"E_alpha": 0.1, "E_h": 0.01, "handle_force_p95": success.handle_force, "slip_share": 0.2}
+    along |= {"E_alpha": 0.1, "E_h": 0.01, "handle_force_p95": success.handle_force, "push_force": 30.0}
     assert succeeded(success, "compliance", along)
     assert not succeeded(success, "compliance", along | {"handle_force_p95": success.handle_force + 1.0})
     assert not succeeded(success, "lifting", along), "alone more of the way is asked for"
     blocked = along | {"hand_force_p95": success.hand_force}
     assert succeeded(success, "compliance", blocked, blocked=True)
     assert not succeeded(success, "compliance", blocked | {"hand_force_p95": success.hand_force + 1.0}, blocked=True)
+    assert not succeeded(success, "compliance", blocked | {"push_force": 5.0}, blocked=True)
