@@ -15,11 +15,11 @@ from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
 ENVIRONMENTS, LENGTH, STATE, TOLD, ACTIONS, BLOCK, STEPS = 10, 4, 3, 2, 2, 2, 6
 ROUNDING = {"rtol": 1e-6, "atol": 1e-5}
 """Of sums of terms of about 30 in 32 bits, added in another order: a processor's own."""
-RANDOM = np.random.default_rng(0)
 
 
 def normal(*shape: int) -> Any:
-    return RANDOM.normal(size=shape).astype(np.float32)
+    """Numbers that follow from the shape alone."""
+    return np.random.default_rng(shape).normal(size=shape).astype(np.float32)
 
 
 def linear(inputs: int, outputs: int) -> Linear:
@@ -38,7 +38,7 @@ STUDENT = HistoryPolicy(
     None,
     Perceptron((linear(STATE + 6, 8), linear(8, ACTIONS)), "relu"),
 )
-ROWS, ENDS = normal(STEPS + 1, ENVIRONMENTS, STATE + TOLD), RANDOM.random((STEPS, ENVIRONMENTS)) < 0.3
+ROWS, ENDS = normal(STEPS + 1, ENVIRONMENTS, STATE + TOLD), np.random.default_rng(0).random((STEPS, ENVIRONMENTS)) < 0.3
 
 
 def past() -> Past:
