@@ -24,6 +24,8 @@ from iowbc.stages import teacher
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
+pytestmark = pytest.mark.system
+
 ROOT = DOCS.parent
 TINY = (
     *("task.references.use_rg=false", "task.episode_duration=[0.2, 1.0]", "teacher.environments=4"),

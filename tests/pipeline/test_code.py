@@ -10,6 +10,8 @@ import pytest
 from iowbc.pipeline import code
 from iowbc.pipeline.code import stage_code
 
+pytestmark = pytest.mark.unit
+
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

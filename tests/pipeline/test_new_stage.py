@@ -25,6 +25,8 @@ from iowbc.report.curves import learning_panels
 from iowbc.report.runs import Group, Run
 from iowbc.stages.registry import STAGES
 
+pytestmark = pytest.mark.unit
+
 
 class Juggling(Section):
     """How the new stage trains."""

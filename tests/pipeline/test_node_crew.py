@@ -17,6 +17,8 @@ from iowbc.pipeline.cluster import stragglers
 from iowbc.pipeline.cluster.crew import CORE_PATIENCE, TRIES, Holder, NodeCrew, Origin
 from iowbc.pipeline.cluster.identity import identity
 
+pytestmark = pytest.mark.unit
+
 
 class Adder:
     """A member: adds up what it is given."""

@@ -16,6 +16,8 @@ from iowbc.pipeline.store.digests import canonical_json, data_digest, syntax_dig
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.workspace import Workspace
 
+pytestmark = pytest.mark.unit
+
 
 def test_a_first_plan_says_that_nothing_is_stored(workplace: Workplace) -> None:
     assert {step.reasons for step in workplace.plan().values()} == {("nothing stored yet",)}

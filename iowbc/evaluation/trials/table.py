@@ -100,8 +100,8 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
         pushes = metrics["push_force_share"] >= success.push_time
         return posture and pushes and metrics["foot_slip"] <= success.foot_slide * metrics["seconds"]
     if kind == COMPLIANCE and blocked:
-        touches = metrics["slip_share"] <= 1.0 - success.push_time
-        return posture and touches and metrics["hand_force_p95"] <= success.hand_force
+        pushes = metrics["push_force"] >= success.least_push
+        return posture and pushes and metrics["hand_force_p95"] <= success.hand_force
     if kind == COMPLIANCE:
         bounded = not metrics["handle_force_p95"] > success.handle_force
         return bounded and carried_along(success, metrics, success.compliance_transport)

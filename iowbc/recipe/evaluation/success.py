@@ -36,6 +36,9 @@ class Success(Section):
     hand_force: float = Field(default=70.0, gt=0)
     """Largest 95th percentile of the horizontal force at either hand before a blocked crate in such a trial [N]. Two
     hands may then push with 140 N, where foot friction of 0.5 allows 164 N."""
+    least_push: float = Field(default=20.0, ge=0)
+    """Least mean force of both hands before a blocked crate in such a trial, while steps are commanded [N]: a robot that
+    does not push has nothing to yield to."""
     compliance_transport: float = Field(default=0.25, ge=0, le=1)
     """Part of the commanded displacement that robot and object must cover in such a trial: half of `transport`, for the
     partner stops, lags and leads elsewhere."""
