@@ -8,9 +8,9 @@ from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.request import Request, in_order, prepared, recipes
-from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned
+from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned, time_of
 from iowbc.commands.tables import hanging
-from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
+from iowbc.pipeline.console.wording import KEY_LENGTH, short
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.step import Step
 
@@ -59,15 +59,13 @@ def _print(steps: Sequence[Step], console: Console) -> None:
             console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
-    known = [step.guess for step in missing if step.guess is not None]
-    sure = "about" if all(step.roughly is None for step in missing) else "roughly"
+    rest = sum(step.guess is None for step in missing)
     if not missing:
         console.print("all stages are cached", highlight=False)
-    elif not known:
+    elif rest == len(missing):
         console.print(f"{count}; how long that takes is not known", highlight=False)
     else:
-        rest = len(missing) - len(known)
-        parts = [f"{sure} {duration(sum(known))}"]
+        parts = [time_of(missing)]
         parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
         console.print(f"{count}: {', and '.join(parts)}", highlight=False)
 
@@ -78,9 +76,9 @@ def _planned(step: Step) -> Text:
         published = step.artifact is not None and step.artifact.published
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if published else "cached", "cyan"), (key, "dim"))
-    takes = "" if step.expected is None else f", about {duration(step.expected)}"
+    takes = "" if step.guess is None else f", {time_of([step])}"
     if step.expected is None and step.roughly is not None:
-        takes = f", roughly {duration(step.roughly)} at the rate of {step.rate_of}"
+        takes += f" at the rate of {step.rate_of}"
     return Text.assemble(("run", "bold yellow"), takes)
 
 
@@ -99,5 +97,6 @@ def _data(step: Step) -> dict[str, Any]:
         "reasons": step.reasons,
         "notes": step.notes,
         "expected_seconds": None if step.cached else step.expected,
+        "expected_range": None if step.cached else [(step.expected or 0.0) * end for end in step.spread],
         "roughly_seconds": None if step.cached else step.roughly,
     }

@@ -67,15 +67,22 @@ def in_all(found: Planned, what: str = "points") -> str:
     shared = sum(bool(stage.shared_with) for stage in stages)
     cached = sum(stage.step.cached for stage in stages)
     head = f"{len(found)} {what}: {len(made)} stages would run, {shared} are shared, {cached} cached"
-    known = [step.guess for step in made if step.guess is not None]
-    rest = len(made) - len(known)
     if not made:
         return f"{len(found)} {what}: all stages are cached"
-    if not known:
+    rest = sum(step.guess is None for step in made)
+    if rest == len(made):
         return f"{head}; how long that takes is not known"
     unknown = f", and {rest} of unknown length" if rest else ""
-    sure = "about" if all(step.roughly is None for step in made) else "roughly"
-    return f"{head}; {sure} {duration(sum(known))} one after another{unknown}"
+    return f"{head}; {time_of(made)} one after another{unknown}"
+
+
+def time_of(steps: Sequence[Step]) -> str:
+    """The time that stages take together, as far as it is known: a range, or a guess where one of them has no more."""
+    known = [step for step in steps if step.guess is not None]
+    if any(step.expected is None for step in known):
+        return f"a guess: {duration(sum(step.guess or 0.0 for step in known))}"
+    low, high = (duration(sum((step.expected or 0.0) * step.spread[end] for step in known)) for end in (0, 1))
+    return f"{low} to {high}" if low != high else f"about {low}"
 
 
 def print_plan(sweep: Sweep, found: Planned, console: Console, as_json: bool = False) -> None:

@@ -7,7 +7,9 @@ from typing import Any
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
+from iowbc.pipeline.estimate import estimate
 from iowbc.pipeline.ingredients import key_values, slice_value
+from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Borrowed, Stage
 from iowbc.pipeline.step import Options, Step
@@ -18,7 +20,6 @@ from iowbc.pipeline.store.workspace import Workspace
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
-from iowbc.recipe.recipe import SEEDS
 from iowbc.recipe.section import deciding
 
 NOT_WHOLE = "its published artifact leaves out large files"
@@ -108,8 +109,8 @@ class Planner:
         former = self._closest(stage.name, ingredients)
         step = Step(stage, code=stage_code(stage))
         if former is not None:
-            expected, roughly = _reckoned(stage, former, ingredients)
-            step = replace(step, expected=expected, roughly=roughly, rate_of=former.manifest.recipe)
+            found = estimate(stage, ingredients, self.store.artifacts(stage.name), former)
+            step = replace(step, **vars(found), rate_of=_origin_of(former))
         if unknown:
             return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
         step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients))
@@ -133,7 +134,6 @@ class Planner:
             if changed and self.options.on_code_change == "report":
                 notes.append(changed)
             notes.extend(self._looks(stage, artifact))
-            step = replace(step, expected=artifact.manifest.seconds)
         return replace(step, artifact=artifact, damage=damage, notes=tuple(notes))
 
     def _demands(self, step: Step, whole: bool) -> Iterator[str]:
@@ -337,22 +337,10 @@ def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) 
     return artifact, ""
 
 
-def _reckoned(
-    stage: Stage, former: Artifact, ingredients: Mapping[str, Any]
-) -> tuple[float, None] | tuple[None, float]:
-    """The time that a stage takes at the rate of a stored artifact [s]: known, or roughly where more differs than seed
-    and counts.
-
-    It is proportional to each of the stage's counts.
-    """
-    old, seconds = former.ingredients, former.manifest.seconds
-    alike = old.get("version") == ingredients["version"]
-    for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
-        if path in stage.counts and MISSING not in (before, after) and before:
-            seconds *= after / before
-        elif path not in SEEDS:
-            alike = False
-    return (seconds, None) if alike else (None, seconds)
+def _origin_of(former: Artifact) -> str:
+    """Whose rate a guess is made at: the recipe of an artifact, and the machine where that is another one."""
+    made = former.manifest
+    return made.recipe if made.host == host() else f"{made.recipe} on another machine"
 
 
 def _shown(value: Any) -> str:

@@ -38,12 +38,13 @@ class Step:
     damage: str = ""
     """What is wrong with the stored artifact with this key."""
     expected: float | None = None
-    """Time that it takes at the rate of a stored artifact or of its last attempt [s]; None where no rate is known."""
+    """Time that it takes by its last runs on this machine or by its last attempt [s]; None where there are none."""
+    spread: tuple[float, float] = (1.0, 1.0)
+    """Ends of the range in which that will lie, as parts of it."""
     roughly: float | None = None
-    """Where no rate is known: time at the rate of the stored artifact that differs least, though it differs in more
-    than seed and counts [s]."""
+    """Where there are none: a guess at the rate of the stored artifact that differs least [s]."""
     rate_of: str = ""
-    """Recipe whose artifact that rate is of."""
+    """Recipe, and other machine, whose rate that is."""
     code: Mapping[str, str] = field(default_factory=dict)
     predecessor: Artifact | None = None
     """The stored artifact that it would go on from."""

@@ -68,7 +68,8 @@ class Named(Section):
 
 
 class Unfitting(ValueError):
-    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value and what is wrong there."""
+    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value, from the section that
+    raises it, and what is wrong there."""
 
     def __init__(self, problems: Sequence[tuple[str, str]]) -> None:
         self.problems = tuple(problems)

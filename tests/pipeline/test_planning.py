@@ -2,16 +2,19 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import fake_stages
 import pytest
 from workplace import RECIPE, Workplace
 
+from iowbc.commands.sweep_plan import time_of
 from iowbc.errors import RecipeError
 from iowbc.pipeline import planner as planning
 from iowbc.pipeline.code import stage_code
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.store.artifact import MANIFEST, Manifest, write_manifest
 from iowbc.pipeline.store.digests import canonical_json, data_digest, syntax_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.workspace import Workspace
@@ -204,6 +207,28 @@ def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_p
     assert (record["done"], record["total"], record["note"]) == (25, 100, "at 25")
     again.begin("small", True, {})
     assert again.record["done"] == 0, "a forced attempt begins anew"
+
+
+def rewritten(folder: Path, **entries: Any) -> None:
+    """The manifest of an artifact with other entries."""
+    manifest = Manifest.model_validate_json((folder / MANIFEST).read_bytes())
+    write_manifest(folder, manifest.model_copy(update=entries))
+
+
+def test_a_time_is_a_range_over_the_last_runs_here_and_a_guess_where_there_are_none(workplace: Workplace) -> None:
+    for seed, seconds in enumerate((100.0, 300.0, 200.0)):
+        rewritten(workplace.run(f"teacher.seed={seed}")["teacher"].folder, seconds=seconds)
+    step = workplace.plan("teacher.seed=9")["teacher"]
+    assert (step.expected, step.roughly) == (200.0, None)
+    assert [step.expected * end for end in step.spread] == pytest.approx([80.0, 375.0])
+    assert time_of([step]) == "80 s to 6 min"
+    for artifact in workplace.store.artifacts("teacher"):
+        rewritten(artifact.folder, host="elsewhere")
+    step = workplace.plan("teacher.seed=9")["teacher"]
+    assert step.expected is None
+    assert step.roughly in (100.0, 200.0, 300.0)
+    assert step.rate_of == "small on another machine"
+    assert time_of([step]).startswith("a guess: ")
 
 
 def test_where_more_differs_the_time_of_what_differs_least_is_told_as_rough(workplace: Workplace) -> None:
