@@ -40,9 +40,8 @@ def compliance_table(summary: pd.DataFrame) -> Table:
         "trial, at the partner's handle, and at the hand with more; work: horizontal, done on the partner; means over "
         "all trials up to their end. E_v against the command, averaged over a gait period and raw; E_v partner: "
         "velocity of the handle against the one that the partner intends; means over surviving trials. "
-        f"{FAILS}: none survived. {STANDS_STILL}: what doing nothing scores, from the script. Peak force of a hand on a "
-        "blocked crate, of the first published controllers: "
-        f"{before}. In simulation, undisturbed, {partner(chosen)}."
+        f"{FAILS}: none survived. {STANDS_STILL}: what doing nothing scores, from the script. Peak force of a hand on "
+        f"a blocked crate, of the first published controllers: {before}. In simulation, undisturbed, {partner(chosen)}."
         f"{trainings(chosen)}"
     )
     return Table("compliance", caption, head, head, tuple(rows), chosen)
