@@ -15,13 +15,14 @@ from iowbc.stages.spreading import play_everywhere
 if TYPE_CHECKING:
     import pandas as pd
 
-    from iowbc.learning.acting import Policy
+    from iowbc.evaluation.trials.rollout import Acting
     from iowbc.task.specification import Specification
 
 
-def acting_stage(recipe: Recipe) -> str:
-    """The stage whose artifact holds the policy to evaluate."""
-    return policy_stage(recipe) if recipe.eval.policy == "student" else "teacher"
+def acting_stage(recipe: Recipe) -> tuple[str, ...]:
+    """The stage whose artifact holds the policy to evaluate; none for the quadratic program."""
+    stages = {"student": (policy_stage(recipe),), "teacher": ("teacher",), "model": ()}
+    return stages[recipe.eval.policy]
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -29,20 +30,22 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     if recipe.eval.policy == "student" and not leaves_student(recipe):
         text = "asks for the student, and no stage of the recipe trains one: add `distill` to its stages, or evaluate "
         yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
+    if recipe.eval.policy == "model" and recipe.eval.probe is not None:
+        yield "eval.probe", "reads what a trained policy knows of its load: leave it out, or evaluate the student"
 
 
 def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
     import torch
 
+    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.trials.protocol import evaluated_world
-    from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe = job.recipe
-    policy = load_policy(job.inputs[acting_stage(recipe)])
     world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
+    policy = evaluated_policy(world, read_by_trials(job).get("policy"))
     metrics: dict[str, float] = {}
     try:
         if recipe.eval.measured:
@@ -55,7 +58,7 @@ def run(job: Job) -> None:
     job.summarize(metrics)
 
 
-def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import Film, film_trial, filmed
@@ -89,7 +92,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
     return headline(summary)
 
 
-def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
     from iowbc.evaluation.probe.readings import read
     from iowbc.evaluation.probe.regression import inferred_masses
@@ -120,8 +123,8 @@ def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float
 
 def read_by_trials(job: Job) -> dict[str, Path]:
     """Folders from which a batch of trials can be played on another machine; see `play_batch`."""
-    generator = {"generator": job.inputs["rg-fit"]} if "rg-fit" in job.inputs else {}
-    return {"robot": job.robot, "policy": job.inputs[acting_stage(job.recipe)], **generator}
+    read = [("generator", "rg-fit"), *(("policy", stage) for stage in acting_stage(job.recipe))]
+    return {"robot": job.robot} | {name: job.inputs[stage] for name, stage in read if stage in job.inputs}
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
@@ -152,11 +155,11 @@ STAGE = Stage(
     name="eval",
     version=5,
     slice=("rg.height", "simulation", "task", "eval"),
-    reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
+    reads=lambda recipe: (*generator_stage(recipe), *acting_stage(recipe)),
     run=run,
     problems=problems,
     results=("*.parquet",),
-    packages=("stages.evaluate", "evaluation", "deploy", "learning", "rollouts", *ENVIRONMENTS),
+    packages=("stages.evaluate", "evaluation", "model_based", "deploy", "learning", "rollouts", *ENVIRONMENTS),
     counts=("eval.trials",),
     spreads=always,
 )

@@ -89,16 +89,22 @@ def play_everywhere(
 
 
 def play_batch(
-    recipe: Recipe, name: str, trials: "Sequence[Trial]", *, robot: Path, policy: Path, generator: Path | None = None
+    recipe: Recipe,
+    name: str,
+    trials: "Sequence[Trial]",
+    *,
+    robot: Path,
+    policy: Path | None = None,
+    generator: Path | None = None,
 ) -> bytes:
     """The file of one batch."""
     import torch
 
+    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-    from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as in the stage
     world = evaluated_world(Specification(recipe, robot, generator))
     with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
-        return Protocol(world, load_policy(policy), work=Path(folder), workers=0).play(name, trials)
+        return Protocol(world, evaluated_policy(world, policy), work=Path(folder), workers=0).play(name, trials)
