@@ -35,6 +35,15 @@ VARIANTS = {
         "task.reward.object.vertical_velocity",
         "eval.simulation",
     },
+    "wbc_fair": {
+        "stages",
+        *(f"simulation.scenes.{name}_arms" for name in ("lift", "tyre", "push")),
+        *(f"task.scenes.{name}" for name in ("lift", "tyre", "push", "lift_arms", "tyre_arms", "push_arms")),
+        *(f"task.references.{kind}.{name}_arms" for kind in ("grasps", "loads") for name in ("lift", "tyre", "push")),
+        *(f"task.references.loads.{name}" for name in ("lift", "squeeze", "tyre")),
+        "task.observation.observe_object",
+        *(f"task.reward.object.{name}" for name in ("position", "orientation", "vertical_velocity")),
+    },
     "wo_rg": {
         "stages",
         "task.references.use_rg",
@@ -62,10 +71,19 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 
 def differences(one: Recipe, other: Recipe) -> set[str]:
-    """Dotted paths of the values that differ; a whole world pinned for the evaluation counts as one."""
+    """Dotted paths of the values that differ; a whole world pinned for the evaluation, or a scene of one's own, counts
+    as one."""
     a, b = leaves(one.model_dump()), leaves(other.model_dump())
     found = {name.removeprefix(".") for name in a.keys() | b.keys() if a.get(name) != b.get(name)}
-    return {"eval.simulation" if name.startswith("eval.simulation.") else name for name in found}
+    whole = ["eval.simulation", *(f"simulation.scenes.{name}" for name in one.simulation.scenes.own)]
+    return {next((path for path in whole if name.startswith(f"{path}.")), name) for name in found}
+
+
+def trial_world(recipe: Recipe) -> dict[str, Any]:
+    """The world of a recipe's trials, in which no scene of its own is played."""
+    simulation = recipe.eval.simulation or recipe.simulation
+    own = set(simulation.scenes.own)
+    return {name: value for name, value in leaves(simulation.model_dump()).items() if name.split(".")[2] not in own}
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in RECIPES.glob("*.yaml") if path.stem != "paper"))
@@ -89,8 +107,26 @@ def test_a_variant_shares_the_reference_generator(name: str) -> None:
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_a_variant_is_evaluated_in_the_world_where_iowbc_was_trained(name: str) -> None:
-    variant, full = recipe(name), recipe("full")
-    assert (variant.eval.simulation or variant.simulation) == (full.eval.simulation or full.simulation)
+    assert trial_world(recipe(name)) == trial_world(recipe("full"))
+
+
+def test_the_fair_load_agnostic_controller_never_meets_an_object_in_training() -> None:
+    fair = recipe("wbc_fair")
+    played = {name: getattr(fair.simulation.scenes, name) for name, share in fair.task.scenes if share > 0}
+    assert {scene.object for scene in played.values()} == {None}
+    assert not fair.task.observation.observe_object
+    weights = fair.task.reward.object
+    assert (weights.position, weights.orientation, weights.vertical_velocity, weights.beside) == (0, 0, 0, 0)
+
+
+def test_the_fair_load_agnostic_controller_practises_the_arms_of_every_grasp_as_often_as_iowbc() -> None:
+    shares = {}
+    for name in ("wbc_fair", "full"):
+        task = recipe(name).task
+        grasps = dict(task.references.grasps)
+        played = [(grasps[scene], share) for scene, share in task.scenes if share > 0]
+        shares[name] = {grasp: sum(share for own, share in played if own == grasp) for grasp, _ in played}
+    assert shares["wbc_fair"] == shares["full"]
 
 
 ABLATIONS = {
