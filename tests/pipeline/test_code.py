@@ -1,5 +1,6 @@
 """The code that an artifact records is all that its stage's imports lead to, and nothing else."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,9 +29,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "iowbc"
 
 
-def digests(package: Path, changed: str = "", module: str = "iowbc.stages.cook") -> dict[str, str]:
+def digests(package: Path, changed: str = "", module: str = "iowbc.stages.cook") -> Mapping[str, str]:
     """What is recorded after a module has changed."""
-    for cached in (code.module_closure, code._imports, code.syntax_digest):
+    for cached in (code.module_code, code.module_closure, code._imports, code.syntax_digest):
         cached.cache_clear()
     if changed:
         (package / changed).write_text((package / changed).read_text() + "answer = 42\n")
