@@ -15,10 +15,16 @@ IN_KEYS = "recipe.recipe"
 names itself count."""
 
 
-def stage_code(stage: Stage) -> dict[str, str]:
+def stage_code(stage: Stage) -> Mapping[str, str]:
     """Digest of the stage's own module and, by room, of the modules of the package that it imports, however deep."""
     own = stage.run.__module__.removeprefix(f"{PACKAGE.name}.")
-    modules = module_closure(own) if own != stage.run.__module__ else frozenset()
+    return module_code(own) if own != stage.run.__module__ else {}
+
+
+@functools.cache
+def module_code(own: str) -> Mapping[str, str]:
+    """The same for a module of the package, by its name below it."""
+    modules = module_closure(own)
     parts = {name: name if name == own else name.split(".")[0] for name in modules}
     return {
         part: content_digest({name: syntax_digest(_source(name)) for name in modules if parts[name] == part})
