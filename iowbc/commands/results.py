@@ -21,9 +21,12 @@ from iowbc.stages.registry import STAGES
 
 METRICS_SHOWN = 3
 """Metrics of a stage that are shown at most."""
-TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "trainings", "probe")
+TABLES = (
+    *("lifting", "pushing", "paper", "heavy", "compliance", "impedance", "push_map"),
+    *("capacity", "interquartile", "trainings", "probe"),
+)
 """The main tables, in their order."""
-DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
+DRAWN = ("lifting", "pushing", "heavy", "compliance", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
 EXPORTED = "policy.onnx"
 

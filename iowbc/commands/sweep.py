@@ -29,12 +29,15 @@ from iowbc.pipeline.tracking.family import Family
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
+from iowbc.recipe.sweep import MOST_POINTS
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
 
 LOGS = "logs"
 """Folder of a sweep with what each point prints."""
+MANY = 100
+"""Points whose number is told before they are planned, for that takes a while."""
 STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
 
 
@@ -48,12 +51,15 @@ class SweepRequest:
     """File that says what is varied besides."""
     jobs: int | None
     """Points that run at the same time; empty: one here, as many as there are cores on a cluster."""
+    most: int = MOST_POINTS
+    """Points at most."""
 
     @property
     def command(self) -> str:
         """The command that goes on with this sweep."""
         further = ["--from", str(self.file)] if self.file else []
         further += ["--jobs", str(self.jobs)] if self.jobs else []
+        further += ["--points", str(self.most)] if self.most != MOST_POINTS else []
         return replace(self.recipe, verb="sweep", further=further).command([])
 
 
@@ -72,12 +78,17 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
     if asked.recipe.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
-    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file)
+    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file, asked.most, _tell_count)
     points = []
     for point in found.points:
         request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
         points.append(ReadyPoint(point, *prepared(point.loaded, request, registry), request))
     return found, points
+
+
+def _tell_count(count: int) -> None:
+    if count >= MANY:
+        Console(stderr=True).print(f"plans {count:,} points", highlight=False)
 
 
 def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:

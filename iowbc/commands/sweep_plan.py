@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Any
 
 from rich.console import Console
@@ -56,7 +55,7 @@ def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
         "recipe": key_values(planner.loaded.recipe, planner.deciding, step.stage),
         "robot": planner.robot_digest,
         "inputs": {name: before[name] for name in planner.reads(step.stage)},
-        "start": step.stage.starts_from and attrgetter(step.stage.starts_from)(planner.loaded.recipe),
+        "borrowed": {name: one.named for name, one in step.stage.borrows(planner.loaded.recipe).items()},
     }
     return data_digest(ingredients)
 

@@ -18,12 +18,11 @@ names itself count."""
 def stage_code(stage: Stage) -> Mapping[str, str]:
     """Digest of the stage's own module and, by room, of the modules of the package that it imports, however deep."""
     own = stage.run.__module__.removeprefix(f"{PACKAGE.name}.")
-    return module_code(own) if own != stage.run.__module__ else {}
+    return _code_of(own) if own != stage.run.__module__ else {}
 
 
 @functools.cache
-def module_code(own: str) -> Mapping[str, str]:
-    """The same for a module of the package, by its name below it."""
+def _code_of(own: str) -> Mapping[str, str]:
     modules = module_closure(own)
     parts = {name: name if name == own else name.split(".")[0] for name in modules}
     return {

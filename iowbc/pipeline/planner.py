@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
 from iowbc.pipeline.ingredients import key_values, slice_value
 from iowbc.pipeline.nested import MISSING, differences, nested
-from iowbc.pipeline.stage import START, Stage
+from iowbc.pipeline.stage import Borrowed, Stage
 from iowbc.pipeline.step import Options, Step
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
@@ -35,9 +34,9 @@ class Planner:
         store: Store,
         robot: Path,
         options: Options,
-        origins: Mapping[str, "Planner"],
+        origins: Mapping[tuple[str, str], "Planner"],
     ) -> None:
-        """`origins`: by stage, the planner of the recipe whose artifact it begins from; see `planner_for`."""
+        """`origins`: by stage and input, the planner of the recipe that makes what is borrowed; see `planner_for`."""
         self.loaded = loaded
         self.stages = stages
         self.store = store
@@ -57,7 +56,7 @@ class Planner:
         steps: dict[str, Step] = {}
         for stage in self.stages:
             inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
-            step = self.decide(stage, {**inputs, **self.start(stage)})
+            step = self.decide(stage, {**inputs, **self.borrowed(stage)})
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
@@ -67,27 +66,27 @@ class Planner:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         return list(steps.values())
 
-    def start(self, stage: Stage) -> dict[str, Artifact | None]:
-        """The artifact that a stage begins from, by its name among the inputs; empty where the recipe names none.
+    def borrowed(self, stage: Stage) -> dict[str, Artifact | None]:
+        """The artifacts of other recipes that a stage reads, by their names among the inputs.
 
-        None for one that another recipe has not made yet. Raises `RecipeError` for one that is not stored, or damaged.
+        None for one that is not made yet. Raises `RecipeError` for one that is not stored, or damaged.
         """
-        named = named_start(self.loaded, stage)
-        if named is None:
-            return {}
-        if stage.name in self.origins:
-            step = self.origins[stage.name].plan()[-1]
-            return {START: step.artifact if step.cached else None}
-        found = [one for one in self.store.artifacts(stage.name) if one.manifest.key.startswith(named)]
+        return {name: self._found(stage, name, one) for name, one in stage.borrows(self.loaded.recipe).items()}
+
+    def _found(self, stage: Stage, name: str, borrowed: Borrowed) -> Artifact | None:
+        if (stage.name, name) in self.origins:
+            step = self.origins[stage.name, name].plan()[-1]
+            return step.artifact if step.cached else None
+        found = [one for one in self.store.artifacts(borrowed.stage) if one.manifest.key.startswith(borrowed.named)]
         if len(found) != 1:
             keys = ", ".join(one.manifest.key[:12] for one in found) or "none"
-            text = f"should begin one key of {stage.name}, begins {keys}; `iowbc ls` has them"
-            raise wrong_start(self.loaded, stage, text)
+            text = f"should begin one key of {borrowed.stage}, begins {keys}; `iowbc ls` has them"
+            raise wrong_origin(self.loaded, borrowed, text)
         try:
             found[0].verify()
         except Damaged as error:
-            raise wrong_start(self.loaded, stage, f"is damaged: {error}") from None
-        return {START: found[0]}
+            raise wrong_origin(self.loaded, borrowed, f"is damaged: {error}") from None
+        return found[0]
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
         """Names of the stages whose artifacts a stage reads."""
@@ -191,7 +190,7 @@ class Planner:
             of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
             if (
                 of_stage
-                and path != stage.starts_from
+                and path not in {borrowed.path for borrowed in stage.borrows(self.loaded.recipe).values()}
                 and MISSING not in (old, new)
                 and stage.name not in self.options.force
             ):
@@ -266,14 +265,15 @@ def planner_for(
     itself = () if loaded.overrides else (loaded.file.resolve(),)
     origins = {}
     for stage in stages:
-        origin = _origin(loaded, stage, (*above, *itself))
-        if origin is not None:
-            until = replace(options, until=stage.name, force=frozenset())
-            origins[stage.name] = planner_for(origin, registry, store, robot, until, (*above, *itself))
+        for name, borrowed in stage.borrows(loaded.recipe).items():
+            origin = _origin(loaded, borrowed, (*above, *itself))
+            if origin is not None:
+                until = replace(options, until=borrowed.stage, force=frozenset())
+                made = planner_for(origin, registry, store, robot, until, (*above, *itself))
+                origins[stage.name, name] = made
     planner = Planner(loaded, stages, store, robot, options, origins)
     for stage in stages:
-        if stage.name not in origins:
-            planner.start(stage)
+        planner.borrowed(stage)
     return planner
 
 
@@ -303,32 +303,26 @@ def _selected(loaded: LoadedRecipe, registry: Mapping[str, Stage], options: Opti
     return chosen
 
 
-def named_start(loaded: LoadedRecipe, stage: Stage) -> str | None:
-    """What the recipe calls the artifact that a stage begins from."""
-    return None if stage.starts_from is None else attrgetter(stage.starts_from)(loaded.recipe)
+def wrong_origin(loaded: LoadedRecipe, borrowed: Borrowed, text: str) -> RecipeError:
+    """The error that a stage cannot read what the recipe names."""
+    path = borrowed.path
+    return RecipeError([Problem(loaded.place(path), f"key '{path}' = {shown(borrowed.named)}: {text}")])
 
 
-def wrong_start(loaded: LoadedRecipe, stage: Stage, text: str) -> RecipeError:
-    """The error that a stage cannot begin from what the recipe names."""
-    path = stage.starts_from or ""
-    return RecipeError([Problem(loaded.place(path), f"key '{path}' = {shown(named_start(loaded, stage))}: {text}")])
-
-
-def _origin(loaded: LoadedRecipe, stage: Stage, above: Sequence[Path]) -> LoadedRecipe | None:
-    """The recipe whose artifact a stage begins from, where one is named. Raises `RecipeError` if it cannot be it."""
-    named = named_start(loaded, stage)
-    if named is None or Path(named).suffix not in SUFFIXES:
+def _origin(loaded: LoadedRecipe, borrowed: Borrowed, above: Sequence[Path]) -> LoadedRecipe | None:
+    """The recipe that makes what is borrowed, where a file is named. Raises `RecipeError` if it cannot be it."""
+    if Path(borrowed.named).suffix not in SUFFIXES:
         return None
-    place = loaded.place(stage.starts_from or "")
+    place = loaded.place(borrowed.path)
     said_in = loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])
     try:
-        origin = load_recipe(file_meant_in(said_in.parent, named))
+        origin = load_recipe(file_meant_in(said_in.parent, borrowed.named))
     except RecipeError as error:
-        raise wrong_start(loaded, stage, f"{error}") from None
+        raise wrong_origin(loaded, borrowed, f"{error}") from None
     if origin.file.resolve() in above:
-        raise wrong_start(loaded, stage, "begins from itself in the end")
+        raise wrong_origin(loaded, borrowed, "begins from itself in the end")
     if origin.recipe.robot != loaded.recipe.robot:
-        raise wrong_start(loaded, stage, f"is about another robot, {origin.recipe.robot}")
+        raise wrong_origin(loaded, borrowed, f"is about another robot, {origin.recipe.robot}")
     return origin
 
 

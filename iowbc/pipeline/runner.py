@@ -142,10 +142,10 @@ class Runner:
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
         """What a stage reads, by name."""
         read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
-        for name, artifact in self.planner.start(stage).items():
+        for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
-                origin = self.planner.origins[stage.name].loaded.file
-                raise PipelineFailed(f"{stage.name} begins from that of {origin}; first `iowbc run {origin}`")
+                origin = self.planner.origins[stage.name, name].loaded.file
+                raise PipelineFailed(f"{stage.name} reads an artifact of {origin}; first `iowbc run {origin}`")
             read[name] = artifact
         return read
 

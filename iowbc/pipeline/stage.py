@@ -12,7 +12,7 @@ Result = TypeVar("Result")
 SUMMARY = "summary.json"
 """File of an artifact with its metrics."""
 START = "start"
-"""Name among a job's inputs of the artifact that it begins from; see `Stage.starts_from`."""
+"""Name among a job's inputs of the artifact that it begins from; see `Stage.borrows`."""
 
 
 class Report(Protocol):
@@ -138,6 +138,18 @@ def always(recipe: Recipe) -> bool:
 
 
 @dataclass(frozen=True)
+class Borrowed:
+    """An artifact that another recipe makes."""
+
+    path: str
+    """Dotted recipe path of the value that names it."""
+    named: str
+    """That value: a recipe's file, or the beginning of a key."""
+    stage: str
+    """Stage that makes it."""
+
+
+@dataclass(frozen=True)
 class Presentation:
     """How artifacts of a stage are shown, and what other commands find in them."""
 
@@ -179,9 +191,8 @@ class Stage:
     differs in nothing but a smaller one, as if it had never stopped."""
     extends_from: tuple[str, ...] = ()
     """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
-    starts_from: str | None = None
-    """Dotted recipe path of another recipe's file, the beginning of a key, or nothing: an artifact of this stage, made
-    by whatever recipe, which is then read as `START`. It needs the files `extends_from`, too."""
+    borrows: Callable[[Recipe], Mapping[str, Borrowed]] = _empty
+    """Artifacts that other recipes make, by their names among the job's inputs, for a given recipe."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
     presentation: Presentation = Presentation()

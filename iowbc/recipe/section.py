@@ -15,6 +15,8 @@ decides nothing, so that their keys hold."""
 
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
+ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
+"""An artifact of another recipe: that recipe's file, or eight or more first characters of the artifact's key."""
 DEEPEST = 16
 """Hidden layers of the deepest network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from iowbc.task.specification import Specification
 
 
+FORCES = ("handle_force_p95", "hand_force_p95")
+"""Shown of each behaviour of the partner."""
+
+
 def acting_stage(recipe: Recipe) -> str:
     """The stage whose artifact holds the policy to evaluate."""
     return policy_stage(recipe) if recipe.eval.policy == "student" else "teacher"
@@ -73,6 +77,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import Film, film_trial, filmed
+    from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
 
@@ -97,7 +102,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
             film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
-    for suite, rows in summary[summary["kind"] != "pushes"].groupby("suite", sort=False):
+    for suite, rows in summary[~summary["kind"].isin(PROBING)].groupby("suite", sort=False):
         counts = ", ".join(f"{_load(row)} {row['succeeded']}/{row['trials']}" for _, row in rows.iterrows())
         job.report.say(f"{suite}: succeeded {counts}")
     return headline(summary)
@@ -164,11 +169,13 @@ def play_batch(
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
-    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite."""
+    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite, and
+    forces where a partner is met."""
+    from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.trials.errors import ERRORS
 
     metrics = {name: float(summary[name].sum()) for name in ("trials", "survived", "succeeded")}
-    for _, row in summary[summary["kind"] != "pushes"].iterrows():
+    for _, row in summary[~summary["kind"].isin(PROBING)].iterrows():
         rows = summary[summary["suite"] == row["suite"]]
         if row["case"] == row["suite"] and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
             continue
@@ -178,6 +185,8 @@ def headline(summary: "pd.DataFrame") -> dict[str, float]:
             metrics[f"{name}/transport"] = float(row["transport_robot"])
         if row["survived"]:
             metrics |= {f"{name}/{error}": float(row[error]) for error in ERRORS}
+        forces = FORCES if row["kind"] == "compliance" else ()
+        metrics |= {f"{name}/{force}": float(row[force]) for force in forces if not math.isnan(row[force])}
     return metrics
 
 
@@ -189,7 +198,7 @@ def _load(row: "pd.Series[Any]") -> str:
 
 STAGE = Stage(
     name="eval",
-    version=5,
+    version=6,
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
     run=run,
@@ -198,7 +207,9 @@ STAGE = Stage(
     results=("*.parquet",),
     counts=("eval.trials",),
     presentation=Presentation(
-        headline=("trials", "survived", "succeeded"), columns=("succeeded", "trials"), pictures=("comparison.png",)
+        headline=("trials", "survived", "succeeded"),
+        columns=("succeeded", "trials"),
+        pictures=("comparison.png", "compliance.png", "push_map.png"),
     ),
     spreads=always,
 )

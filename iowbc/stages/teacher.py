@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import START, Job, Presentation, Stage
+from iowbc.pipeline.stage import START, Borrowed, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
@@ -49,6 +49,12 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
         from iowbc.task.own_parts import taken_names
 
         yield from taken_names(recipe.task.observation)
+
+
+def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
+    """The teacher that training begins from."""
+    start = recipe.teacher.start
+    return {} if start is None else {START: Borrowed("teacher.start", start, "teacher")}
 
 
 def run(job: Job) -> None:
@@ -127,7 +133,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
     from iowbc.task.specification import Specification
 
     check, shares = world.recipe.teacher.check, world.recipe.task.scenes
-    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence)})
+    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence, scripts=check.scripts)})
     own = Specification(recipe, world.robot, world.rg)
     played = {"lift": check.lifting, "push": check.pushing} | check.others
     trials = [
@@ -137,7 +143,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
         for trial in quick_trials(own, scene, masses, check.trials, check.seed)
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
-    return QuickEvaluation(own, trials, fall=check.fall, workers=min(workers, len(trials)))
+    return QuickEvaluation(own, trials, check=check, workers=min(workers, len(trials)))
 
 
 def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
@@ -180,7 +186,7 @@ STAGE = Stage(
     results=("teacher.safetensors", "teacher.json"),
     extends="teacher.steps",
     extends_from=(STATE, TABLE),
-    starts_from="teacher.start",
+    borrows=borrows,
     counts=("teacher.steps",),
     presentation=Presentation(
         headline=("best_score", "check/survived", "episode_seconds"),

@@ -2,6 +2,9 @@
 
 import io
 import os
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -63,6 +66,38 @@ def test_only_a_policy_that_sees_s_priv_is_played_with_its_parts_in_a_users_file
     values["task"]["observation"]["own"] = {"mine": own_part(tmp_path)}
     artifact: Any = SimpleNamespace(manifest=SimpleNamespace(stage=stage), recipe=values, folder=tmp_path)
     assert len(_source(artifact, None).world.recipe.task.observation.own) == told
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_film_that_is_terminated_leaves_no_part_of_it(tmp_path: Path, number: signal.Signals) -> None:
+    program = (
+        "import os, signal\nfrom pathlib import Path\nimport numpy as np\n"
+        "from iowbc.commands.interrupt import close_on_termination, leave\n"
+        "from iowbc.evaluation.films import Film\n"
+        "signal.signal(signal.SIGINT, leave)\nclose_on_termination()\n"
+        "with Film(Path('x.mp4'), 10) as film:\n"
+        "    while not Path('x.part.mp4').exists():\n"
+        "        film.add(np.zeros((32, 32, 3), np.uint8))\n"
+        f"    os.kill(os.getpid(), {int(number)})\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_play_that_is_terminated_leaves_no_part_of_its_film(tmp_path: Path) -> None:
+    export = next((Path(__file__).parents[2] / "runs" / "published" / "export").iterdir())
+    words = [sys.executable, "-m", "iowbc", "play", str(export), "--video", "x.mp4"]
+    playing = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    while not (tmp_path / "x.part.mp4").exists():
+        if playing.poll() is not None:
+            pytest.skip(f"nothing can be drawn here: {playing.communicate()[1].decode()}")
+        time.sleep(0.05)
+    playing.terminate()
+    assert playing.wait(60) == 130
+    assert list(tmp_path.glob("*.mp4")) == []
+    playing.communicate()
 
 
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,7 +83,6 @@ def stage(
     reads: tuple[str, ...],
     slice: tuple[str, ...],
     counts: tuple[str, ...] = (),
-    starts_from: str | None = None,
 ) -> Stage:
     """A counting stage that reads the others that its recipe has."""
 
@@ -98,7 +97,7 @@ def stage(
         run=counting(name),
         results=("result.json",),
         counts=counts,
-        starts_from=starts_from,
+        borrows=real.STAGES[name].borrows,
         presentation=real.STAGES[name].presentation,
     )
 
@@ -108,7 +107,7 @@ STAGES = {
     for made in (
         stage("rg-dataset", (), ("seed", "rg")),
         stage("rg-fit", ("rg-dataset",), ("seed", "rg")),
-        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), ("teacher.steps",), "teacher.start"),
+        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), ("teacher.steps",)),
         stage("distill", ("rg-fit", "teacher"), ("distill",)),
         stage("eval", ("distill",), ("eval",), counts=("eval.trials",)),
         stage("export", ("distill",), ("name", "export")),

@@ -1,6 +1,7 @@
 """Those who drive a rollout: alike for a part of the environments, and with a memory of what was before."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ def scale(size: int) -> Normal:
 
 
 TEACHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
+OTHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
 STUDENT = HistoryPolicy(
     scale(STATE),
     Whole(linear(STATE, 4), linear(4 * LENGTH, 6), "elu"),
@@ -54,7 +56,8 @@ def remembering() -> ExploringPolicy:
 def apprentice() -> DaggerPolicy:
     return DaggerPolicy(
         student=STUDENT,
-        teacher=TEACHER,
+        teachers=(TEACHER, OTHER),
+        teacher_of=(np.arange(ENVIRONMENTS) > 6).astype(int),
         observation=slice(0, STATE),
         privileged=slice(STATE, STATE + TOLD),
         masked=np.array([STATE + 1]),
@@ -102,4 +105,13 @@ def test_the_teacher_drives_its_environments_and_answers_without_what_it_is_not_
     np.testing.assert_array_equal(action[4:], told["own"][4:])
     rows = ROWS[0].copy()
     rows[:, STATE + 1] = TEACHER.normal.mean[STATE + 1]
-    np.testing.assert_allclose(told["answer"], TEACHER(rows), **ROUNDING)
+    first = rollout_policy.teacher_of == 0
+    np.testing.assert_allclose(told["answer"][first], TEACHER(rows)[first], **ROUNDING)
+
+
+def test_each_environment_is_answered_by_its_own_teacher() -> None:
+    rollout_policy = replace(apprentice(), masked=np.zeros(0, int))
+    _, recorded = rollout_policy.act(0, ROWS[0], rollout_policy.starts)
+    for teacher, own in ((TEACHER, rollout_policy.teacher_of == 0), (OTHER, rollout_policy.teacher_of == 1)):
+        assert own.any()
+        np.testing.assert_allclose(recorded["answer"][own], teacher(ROWS[0])[own], **ROUNDING)
