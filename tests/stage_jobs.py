@@ -65,16 +65,14 @@ class Remade:
         self.states: list[Any] = [None for _ in made]
         self.found: list[Any] = []
 
-    def ask(
-        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
-    ) -> None:
+    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
         assert patience > 0.0
         self.found = []
-        for index, (make, own) in enumerate(zip(self.made, arguments, strict=True)):
+        for index, (make, own) in enumerate(zip(self.made, messages, strict=True)):
             member = make()
             if self.states[index] is not None:
                 member.restore(self.states[index])
-            self.found.append(member.ask(request, own))
+            self.found.append(member.ask(own))
             if changes:
                 self.states[index] = member.state()
 

@@ -24,7 +24,7 @@ def play(
     partner_share: Annotated[
         float, typer.Option(help="Part of the weight that a partner bears.", min=0.0, max=1.0)
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0)] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
     disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses and pushes.")] = False,
     video: Annotated[Path | None, typer.Option(help="Make a film instead of opening a window.", metavar="MP4")] = None,
     web: Annotated[bool, typer.Option("--web", help="Drive it in the browser; needs no display.")] = False,
@@ -35,16 +35,17 @@ def play(
     from iowbc.commands.play import PlayRequest, play_word
     from iowbc.commands.play_web import PORT, play_on_web
     from iowbc.errors import UsageError
+    from iowbc.stages.registry import STAGES
 
     request = PlayRequest(
         scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
     )
     if web:
-        play_on_web(store_in(runs), console(), what, stage, request, port or PORT)
+        play_on_web(store_in(runs), console(), what, stage, request, port or PORT, STAGES)
     elif port is not None:
         raise UsageError("--port is that of the page that --web serves; give both")
     else:
-        raise typer.Exit(play_word(store_in(runs), console(), what, stage, request))
+        raise typer.Exit(play_word(store_in(runs), console(), what, stage, request, STAGES))
 
 
 def export(

@@ -23,6 +23,7 @@ from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
+from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -124,12 +125,12 @@ def _groups(found: Sequence[Named]) -> "list[Group]":
 
 def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[Panel]]":
     """The main learning curves of all recipes by stage; also drawn under `output`, a picture a stage."""
-    from iowbc.report.curves import LEARNING, learning_panels
+    from iowbc.report.curves import learning_panels
     from iowbc.report.learning_figure import POINTS, learning_figure
     from iowbc.report.picture_file import write_figure
 
     groups = _groups(found)
-    curves = {stage: panels for stage in LEARNING if (panels := learning_panels(groups, stage, POINTS)[0])}
+    curves = {stage: panels for stage in STAGES if (panels := learning_panels(groups, stage, POINTS)[0])}
     for stage, panels in curves.items():
         write_figure(learning_figure(panels, stage), output / "figures" / f"learning_{stage}.png")
     return curves

@@ -15,17 +15,10 @@ from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, l
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
+from iowbc.stages.registry import STAGES
 
 VIEW = "iowbc"
 """Name under which MLflow keeps how the runs are shown."""
-COLUMNS = {
-    "rg-fit": ("joint_rmse",),
-    "teacher": ("best_score",),
-    "distill": ("action_agreement",),
-    "eval": ("succeeded", "trials"),
-    "export": ("parity",),
-}
-"""Metrics of stages that are columns."""
 
 
 def serve(runs: Runs, console: Console, port: int) -> int:
@@ -59,7 +52,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
 
 def view() -> dict[str, object]:
     """How MLflow shows the runs: newest first, stages within their run, with the columns that tell most."""
-    metrics = [f"metrics.`{stage}/{name}`" for stage, names in COLUMNS.items() for name in names]
+    metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.presentation.columns]
     return {
         "searchFilter": "",
         "orderByKey": "attributes.start_time",

@@ -20,6 +20,7 @@ from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import Contract, generator_folder, read_contract, readable, require_sealed
 from iowbc.deploy.exported_folder import GENERATOR, GRAPH, ROBOT, exported_folder
 from iowbc.deploy.guard import TargetGuard
+from iowbc.deploy.plausibility import WIDE, Limits, Plausibility
 from iowbc.deploy.session import Values, open_session, run
 from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
@@ -44,7 +45,10 @@ class Targets:
     support_reference: Array
     """θ_S_ref with the gait prior, (n, 15) [rad]."""
     held: Mask
-    """Robots whose last good targets are held, because the new ones are no numbers or jump, (n,)."""
+    """Robots whose last good targets are held, (n,)."""
+    reasons: tuple[str, ...]
+    """Why each robot's are, "" where they are not: a measurement or command that cannot be true, an old measurement,
+    targets that are no numbers or that jump."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,15 @@ class Loop:
     history: Array
     """H_t, as the graph returned it, float32."""
 
+    def except_for(self, robots: list[int], earlier: Self) -> Self:
+        """The same, with some robots as they were."""
+        if not robots:
+            return self
+        mixed = {field.name: getattr(self, field.name).copy() for field in fields(self)}
+        for name, values in mixed.items():
+            values[robots] = getattr(earlier, name)[robots]
+        return replace(self, **mixed)
+
 
 class Controller:
     """The exported policy with its arm kinematics and gait clock, for n robots at once."""
@@ -81,6 +94,7 @@ class Controller:
         session: onnxruntime.InferenceSession,
         references: ReferenceLayer,
         robots: int,
+        limits: Limits,
     ) -> None:
         self.contract, self.robot, self.robots = contract, robot, robots
         self.frequency = contract.control_frequency
@@ -91,7 +105,12 @@ class Controller:
         self._blank = {port.name: np.zeros((robots, *port.shape), np.float32) for port in contract.inputs}
         if "object_quaternion" in self._blank:
             self._blank["object_quaternion"][:, 0] = 1.0
+        self._plausibility = Plausibility(contract, limits, robots)
         self._guard = TargetGuard(robots, np.array(contract.velocity_limit), 1.0 / self.frequency)
+        self._good = {name: self._blank[name].astype(np.float64) for name in self._plausibility.names}
+        self._good["command"][:, HEIGHT] = robot.default_height
+        self._good["joint_position"] += contract.default_position
+        self._good["projected_gravity"][:, 2] = -1.0
         self.inputs: Values = {}
         self.outputs: Values = {}
         support, arms = len(contract.support), len(contract.interaction)
@@ -111,11 +130,14 @@ class Controller:
         self.reset()
 
     @classmethod
-    def load(cls, folder: Path | str, robots: int = 1) -> Self:
+    def load(cls, folder: Path | str, robots: int = 1, limits: Limits = WIDE) -> Self:
         """The controller in an exported folder, or the one that a recipe exported here, by the recipe's name.
 
-        Raises ContractBroken where it is not what its contract says.
+        `limits` of measurements that are believed. Raises ContractBroken where the folder is not what its contract
+        says, ValueError for fewer than one robot.
         """
+        if robots < 1:
+            raise ValueError(f"robots: {robots}, expected 1 or more")
         folder = exported_folder(folder)
         contract = read_contract(folder)
         with readable(folder / ROBOT):
@@ -134,7 +156,7 @@ class Controller:
         with readable(folder / GENERATOR):
             references = ReferenceLayer(robot, contract.references, generator)
         with readable(folder / GRAPH):
-            controller = cls(contract, robot, session, references, robots)
+            controller = cls(contract, robot, session, references, robots, limits)
             outputs, posture = controller._at_rest()
         made = {name: value.shape[1:] for name, value in outputs.items()}
         if made != (said := {port.name: port.shape for port in contract.outputs}):
@@ -151,66 +173,88 @@ class Controller:
             )
         return controller
 
-    def reset(self, which: NDArray[np.bool_] | None = None, *, scene: str | None = None) -> None:
-        """Forget the past of the marked robots, (n,), or of all; `scene` chooses base grasp and expected load
-        ("lift" at first)."""
-        which = np.ones(self.robots, np.bool_) if which is None else which
-        self._loop = replace(self._loop, starts=self._loop.starts | which)
+    def reset(self, which: Mask | None = None, *, scene: str | None = None) -> None:
+        """Forget the past of the marked robots, a boolean (n,), or of all; `scene` chooses base grasp and expected load
+        ("lift" at first). Raises ValueError for any other mask and for an unknown scene."""
+        which = np.ones(self.robots, np.bool_) if which is None else np.asarray(which)
+        if which.dtype != np.bool_ or which.shape != (self.robots,):
+            raise ValueError(
+                f"reset: expected a boolean for each of {self.robots} robots, got {which.dtype} of shape {which.shape}"
+            )
         if scene is not None or not self._grasp.any():
             self._grasp[which] = both_wrists(base_grasp(self.contract.references.grasps, scene or "lift"))
             self._load[which] = getattr(self.contract.references.loads, scene or "lift")
+        self._loop = replace(self._loop, starts=self._loop.starts | which)
 
-    def step(self, measured: Measured, command: Array, *, limit_rates: bool = True) -> Targets:
+    def step(
+        self,
+        measured: Measured,
+        command: Array,
+        *,
+        measured_at: Array | float | None = None,
+        limit_rates: bool = True,
+    ) -> Targets:
         """Joint targets for the next control period.
 
         command: C, (n, 11) or (11,); clamped to the feasible map, and approached at the rates of training unless
-        `limit_rates` is off. Targets that are not finite, or further away than joints move in the time, are not passed
-        on: see `Targets.held`. Raises ValueError for a shape that does not fit or a value that is not finite, and is
-        then as before the call.
+        `limit_rates` is off. measured_at: time stamps of the measurements, (n,) or one [s], of any clock; without them
+        a measurement is old when its values repeat.
+
+        A robot whose measurement or command cannot be true or is old (see `Limits`) stays where it was in its gait and
+        history, and holds its last good targets, as does one whose targets are not finite or further away than joints
+        move in the time; the others go on: see `Targets.held` and `Targets.reasons`. One that never had good ones holds
+        its joints where they were last measured, or the default posture. Reset a robot that was held for long. Raises
+        ValueError for a shape that does not fit or a missing quantity, and is then as before the call.
         """
-        wanted = np.asarray(command, np.float64)
-        if wanted.ndim == 1:
-            wanted = np.tile(wanted, (self.robots, 1))
-        self._checked("command", wanted, self._loop.command.shape)
-        given = self._given(measured)
-        loop = self._advanced(wanted, limit_rates)
+        given, refusals = self._judged(measured, command, measured_at)
+        loop = self._advanced(given["command"], limit_rates)
         heading = np.where(loop.starts, given["heading"][:, 0], loop.heading_reference)
-        inputs = (
-            self._blank
-            | given
-            | self._as_inputs(
-                command=loop.command,
-                arm_reference=loop.arms,
-                heading_reference=heading[:, None],
-                gait=np.stack([loop.phase, loop.stepping], axis=1),
-                last_action=loop.action,
-                history=loop.history,
-                restart=loop.starts[:, None],
-            )
+        inputs = self._blank | self._as_inputs(
+            **given
+            | {
+                "command": loop.command,
+                "arm_reference": loop.arms,
+                "heading_reference": heading[:, None],
+                "gait": np.stack([loop.phase, loop.stepping], axis=1),
+                "last_action": loop.action,
+                "history": loop.history,
+                "restart": loop.starts[:, None],
+            }
         )
         outputs = run(self._session, inputs)
         position = np.empty((self.robots, len(self.contract.joints)))
         position[:, self._support] = outputs["support_target"]
         position[:, self._interaction] = self._references.arm_target(loop.arms, loop.posture, loop.command, self._load)
-        passed, held = self._guard.passed(position, loop.starts, given["joint_position"].astype(np.float64))
+        passed, reasons = self._guard.passed(position, loop.starts, given["joint_position"], refusals)
+        held: Mask = np.array([reason != "" for reason in reasons])
         whole: Mask = np.asarray(np.isfinite(outputs["history_next"]).all(axis=(1, 2)))
-        self._loop = replace(
+        advanced = replace(
             loop,
             starts=np.zeros(self.robots, np.bool_),
             heading_reference=heading + loop.command[:, YAW_RATE] / self.frequency,
             action=np.where(held[:, None], loop.action, outputs["action"]),
             history=np.where(whole[:, None, None], outputs["history_next"], loop.history),
         )
+        self._loop = advanced.except_for(list(refusals), self._loop)
         self.inputs, self.outputs = inputs, outputs
-        return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held)
+        return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held, reasons)
 
-    def _given(self, measured: Measured) -> Values:
-        """The measured inputs of the graph, checked."""
-        return {
-            field.name: self._checked(field.name, getattr(measured, field.name), self._blank[field.name].shape)
-            for field in fields(measured)
-            if field.name in self._blank
-        }
+    def _judged(
+        self, measured: Measured, command: Array, measured_at: Array | float | None
+    ) -> tuple[dict[str, Array], dict[int, str]]:
+        """Command and measured inputs of the graph, and why those of some robots were replaced by their last good
+        ones."""
+        wanted = np.asarray(command, np.float64)
+        values = vars(measured) | {"command": np.tile(wanted, (self.robots, 1)) if wanted.ndim == 1 else wanted}
+        given = {name: self._shaped(name, values[name], good.shape) for name, good in self._good.items()}
+        stamps = None if measured_at is None else np.broadcast_to(np.asarray(measured_at, np.float64), self.robots)
+        with np.errstate(over="ignore", invalid="ignore"):
+            refusals = self._plausibility.refusals(given, stamps)
+        for robot in refusals:
+            for name, good in self._good.items():
+                given[name][robot] = good[robot]
+        self._good = given
+        return given, refusals
 
     def _advanced(self, wanted: Array, limit_rates: bool) -> Loop:
         """Command, references and gait clock of this step; robots that start are settled in their grasp."""
@@ -249,16 +293,13 @@ class Controller:
         return {name: np.array(value, np.float32) for name, value in values.items()}
 
     @staticmethod
-    def _checked(name: str, value: Array | None, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    def _shaped(name: str, value: Array | None, shape: tuple[int, ...]) -> Array:
+        """A copy of a value that has its shape. Raises ValueError."""
         if value is None:
             raise ValueError(f"{name}: this policy needs it, with shape {shape}; got nothing")
         if np.shape(value) != shape:
             raise ValueError(f"{name}: expected shape {shape}, got {np.shape(value)}")
-        with np.errstate(over="ignore"):
-            given = np.array(value, np.float32)
-        if not np.isfinite(given).all():
-            raise ValueError(f"{name}: not finite: {value}")
-        return given
+        return np.array(value, np.float64)
 
 
 def base_grasp(grasps: Grasps, scene: str) -> tuple[float, float, float]:

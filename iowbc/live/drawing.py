@@ -118,7 +118,7 @@ class Drawing:
             """In order, as only asynchronous callbacks are."""
             force = STIFFNESS * (np.array(event.end_position) - np.array(event.start_position))
             force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), STRONGEST))
-            self._pull(what, np.zeros(3) if event.phase == "end" else force)
+            self._pull(what, force if event.phase != "end" and np.isfinite(force).all() else np.zeros(3))
 
         return pull
 

@@ -28,6 +28,8 @@ LIGHTEST = 1.0
 """The same in the scene without an object, where it says nothing [kg]."""
 STRONGEST_PUSH = 60.0
 """Largest push on the slider [N·s]: what speeds a robot of 35 kg up by 1.7 m/s."""
+LAST_SEED = 2**32 - 1
+"""Largest seed of an episode."""
 LABELS = {
     "v_x": "forward [m/s]",
     "v_y": "left [m/s]",
@@ -102,7 +104,7 @@ class Panel:
         self.mass = gui.add_slider("Mass [kg]", 0.0, most, 0.5, request.mass, hint="0 is without an object")
         share = request.partner_share or 0.0
         self.partner_share = gui.add_slider("Partner's share", 0.0, 1.0, 0.05, share, hint="Of the weight")
-        self.seed = gui.add_number("Seed", request.seed, min=0, step=1)
+        self.seed = gui.add_number("Seed", request.seed, min=0, max=LAST_SEED, step=1)
         self.disturbances = gui.add_checkbox("Impulses, pushes", request.disturbances, hint="At random times")
         self.scene.on_update(lambda _: self._suit_mass())
 

@@ -85,18 +85,20 @@ class Explorer:
 
 @dataclass(frozen=True)
 class Apprentice:
-    """A student, and a teacher that says what it would have done and drives some of the environments."""
+    """A student, and teachers that say what they would have done and drive some of the environments."""
 
     student: HistoryPolicy
-    teacher: RowPolicy
+    teachers: tuple[RowPolicy, ...]
     observation: slice
     """Where in a row is s_t."""
     privileged: slice
     """Where in a row is s_priv."""
-    untold: Indices
-    """Places in a row of what the teacher is not told: it takes each for its mean."""
+    masked: Indices
+    """Places in a row of what is masked for the teachers, which see its mean there."""
+    teacher_of: Indices
+    """Place of each environment's teacher among them, (n,)."""
     taught: Mask
-    """Environments that the teacher drives, (n,)."""
+    """Environments that their teacher drives, (n,)."""
     block: int
     """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
     past: Past
@@ -108,7 +110,8 @@ class Apprentice:
 
     def part(self, first: int, last: int) -> Self:
         """See `Pilot`."""
-        return replace(self, taught=self.taught[first:last], past=self.past.of(first, last))
+        own = slice(first, last)
+        return replace(self, teacher_of=self.teacher_of[own], taught=self.taught[own], past=self.past.of(first, last))
 
     @cached_property
     def _history(self) -> History:
@@ -117,9 +120,17 @@ class Apprentice:
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
         """See `Pilot`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
         del step
-        told = rows.copy()
-        told[:, self.untold] = self.teacher.normal.mean[self.untold]
-        told = np.concatenate([told[:, self.observation], told[:, self.privileged]], axis=1)
-        answer = in_blocks(self.teacher, self.block, told)
+        answer = self._answer(0, rows)
+        for place in range(1, len(self.teachers)):
+            own = self.teacher_of == place
+            if own.any():
+                answer[own] = self._answer(place, rows)[own]
         own = in_blocks(self.student, self.block, self._history.push(rows[:, self.observation], starts))
         return np.where(self.taught[:, None], answer, own), {"own": own, "answer": answer}
+
+    def _answer(self, place: int, rows: Array) -> Array:
+        """What one teacher would do in every environment, whole blocks at a time, (n, A)."""
+        teacher, seen = self.teachers[place], rows.copy()
+        seen[:, self.masked] = teacher.normal.mean[self.masked]
+        seen = np.concatenate([seen[:, self.observation], seen[:, self.privileged]], axis=1)
+        return in_blocks(teacher, self.block, seen)

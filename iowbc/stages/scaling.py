@@ -31,8 +31,9 @@ from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.pilots import Explorer
 from iowbc.stages.environments import Elsewhere
+from iowbc.stages.eval import play_everywhere
+from iowbc.stages.labelling import SHARES, label_everywhere
 from iowbc.stages.rg_dataset import CHUNK
-from iowbc.stages.spreading import SHARES, label_everywhere, play_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv

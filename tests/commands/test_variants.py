@@ -33,7 +33,7 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert rows[2][:5] == ["third", *["cached"] * 4]
     assert rows[2][5].replace(".", "").isdigit(), "eval has more trials: its rate is known"
     assert rows[2][7].startswith("~"), "export has another name: its time is like that of the other"
-    assert "2 recipes: 2 stages would run, 0 are shared, 10 cached; roughly " in planned
+    assert "2 recipes: 2 stages would run, 0 are shared, 10 cached; a guess: " in planned
     assert "`iowbc plan third` says why" in planned
     done = command("run", "both.yaml")
     assert done.returncode == 0, done.stderr

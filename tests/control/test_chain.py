@@ -9,19 +9,23 @@ import pytest
 from iowbc.control.chain import Chain, turn
 from iowbc.robot import rotations
 
-RANDOM = np.random.default_rng(0)
 LENGTH, ROWS = 4, 5
 
 
-def body(axis: Any) -> Any:
-    quaternion = rotations.normalized(RANDOM.normal(size=4))
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def body(axis: Any, random: np.random.Generator) -> Any:
+    quaternion = rotations.normalized(random.normal(size=4))
     return SimpleNamespace(
-        name="link", position=RANDOM.normal(size=3), quaternion=quaternion, hinge=SimpleNamespace(axis=np.array(axis))
+        name="link", position=random.normal(size=3), quaternion=quaternion, hinge=SimpleNamespace(axis=np.array(axis))
     )
 
 
-def unit() -> Any:
-    vector = RANDOM.normal(size=3)
+def unit(random: np.random.Generator) -> Any:
+    vector = random.normal(size=3)
     return vector / np.linalg.norm(vector)
 
 
@@ -47,10 +51,10 @@ def by_matrices(chain: list[Any], angle: Any) -> tuple[Any, Any, list[Any], list
     ],
     ids=["coordinate axes", "reversed axes", "axes of any direction"],
 )
-def test_points_directions_and_jacobian_are_those_of_the_matrices(axes: list[Any]) -> None:
-    pairs = [(unit(), unit()) if pair == "skew" else pair for pair in axes]
-    chains = [[body(pair[side]) for pair in pairs] for side in range(2)]
-    angle, grip, direction = RANDOM.normal(size=(LENGTH, 2, ROWS)), RANDOM.normal(size=3), unit()
+def test_points_directions_and_jacobian_are_those_of_the_matrices(axes: list[Any], random: np.random.Generator) -> None:
+    pairs = [(unit(random), unit(random)) if pair == "skew" else pair for pair in axes]
+    chains = [[body(pair[side], random) for pair in pairs] for side in range(2)]
+    angle, grip, direction = random.normal(size=(LENGTH, 2, ROWS)), random.normal(size=3), unit(random)
     with_jacobian = np.empty((3, LENGTH + 1, 2, ROWS))
     with_jacobian[:, -1] = grip[:, None, None]
     Chain(chains).carry(angle, with_jacobian, LENGTH)
@@ -69,17 +73,17 @@ def test_points_directions_and_jacobian_are_those_of_the_matrices(axes: list[Any
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_turn_is_a_rotation_about_its_axis(axis: int) -> None:
-    vectors, angle = RANDOM.normal(size=(3, 2, 1, ROWS)), RANDOM.normal(size=(1, ROWS))
+def test_a_turn_is_a_rotation_about_its_axis(axis: int, random: np.random.Generator) -> None:
+    vectors, angle = random.normal(size=(3, 2, 1, ROWS)), random.normal(size=(1, ROWS))
     expected = np.einsum("nij,jksn->iksn", rotations.axis_matrix(np.eye(3)[axis], angle[0]), vectors)
     turn(vectors, axis, angle)
     assert vectors == pytest.approx(expected)
 
 
-def test_a_body_without_a_hinge_is_fixed_to_the_one_before() -> None:
-    chain = [body([0, 0, 1]), body([1, 0, 0]), body([0, 1, 0])]
+def test_a_body_without_a_hinge_is_fixed_to_the_one_before(random: np.random.Generator) -> None:
+    chain = [body([0, 0, 1], random), body([1, 0, 0], random), body([0, 1, 0], random)]
     chain[1].hinge = None
-    angle, point = RANDOM.normal(size=(2, 1, 1)), RANDOM.normal(size=3)
+    angle, point = random.normal(size=(2, 1, 1)), random.normal(size=3)
     carried = point.reshape(3, 1, 1, 1).copy()
     Chain([chain]).carry(angle, carried)
     chain[1].hinge = SimpleNamespace(axis=np.array([1, 0, 0]))
@@ -87,15 +91,15 @@ def test_a_body_without_a_hinge_is_fixed_to_the_one_before() -> None:
     assert carried.ravel() == pytest.approx(position + rotation @ point)
 
 
-def test_a_chain_ends_at_a_hinge() -> None:
-    stiff = body([1, 0, 0])
+def test_a_chain_ends_at_a_hinge(random: np.random.Generator) -> None:
+    stiff = body([1, 0, 0], random)
     stiff.hinge = None
     with pytest.raises(ValueError, match="'link' ends a joint chain but has no hinge"):
         Chain([[stiff]])
 
 
-def test_the_example_of_the_docstring() -> None:
-    upper, lower = body([0, 0, 1]), body([0, 1, 0])
+def test_the_example_of_the_docstring(random: np.random.Generator) -> None:
+    upper, lower = body([0, 0, 1], random), body([0, 1, 0], random)
     upper.quaternion = lower.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     upper.position, lower.position = np.zeros(3), np.array([0.2, 0.0, 0.0])
     vectors = np.zeros((3, 3, 1, 1))

@@ -20,9 +20,9 @@ def started() -> TargetGuard:
 
 
 def test_what_joints_can_follow_is_passed_on() -> None:
-    passed, held = started().passed(np.array([[0.2, -0.4]]), NOBODY, MEASURED)
+    passed, why = started().passed(np.array([[0.2, -0.4]]), NOBODY, MEASURED)
     assert passed.tolist() == [[0.2, -0.4]]
-    assert not held.any()
+    assert not any(why)
 
 
 @pytest.mark.parametrize("wrong", [[9.0, 0.0], [0.0, -9.0], [np.nan, 0.0], [0.0, np.inf]])
@@ -32,14 +32,14 @@ def test_a_jump_or_no_number_holds_all_joints_and_is_said_once(
     guard = started()
     with caplog.at_level(logging.WARNING):
         for _ in range(2):
-            passed, held = guard.passed(np.array([wrong]), NOBODY, MEASURED)
+            passed, why = guard.passed(np.array([wrong]), NOBODY, MEASURED)
             assert passed.tolist() == [[0.0, 0.0]]
-            assert held.all()
+            assert all(why)
     assert len(caplog.records) == 1
     assert "robot 0" in caplog.text
-    passed, held = guard.passed(np.array([[0.1, 0.1]]), NOBODY, MEASURED)
+    passed, why = guard.passed(np.array([[0.1, 0.1]]), NOBODY, MEASURED)
     assert passed.tolist() == [[0.1, 0.1]]
-    assert not held.any()
+    assert not any(why)
 
 
 def test_a_target_that_stays_away_is_followed_when_joints_had_the_time() -> None:
@@ -50,17 +50,25 @@ def test_a_target_that_stays_away_is_followed_when_joints_had_the_time() -> None
 
 def test_a_first_target_may_be_anywhere_and_without_one_the_joints_stay() -> None:
     guard = TargetGuard(1, LIMIT, 0.02)
-    passed, held = guard.passed(np.array([[2.0, 2.0]]), EVERYBODY, MEASURED)
+    passed, why = guard.passed(np.array([[2.0, 2.0]]), EVERYBODY, MEASURED)
     assert passed.tolist() == [[2.0, 2.0]]
-    assert not held.any()
-    passed, held = guard.passed(np.array([[np.nan, 2.0]]), EVERYBODY, MEASURED)
+    assert not any(why)
+    passed, why = guard.passed(np.array([[np.nan, 2.0]]), EVERYBODY, MEASURED)
     assert passed.tolist() == MEASURED.tolist()
-    assert held.all()
+    assert all(why)
 
 
 def test_robots_are_held_one_by_one() -> None:
     guard, nobody = TargetGuard(2, LIMIT, 0.02), np.zeros(2, bool)
     guard.passed(np.zeros((2, 2)), ~nobody, np.zeros((2, 2)))
-    passed, held = guard.passed(np.array([[0.1, 0.1], [np.nan, 0.1]]), nobody, np.zeros((2, 2)))
-    assert held.tolist() == [False, True]
+    passed, why = guard.passed(np.array([[0.1, 0.1], [np.nan, 0.1]]), nobody, np.zeros((2, 2)))
+    assert why == ("", "its targets are not finite")
     assert passed.tolist() == [[0.1, 0.1], [0.0, 0.0]]
+
+
+def test_a_refused_robot_holds_its_targets_however_good_the_new_ones_are() -> None:
+    guard, nobody = TargetGuard(2, LIMIT, 0.02), np.zeros(2, bool)
+    guard.passed(np.zeros((2, 2)), ~nobody, np.zeros((2, 2)))
+    passed, why = guard.passed(np.full((2, 2), 0.1), nobody, np.zeros((2, 2)), {1: "its sensors are off"})
+    assert passed.tolist() == [[0.1, 0.1], [0.0, 0.0]]
+    assert why == ("", "its sensors are off")

@@ -21,6 +21,8 @@ from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
 from iowbc.rollouts.pilots import Explorer
 
+pytestmark = pytest.mark.integration
+
 SEEN, LENGTH = 2, 4
 """Of a mass its position and velocity are observed; the distance is privileged."""
 NETWORK = HistoryNetwork(length=LENGTH, frame_features=8, latent=8)

@@ -17,6 +17,8 @@ from iowbc.pipeline.cluster import stragglers
 from iowbc.pipeline.cluster.crew import CORE_PATIENCE, TRIES, Holder, NodeCrew, Origin
 from iowbc.pipeline.cluster.identity import identity
 
+pytestmark = pytest.mark.unit
+
 
 class Adder:
     """A member: adds up what it is given."""
@@ -24,12 +26,12 @@ class Adder:
     def __init__(self, start: int) -> None:
         self.total = start
 
-    def ask(self, request: str, arguments: tuple[Any, ...]) -> int:
-        if request == "refuse":
+    def ask(self, message: int | str) -> int:
+        if message == "refuse":
             raise Damaged("no such thing")
-        if request == "break":
+        if message == "break":
             raise ZeroDivisionError("nobody foresaw this")
-        self.total += arguments[0]
+        self.total += message
         return self.total
 
     def state(self) -> int:
@@ -140,8 +142,8 @@ class Watch:
     def crew(self, *starts: int) -> NodeCrew:
         return NodeCrew("helper", self.origin, [(start,) for start in starts], lambda: self.stop, self.said.append)
 
-    def added(self, crew: NodeCrew, *values: int, request: str = "add", patience: float = 60.0) -> list[int]:
-        crew.ask(request, [(value,) for value in values], patience=patience)
+    def added(self, crew: NodeCrew, *values: int | str, patience: float = 60.0) -> list[int]:
+        crew.ask(values, patience=patience)
         return crew.answers()
 
 
@@ -212,7 +214,7 @@ def test_losses_in_a_row_are_counted_and_the_last_reason_told(watch: Watch) -> N
 )
 def test_what_a_member_raises_is_told_with_its_place(watch: Watch, request_: str, told: str) -> None:
     with pytest.raises(WorkerFailed, match=rf"(?s)^helper 1 of 2, on node0:.*{told}"):
-        watch.added(watch.crew(10, 20), 1, 2, request=request_)
+        watch.added(watch.crew(10, 20), request_, request_)
 
 
 def test_a_node_with_another_version_is_refused_with_both(watch: Watch) -> None:

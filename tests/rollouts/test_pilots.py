@@ -1,6 +1,7 @@
 """Those who drive a rollout: alike for a part of the environments, and with a memory of what was before."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,11 @@ from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
 ENVIRONMENTS, LENGTH, STATE, TOLD, ACTIONS, BLOCK, STEPS = 10, 4, 3, 2, 2, 2, 6
 ROUNDING = {"rtol": 1e-6, "atol": 1e-5}
 """Of sums of terms of about 30 in 32 bits, added in another order: a processor's own."""
-RANDOM = np.random.default_rng(0)
 
 
 def normal(*shape: int) -> Any:
-    return RANDOM.normal(size=shape).astype(np.float32)
+    """Numbers that follow from the shape alone."""
+    return np.random.default_rng(shape).normal(size=shape).astype(np.float32)
 
 
 def linear(inputs: int, outputs: int) -> Linear:
@@ -30,13 +31,14 @@ def scale(size: int) -> Normal:
 
 
 TEACHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
+OTHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
 STUDENT = HistoryPolicy(
     scale(STATE),
     Whole(linear(STATE, 4), linear(4 * LENGTH, 6), "elu"),
     None,
     Perceptron((linear(STATE + 6, 8), linear(8, ACTIONS)), "relu"),
 )
-ROWS, ENDS = normal(STEPS + 1, ENVIRONMENTS, STATE + TOLD), RANDOM.random((STEPS, ENVIRONMENTS)) < 0.3
+ROWS, ENDS = normal(STEPS + 1, ENVIRONMENTS, STATE + TOLD), np.random.default_rng(0).random((STEPS, ENVIRONMENTS)) < 0.3
 
 
 def past() -> Past:
@@ -54,10 +56,11 @@ def remembering() -> Explorer:
 def apprentice() -> Apprentice:
     return Apprentice(
         student=STUDENT,
-        teacher=TEACHER,
+        teachers=(TEACHER, OTHER),
+        teacher_of=(np.arange(ENVIRONMENTS) > 6).astype(int),
         observation=slice(0, STATE),
         privileged=slice(STATE, STATE + TOLD),
-        untold=np.array([STATE + 1]),
+        masked=np.array([STATE + 1]),
         taught=np.arange(ENVIRONMENTS) < 4,
         block=BLOCK,
         past=past(),
@@ -100,4 +103,13 @@ def test_the_teacher_drives_its_environments_and_answers_without_what_it_is_not_
     np.testing.assert_array_equal(action[4:], told["own"][4:])
     rows = ROWS[0].copy()
     rows[:, STATE + 1] = TEACHER.normal.mean[STATE + 1]
-    np.testing.assert_allclose(told["answer"], TEACHER(rows), **ROUNDING)
+    first = pilot.teacher_of == 0
+    np.testing.assert_allclose(told["answer"][first], TEACHER(rows)[first], **ROUNDING)
+
+
+def test_each_environment_is_answered_by_its_own_teacher() -> None:
+    pilot = replace(apprentice(), masked=np.zeros(0, int))
+    _, recorded = pilot.act(0, ROWS[0], pilot.starts)
+    for teacher, own in ((TEACHER, pilot.teacher_of == 0), (OTHER, pilot.teacher_of == 1)):
+        assert own.any()
+        np.testing.assert_allclose(recorded["answer"][own], teacher(ROWS[0])[own], **ROUNDING)

@@ -1,11 +1,16 @@
 """The recipes that come with the package: they can be run, and variants differ from IO-WBC in what they say alone."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
+from typer.testing import CliRunner
 
+from iowbc.cli import app
 from iowbc.evaluation.paper import VARIANTS as VARIANTS_OF_THE_PAPER
+from iowbc.learning.networks import StudentNetwork
 from iowbc.pipeline.ingredients import slice_value
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
@@ -122,6 +127,61 @@ def test_the_fair_load_agnostic_controller_practises_the_arms_of_every_grasp_as_
         played = [(grasps[scene], share) for scene, share in task.scenes if share > 0]
         shares[name] = {grasp: sum(share for own, share in played if own == grasp) for grasp, _ in played}
     assert shares["wbc_fair"] == shares["full"]
+
+
+ABLATIONS = {
+    "history_1": {"distill.history"},
+    "history_5": {"distill.history"},
+    "history_50": {"distill.history"},
+    "no_auxiliary": {"distill.auxiliary"},
+    "no_gait_prior": {"task.references.gait.enabled"},
+    "no_r_gait": {"task.reward.without"},
+    "no_r_obj": {"task.reward.without"},
+    "no_randomization": {"simulation.randomization.enabled", "eval.simulation"},
+}
+"""What each ablation changes; the others' trials go on in the training's world."""
+
+
+@pytest.mark.parametrize("name", ABLATIONS)
+def test_an_ablation_is_one_line_and_changes_nothing_else(name: str) -> None:
+    ablation = recipe(f"ablations/{name}")
+    of_teacher = ablation.teacher.start is not None
+    control = recipe("ablations/continued" if of_teacher else "full")
+    stages = set() if of_teacher else {"stages"}
+    assert differences(ablation, control) - NAMES == ABLATIONS[name] | stages
+    text = (RECIPES / "ablations" / f"{name}.yaml").read_text().partition("eval:")[0].splitlines()
+    own = [line for line in text if not line.startswith(("extends", "name", "description", "stages"))]
+    assert len(own) == 1
+    full = recipe("full")
+    assert (ablation.eval.simulation or ablation.simulation) == (full.eval.simulation or full.simulation)
+
+
+def test_all_ablations_plan_and_share_what_they_can(tmp_path: Path) -> None:
+    study = RECIPES / "ablations" / "ablations.yaml"
+    done = CliRunner().invoke(app, ["plan", str(study), "--json", "--runs", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    planned = [(one["recipe"], {stage["stage"] for stage in one["stages"]}) for one in json.loads(done.stdout)]
+    whole = {name for name, stages in planned if {"teacher", "distill", "eval"} <= stages}
+    assert whole == {"full", "continued", *ABLATIONS}
+    full = deciding(recipe("full"))
+    for name in ("history_1", "history_5", "history_50", "no_auxiliary"):
+        own = deciding(recipe(f"ablations/{name}"))
+        for path in STAGES["teacher"].slice:
+            assert slice_value(own, path, STAGES["teacher"]) == slice_value(full, path, STAGES["teacher"])
+
+
+@pytest.mark.parametrize("length", [1, 50])
+def test_a_student_of_any_history_can_be_made(length: int) -> None:
+    assert StudentNetwork(
+        observation=10,
+        history=length,
+        actions=4,
+        frame_features=4,
+        latent=4,
+        hidden=[8],
+        activation="elu",
+        clip=10.0,
+    )(torch.zeros(2, length, 10)).shape == (2, 4)
 
 
 def test_the_papers_recipe_compares_them() -> None:

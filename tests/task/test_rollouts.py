@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faulty import StepBy
 
 from iowbc.errors import WorkerFailed
 from iowbc.rollouts.blocks import block_size
@@ -18,6 +19,7 @@ from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
 from iowbc.rollouts.pilots import Explorer
 from iowbc.rollouts.policies import RowPolicy
 from iowbc.rollouts.trajectories import Trajectories
+from iowbc.task.vector.requests import Levels
 from iowbc.task.vector.vector_env import VectorEnv
 from iowbc.task.vector.workers import WorkerProcesses
 
@@ -93,9 +95,9 @@ def test_a_worker_that_makes_steps_does_not_count_as_hung(make: Make, monkeypatc
     env.roll(explorer(env, 3), 3)
     workers = env.workers
     assert isinstance(workers, WorkerProcesses)
-    workers.ask("levels")
+    workers.ask([Levels()])
     assert workers._steps() == 3 * 2
     workers.answers()
     monkeypatch.setattr(workers, "_steps", itertools.count().__next__)
-    env._call("__setattr__", [("step", functools.partial(time.sleep, 1.6))])
+    env._call([StepBy(functools.partial(time.sleep, 1.6))])
     env.step(np.zeros((2, 15)))

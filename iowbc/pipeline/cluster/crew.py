@@ -42,7 +42,7 @@ class Holder:
         """Name of the node, once it runs there."""
         return identity().host
 
-    def ask(self, state: Any, request: str, arguments: tuple[Any, ...], changes: bool) -> tuple[bool, Any, Any]:
+    def ask(self, state: Any, message: Any, changes: bool) -> tuple[bool, Any, Any]:
         """Whether the request went well; the answer, or what was wrong; and the state after it, where it changes any.
 
         `state`: from which a member that is not made yet goes on. Raises what Ray raises where inputs are lost.
@@ -54,7 +54,7 @@ class Holder:
                 self._member = self._made()
                 if state is not None:
                     self._member.restore(state)
-            answer = self._member.ask(request, arguments)
+            answer = self._member.ask(message)
             return True, answer, self._member.state() if changes else None
         except ray.exceptions.RayError:
             raise
@@ -117,7 +117,7 @@ class NodeCrew:
 
         self._called = called
         self._origin, self._interrupted, self._say = origin, interrupted, say
-        self._request: tuple[str, Sequence[tuple[Any, ...]], bool] = ("", (), False)
+        self._request: tuple[Sequence[Any], bool] = ((), False)
         self._patience = 0.0
         self._holder = ray.remote(Holder)
         self._places = [Place(arguments) for arguments in calls]
@@ -129,11 +129,9 @@ class NodeCrew:
         """See `Crew`."""
         return [place.state for place in self._places]
 
-    def ask(
-        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
-    ) -> None:
+    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
         """See `Crew`."""
-        self._request, self._patience = (request, arguments, changes), patience
+        self._request, self._patience = (messages, changes), patience
         for index in range(len(self._places)):
             self._begin(index)
 
@@ -169,9 +167,9 @@ class NodeCrew:
 
     def _begin(self, index: int) -> None:
         """Asks a member; one that is remade goes on from its last state."""
-        request, arguments, changes = self._request
+        messages, changes = self._request
         place = self._places[index]
-        asked = place.actor.ask.remote(None if place.host else place.state, request, arguments[index], changes)
+        asked = place.actor.ask.remote(None if place.host else place.state, messages[index], changes)
         place.waiting[asked] = "answer"
         place.since, place.took = time.monotonic(), None
 
@@ -200,7 +198,7 @@ class NodeCrew:
         place.losses = 0
         place.took = time.monotonic() - place.since if place.made else None
         place.made = True
-        if self._request[2]:
+        if self._request[1]:
             place.state = state
 
     def _look(self) -> None:

@@ -32,6 +32,10 @@ class Step:
     """Support joints that do not turn about the lateral axis, among the support joints."""
     command: Array
     """C in force during the step, (n, 11)."""
+    target_velocity: Array
+    """Planar velocity asked for: the command's, changed by the force to which the robot yields, (n, 2) [m/s]."""
+    unyielded_force: Array
+    """Horizontal force on the hands at which the robot should have yielded altogether, and beyond, (n,) [N]."""
     height_rate: Array
     """Rate of change of the commanded height, (n,) [m/s]."""
     support_reference: Array
@@ -44,6 +48,8 @@ class Step:
     """a_t, (n, 15)."""
     previous_action: Array
     """a_{t−1}, (n, 15)."""
+    earlier_action: Array
+    """a_{t−2}, (n, 15)."""
     swing_profile: Array
     """Height at which the gait prior has the soles, (n, 2) [m]."""
     stepping: Mask
@@ -69,9 +75,9 @@ TERMS: dict[str, Term] = {
     "sync.lateral_reference": lambda s: sync.support_reference(
         s.state.joint_position[:, s.support][:, s.lateral], s.support_reference[:, s.lateral]
     ),
-    "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
+    "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
     "sync.yaw_rate": lambda s: sync.yaw_rate(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
-    "sync.progress": lambda s: sync.progress(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
+    "sync.progress": lambda s: sync.progress(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
     "sync.turning": lambda s: sync.turning(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
     "sync.heading": lambda s: sync.heading(s.heading_error),
     "sync.height": lambda s: sync.height(s.motion.height, s.command[:, HEIGHT]),
@@ -90,6 +96,10 @@ TERMS: dict[str, Term] = {
     ),
     "smooth.joint_acceleration": lambda s: smooth.joint_acceleration(s.state.joint_acceleration),
     "smooth.action_rate": lambda s: smooth.action_rate(s.action, s.previous_action),
+    "smooth.action_curvature": lambda s: smooth.action_curvature(s.action, s.previous_action, s.earlier_action),
+    "smooth.effort": lambda s: smooth.effort(
+        s.state.joint_torque, s.state.torque_limit, s.recipe.smooth.comfortable_effort
+    ),
     "smooth.power": lambda s: smooth.power(s.state.joint_torque, s.state.joint_velocity),
     "smooth.base_rates": lambda s: smooth.base_rates(s.state.base_angular_velocity),
     "smooth.vertical_velocity": lambda s: smooth.vertical_velocity(s.motion.base_velocity, s.height_rate),
@@ -97,8 +107,12 @@ TERMS: dict[str, Term] = {
     "gait.contact_timing": lambda s: gait.contact_timing(s.state.foot_contact, s.stance),
     "gait.swing_height": lambda s: gait.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
     "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_force),
+    "gait.touchdown": lambda s: gait.touchdown(
+        s.state.foot_position[:, :, 2], s.state.foot_velocity[:, :, 2], s.recipe.gait.touchdown_height
+    ),
     "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
+    "yielding.force": lambda s: s.unyielded_force,
     "alive": lambda s: np.ones(len(s.command)),
     "termination": lambda s: s.ended,
 }

@@ -1,22 +1,30 @@
 """Stage `eval`: mass sweeps, heavy cases and a probe of the trained policy, their tables, figures and films."""
 
 import math
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Spread, Stage, always
+from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
-from iowbc.stages.spreading import play_everywhere
+from iowbc.recipe.section import deciding
+from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from iowbc.evaluation.trials.plan import Trial
+    from iowbc.evaluation.trials.protocol import Batches
     from iowbc.evaluation.trials.rollout import Acting
     from iowbc.task.specification import Specification
+
+
+FORCES = ("handle_force_p95", "hand_force_p95")
+"""Shown of each behaviour of the partner."""
 
 
 def acting_stage(recipe: Recipe) -> tuple[str, ...]:
@@ -32,6 +40,16 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
         yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
     if recipe.eval.policy == "model" and recipe.eval.probe is not None:
         yield "eval.probe", "reads what a trained policy knows of its load: leave it out, or evaluate the student"
+
+
+def defaults(recipe: Recipe) -> dict[str, object]:
+    """The command sequences of sweeps and cases that have none in the recipe."""
+    if recipe.eval.sequence:
+        return {}
+    return {
+        f"defaults.{name}_sequence": [deciding(segment) for segment in sequence]
+        for name, sequence in (("lifting", LIFTING), ("pushing", PUSHING))
+    }
 
 
 def run(job: Job) -> None:
@@ -62,6 +80,7 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import Film, film_trial, filmed
+    from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
 
@@ -86,7 +105,7 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
             film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
-    for suite, rows in summary[summary["kind"] != "pushes"].groupby("suite", sort=False):
+    for suite, rows in summary[~summary["kind"].isin(PROBING)].groupby("suite", sort=False):
         counts = ", ".join(f"{_load(row)} {row['succeeded']}/{row['trials']}" for _, row in rows.iterrows())
         job.report.say(f"{suite}: succeeded {counts}")
     return headline(summary)
@@ -127,12 +146,45 @@ def read_by_trials(job: Job) -> dict[str, Path]:
     return {"robot": job.robot} | {name: job.inputs[stage] for name, stage in read if stage in job.inputs}
 
 
+def play_everywhere(
+    spread: Spread, recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
+) -> "Iterator[tuple[str, bytes]]":
+    """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
+    names = list(batches)
+    for place, content in spread(play_batch, [(recipe, name, batches[name]) for name in names], folders):
+        yield names[place], content
+
+
+def play_batch(
+    recipe: Recipe,
+    name: str,
+    trials: "Sequence[Trial]",
+    *,
+    robot: Path,
+    policy: Path | None = None,
+    generator: Path | None = None,
+) -> bytes:
+    """The file of one batch."""
+    import torch
+
+    from iowbc.evaluation.acting import evaluated_policy
+    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.task.specification import Specification
+
+    torch.set_num_threads(1)  # as in the stage
+    world = evaluated_world(Specification(recipe, robot, generator))
+    with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
+        return Protocol(world, evaluated_policy(world, policy), work=Path(folder), workers=0).play(name, trials)
+
+
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
-    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite."""
+    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite, and
+    forces where a partner is met."""
+    from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.trials.errors import ERRORS
 
     metrics = {name: float(summary[name].sum()) for name in ("trials", "survived", "succeeded")}
-    for _, row in summary[summary["kind"] != "pushes"].iterrows():
+    for _, row in summary[~summary["kind"].isin(PROBING)].iterrows():
         rows = summary[summary["suite"] == row["suite"]]
         if row["case"] == row["suite"] and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
             continue
@@ -142,6 +194,8 @@ def headline(summary: "pd.DataFrame") -> dict[str, float]:
             metrics[f"{name}/transport"] = float(row["transport_robot"])
         if row["survived"]:
             metrics |= {f"{name}/{error}": float(row[error]) for error in ERRORS}
+        forces = FORCES if row["kind"] == "compliance" else ()
+        metrics |= {f"{name}/{force}": float(row[force]) for force in forces if not math.isnan(row[force])}
     return metrics
 
 
@@ -153,13 +207,18 @@ def _load(row: "pd.Series[Any]") -> str:
 
 STAGE = Stage(
     name="eval",
-    version=5,
+    version=6,
     slice=("rg.height", "simulation", "task", "eval"),
     reads=lambda recipe: (*generator_stage(recipe), *acting_stage(recipe)),
     run=run,
     problems=problems,
+    defaults=defaults,
     results=("*.parquet",),
-    packages=("stages.evaluate", "evaluation", "model_based", "deploy", "learning", "rollouts", *ENVIRONMENTS),
     counts=("eval.trials",),
+    presentation=Presentation(
+        headline=("trials", "survived", "succeeded"),
+        columns=("succeeded", "trials"),
+        pictures=("comparison.png", "compliance.png", "push_map.png"),
+    ),
     spreads=always,
 )
