@@ -15,7 +15,7 @@ from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.recipe.evaluation.sequences import STANDING
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
-from iowbc.stages import evaluate
+from iowbc.stages import eval as evaluate
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 

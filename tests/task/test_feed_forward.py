@@ -8,6 +8,7 @@ import pytest
 from changes import with_changes
 
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
+from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.recipe.evaluation.sequences import STANDING
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
@@ -43,3 +44,11 @@ def test_the_fair_baselines_arms_expect_in_trials_what_they_did_in_training(
     np.testing.assert_array_equal(arm_targets(fair, folder, robot, played), in_training)
     expecting = with_changes(fair, {f"task.references.loads.{played}": 3.5})
     assert np.abs(arm_targets(expecting, folder, robot, played) - in_training).max() > 0.02
+
+
+def test_the_fair_baselines_arms_expect_nothing_in_any_scene_of_the_trials(folder: Path) -> None:
+    fair = load_recipe(RECIPES / "wbc_fair.yaml").recipe
+    assert fair.eval.scenes
+    loads = dict(evaluated_world(Specification(fair, folder)).recipe.task.references.loads)
+    assert {name for name, load in loads.items() if load} == set()
+    assert set(fair.eval.scenes) <= loads.keys()

@@ -45,7 +45,9 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
     further, simulation, task = recipe.eval.scenes, recipe.simulation, recipe.task
     references = task.references
     grasps = {**dict(references.grasps), **{name: own.wrists for name, own in further.items()}}
-    loads = {**dict(references.loads), **{name: own.load for name, own in further.items()}}
+    usual = references.loads.lift
+    expected = {name: usual if own.load is None else own.load for name, own in further.items()}
+    loads = {**dict(references.loads), **expected}
     own = {"grasps": Grasps.model_validate(grasps), "loads": Loads.model_validate(loads)}
     scenes = {"scenes": with_scenes(simulation.scenes, further)}
     return recipe.model_copy(
