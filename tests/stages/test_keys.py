@@ -47,6 +47,7 @@ COSMETIC = {
     "teacher.start",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",
+    "distill.experts",
     "eval.label",
     "eval.success.capacity_rate",
     "eval.video",
