@@ -15,7 +15,7 @@ from iowbc.cli.measuring import bench_control, bench_reference, bench_scale, ben
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
-from iowbc.commands.interrupt import leave
+from iowbc.commands.ending import leave
 from iowbc.commands.streams import let_go, prepare_streams
 from iowbc.commands.unforeseen import told
 from iowbc.processes import name_glfw

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from iowbc.commands.as_json import print_json
-from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor, tables_of
 from iowbc.commands.filming import Filming
 from iowbc.commands.members import FILM, film_of, members_of, points_of, record_comparison
 from iowbc.commands.named import Named, named
-from iowbc.commands.results import shown_path
+from iowbc.commands.origins import PROBE, TRIALS, evaluated_actor, tables_of
+from iowbc.commands.printed import print_json, shown_path, tell
 from iowbc.commands.training import require_training
 from iowbc.commands.trainings import trainings_table
 from iowbc.errors import UsageError
@@ -82,9 +81,9 @@ def compare(
     _print_curves(curves, console)
     if missing:
         text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
-        console.print(f"{text}that takes", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"{text}that takes")
     for text in _written(output):
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        tell(console, text)
 
 
 def _written(output: Path) -> list[str]:

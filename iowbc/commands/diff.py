@@ -12,9 +12,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.as_json import print_json
 from iowbc.commands.named import Named, named
-from iowbc.commands.tables import hanging
+from iowbc.commands.printed import hanging, print_json, tell
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
@@ -46,12 +45,12 @@ def diff(store: Store, console: Console, first: str, second: str, as_json: bool 
     if not found:
         console.print("no difference")
     elif console.is_terminal:
-        console.print(f"{first} -> {second}", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"{first} -> {second}")
         for place in dict.fromkeys(difference.place for difference in found):
             _draw(console, place, [difference for difference in found if difference.place == place])
     else:
         for difference in found:
-            console.print(difference.line, markup=False, highlight=False, soft_wrap=True)
+            tell(console, difference.line)
 
 
 @dataclass(frozen=True)

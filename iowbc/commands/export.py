@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Console
 
 from iowbc.commands.named import named
-from iowbc.commands.results import shown_path
+from iowbc.commands.printed import shown_path, tell
 from iowbc.commands.training import require_training
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
@@ -19,7 +19,7 @@ def export_page(store: Store, console: Console, word: str, folder: Path) -> None
     """Write the page of what a word names into a folder, and say how to look at it. Raises `UsageError`."""
 
     def say(text: str) -> None:
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        tell(console, text)
 
     require_training("export")
     exported = exported_folder(store, word)

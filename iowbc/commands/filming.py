@@ -8,6 +8,8 @@ from typing import Self
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
+from iowbc.commands.printed import tell
+
 INTERVAL = 10.0
 """Seconds between two lines."""
 
@@ -29,13 +31,11 @@ class Filming:
             self._bar.update(self._task, completed=seconds)
         elif self.film is not None and time.monotonic() - self._said >= INTERVAL:
             self._said = time.monotonic()
-            text = f"{self.film}: {seconds:.0f} of {duration:.0f} s"
-            self.console.print(text, markup=False, highlight=False, soft_wrap=True)
+            tell(self.console, f"{self.film}: {seconds:.0f} of {duration:.0f} s")
 
     def __enter__(self) -> Self:
         if self.film is not None:
-            text = f"{self.film}: sets up the simulation"
-            self.console.print(text, markup=False, highlight=False, soft_wrap=True)
+            tell(self.console, f"{self.film}: sets up the simulation")
         if self._bar is not None:
             self._bar.start()
         return self

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from iowbc.commands.named import known_recipes, last_used
-from iowbc.commands.results import shown_path
+from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError, nearest
 from iowbc.files import OLD
 from iowbc.pipeline.console.wording import size
@@ -65,7 +65,7 @@ def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None
         verb = "would remove" if dry_run else "removed"
         if not dry_run:
             _remove(path)
-        console.print(f"{verb} {shown_path(path)} ({size(count)})", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"{verb} {shown_path(path)} ({size(count)})")
     if not dry_run:
         remove_dangling(store.runs)
     console.print(f"{size(total)} in all", highlight=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.results import shown_path
+from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError
 from iowbc.files import replacing
 from iowbc.pipeline.writability import require_writable
@@ -36,7 +36,7 @@ def begin(folder: Path, robot: str, console: Console) -> None:
             continue
         with replacing(target) as fresh:
             shutil.copytree(origin, fresh) if origin.is_dir() else shutil.copyfile(origin, fresh)
-        console.print(shown_path(target), markup=False, highlight=False, soft_wrap=True)
+        tell(console, shown_path(target))
     console.print(f"to begin: cd {folder}, then `iowbc run quickstart`", highlight=False, soft_wrap=True)
 
 

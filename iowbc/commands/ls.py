@@ -3,10 +3,9 @@
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.as_json import artifact_data, print_json
 from iowbc.commands.named import known_recipes
+from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json
 from iowbc.commands.results import metrics_text
-from iowbc.commands.tables import NARROW, plain_table
 from iowbc.errors import require_known
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, size
 from iowbc.pipeline.store.last_used import ever_used

@@ -1,4 +1,4 @@
-"""What an artifact was made from, and the world that its recipe describes."""
+"""What an artifact was made from, the world that its recipe describes, and what an evaluation left."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -6,10 +6,16 @@ from typing import TYPE_CHECKING, Any
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
+from iowbc.results.table import Table, read_tables
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from iowbc.evaluation.side_by_side import Actor
     from iowbc.task.specification import Specification
+
+TRIALS, PROBE = "trials.parquet", "probe.parquet"
 
 
 def generator_of(store: Store, artifact: Artifact) -> Artifact | None:
@@ -54,3 +60,34 @@ def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specif
 
     recipe = Recipe.model_validate(resolved)
     return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)
+
+
+def tables_of(artifact: Artifact) -> list[Table]:
+    """The tables that an artifact holds; an evaluation that has them as text alone is read again."""
+    found, file = read_tables(artifact.folder / "tables"), artifact.folder / TRIALS
+    if found or not file.is_file():
+        return found
+    import pandas as pd
+
+    from iowbc.evaluation.report.aggregate import aggregate
+    from iowbc.evaluation.report.report import report_tables
+
+    trials = pd.read_parquet(file)
+    rate = float(artifact.recipe["eval"]["success"]["capacity_rate"])
+    return sorted(report_tables(trials, aggregate(trials), rate), key=lambda table: table.name)
+
+
+def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":
+    """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
+    import pandas as pd
+
+    from iowbc.evaluation.acting import evaluated_policy
+    from iowbc.evaluation.side_by_side import Actor
+    from iowbc.evaluation.trials.protocol import evaluated_world
+
+    if trials is None and not (artifact.folder / TRIALS).is_file():
+        raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
+    table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
+    world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
+    policy = None if world.recipe.eval.policy == "model" else policy_of(store, artifact).folder
+    return Actor(world, evaluated_policy(world, policy), table)

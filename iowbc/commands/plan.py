@@ -7,10 +7,9 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.as_json import print_json
+from iowbc.commands.printed import hanging, print_json, tell
 from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned, time_of
-from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import KEY_LENGTH, short
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
@@ -54,7 +53,7 @@ def _print_several(found: Planned, request: Request, console: Console) -> None:
     if changing:
         text = f"`iowbc plan {changing[-1]}` says why; so for {', '.join(changing[:-1])}" if changing[:-1] else ""
         text = text or f"`iowbc plan {changing[0]}` says why"
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        tell(console, text)
 
 
 def _print(steps: Sequence[Step], console: Console) -> None:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from iowbc.commands.ending import close_on_termination
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
-from iowbc.commands.interrupt import close_on_termination
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
+from iowbc.commands.printed import tell
 from iowbc.commands.request import Request, prepared
 from iowbc.commands.results import policy_stages
 from iowbc.commands.training import require_training
@@ -54,8 +55,7 @@ def play_word(
         console.print(str(stopped), markup=False, highlight=False)
         return 0
     made = f"; {request.video} has {shown.frames} pictures" if request.video else ""
-    text = f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}"
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    tell(console, f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}")
     return 0
 
 
@@ -79,7 +79,7 @@ def named_source(
         return exported_source(Path(word))
     training = in_training(store, word, stage)
     if training is not None and training.recipe is not None:
-        console.print(training.text, markup=False, highlight=False, soft_wrap=True)
+        tell(console, training.text)
         return _training_source(store, training, training.recipe)
     loaded = load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
     asked = _evaluation(store, word) if loaded is None else loaded.recipe.eval
@@ -91,11 +91,10 @@ def named_source(
         text = "there is neither a checkpoint that can be played nor a finished one; `iowbc status` tells how far it is"
         raise UsageError(f"{training.text}; {text}") from None
     if training is not None:
-        console.print(f"{training.text}; this is a finished one", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"{training.text}; this is a finished one")
     require_whole(store.runs, [artifact])
     if artifact.published:
-        text = f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository"
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository")
     scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
     if scene is not None and scenes:
         require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from iowbc.commands.evaluated import evaluated_actor
-from iowbc.commands.interrupt import close_on_termination
+from iowbc.commands.ending import close_on_termination
 from iowbc.commands.named import named
-from iowbc.commands.origins import policy_of
+from iowbc.commands.origins import evaluated_actor, policy_of
 from iowbc.commands.play import NO_STAGES, Registry, artifact_source, named_source
 from iowbc.commands.ports import HOST, require_free
+from iowbc.commands.printed import tell
 from iowbc.commands.training import require_training, require_viewer
 from iowbc.errors import UsageError
 from iowbc.evaluation.play_request import PlayRequest
@@ -50,7 +50,7 @@ def play_on_web(
 
     def ready() -> None:
         console.print("Drive it in the browser; Ctrl-C ends it:", highlight=False)
-        console.print(f"http://{HOST}:{port}", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"http://{HOST}:{port}")
         there = f"ssh -L {port}:{HOST}:{port} THIS_MACHINE"
         console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
 
@@ -83,5 +83,5 @@ def _actor(store: Store, console: Console, evaluation: Artifact) -> "Actor | Non
     try:
         return evaluated_actor(store, evaluation)
     except UsageError as error:
-        console.print(f"no trials to look through: {error}", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"no trials to look through: {error}")
         return None

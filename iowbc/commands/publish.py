@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from rich.console import Console
 
+from iowbc.commands.printed import shown_path, tell
 from iowbc.commands.request import Request, prepared, recipes
-from iowbc.commands.results import shown_path
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.stage import Stage
@@ -42,5 +42,5 @@ def publish_recipe(
         lacks = [f"without {left_out}"] if left_out else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({size(copy.size)})"
         text = "; ".join([what, *lacks, *notes.get(key, ())])
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        tell(console, text)
     console.print(f"{size(published_size(request.runs))} are published in all", highlight=False)

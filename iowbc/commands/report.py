@@ -9,7 +9,8 @@ from iowbc.commands.compare import joined
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.members import points_of
 from iowbc.commands.named import Named, named
-from iowbc.commands.results import shown_path, split_tables
+from iowbc.commands.printed import shown_path, tell
+from iowbc.commands.results import split_tables
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
@@ -40,8 +41,7 @@ def report(store: Store, console: Console, words: Sequence[str], output: Path) -
     together = joined(store, found)
     main, others = split_tables(together.tables)
     write_page(output, runs, grouped(runs), main, others, differences, together.media)
-    text = f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed"
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    tell(console, f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed")
 
 
 def _differences(first: Named, other: Named) -> list[str]:

@@ -3,17 +3,22 @@
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from iowbc.commands.robot_check import check_against_robot
 from iowbc.errors import Problem, RecipeError
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.step import Options
+from iowbc.pipeline.store.digests import folder_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
+
+if TYPE_CHECKING:
+    from iowbc.robot.description import Robot
 
 
 @dataclass(frozen=True)
@@ -81,3 +86,26 @@ def in_order(planner: Planner) -> list[Planner]:
     """What runs for a recipe: first those from whose artifacts it begins, where they are not stored, then itself."""
     missing = [origin for origin in planner.origins.values() if not origin.plan()[-1].cached]
     return [*(each for origin in missing for each in in_order(origin)), planner]
+
+
+@cache
+def _robot(folder: Path, digest: str) -> "Robot":
+    """The robot in a folder, read once while its files stay as they are."""
+    from iowbc.robot.description import load_robot
+
+    return load_robot(folder)
+
+
+def check_against_robot(loaded: LoadedRecipe, folder: Path) -> None:
+    """Raises `RecipeError` with all that the robot does not have or cannot reach."""
+    from iowbc.reference.ranges import wrong_ranges
+
+    try:
+        robot = _robot(folder, folder_digest(folder))
+    except (OSError, ValueError) as error:
+        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
+    problems = [
+        Problem(loaded.place(path), f"key '{path}': {text}") for path, text in wrong_ranges(robot, loaded.recipe.rg)
+    ]
+    if problems:
+        raise RecipeError(problems)

@@ -1,6 +1,5 @@
 """The end of a run: films, chosen metrics, tables, where the rest lies, and what to type next."""
 
-import os
 import shlex
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -9,8 +8,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.evaluated import tables_of
 from iowbc.commands.named import last_used
+from iowbc.commands.origins import tables_of
+from iowbc.commands.printed import shown_path, tell
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall
@@ -44,7 +44,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
     }
     for folder in folders.values():
         for film in sorted((folder / "videos").glob("*")):
-            _line(console, f"film  {shown_path(film)}")
+            tell(console, f"film  {shown_path(film)}")
     for stage, artifact in artifacts.items():
         chosen = ", ".join(f"{name} {figure(value)}" for name, value in headline(stage, artifact.metrics))
         if chosen:
@@ -54,13 +54,13 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
     for folder in folders.values():
         pictures = len(list((folder / "figures").glob("*")))
         if pictures:
-            _line(console, f"figures  {shown_path(folder / 'figures')} ({pictures})")
+            tell(console, f"figures  {shown_path(folder / 'figures')} ({pictures})")
         if (folder / EXPORTED).is_file():
-            _line(console, f"controller  {shown_path(folder)}")
+            tell(console, f"controller  {shown_path(folder)}")
     if artifacts:
-        _line(console, "next:")
+        tell(console, "next:")
         for command in next_commands(runs, recipe, artifacts):
-            _line(console, f"  {command}")
+            tell(console, f"  {command}")
 
 
 def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]]:
@@ -106,7 +106,7 @@ def _print_tables(artifact: Artifact, folder: Path, console: Console) -> None:
         console.print(drawn(shown[name], console.width))
     others = [path.name for path in sorted(folder.glob("*.md"), key=_rank) if path.stem not in shown]
     if others:
-        _line(console, f"more tables  {shown_path(folder)}: {', '.join(others)}")
+        tell(console, f"more tables  {shown_path(folder)}: {', '.join(others)}")
 
 
 def split_tables(tables: Sequence[Table]) -> tuple[list[Table], list[Table]]:
@@ -125,13 +125,3 @@ def metrics_text(artifact: Artifact, limit: int | None = None) -> str:
     items = list(artifact.metrics.items())
     text = ", ".join(f"{name} {figure(value)}" for name, value in items[:limit])
     return text + (", ..." if limit is not None and len(items) > limit else "")
-
-
-def shown_path(path: Path) -> str:
-    """A path as short as it can be said from here."""
-    relative = os.path.relpath(path)
-    return relative if not relative.startswith("..") else str(path)
-
-
-def _line(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

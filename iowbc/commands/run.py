@@ -1,6 +1,7 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -8,20 +9,22 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare, film_together
 from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
-from iowbc.commands.engine import engine
+from iowbc.commands.printed import shown_path, tell
 from iowbc.commands.request import Request, in_order, prepared, recipes
-from iowbc.commands.results import TABLES, described, print_results, shown_path
+from iowbc.commands.results import TABLES, described, print_results
 from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
-from iowbc.pipeline.console.display import Display, PlainDisplay, SilentDisplay
+from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures
 from iowbc.pipeline.writability import require_writable_runs
+from iowbc.recipe.execution import Execution
 from iowbc.recipe.reading.loading import LoadedRecipe
 
 if TYPE_CHECKING:
@@ -72,14 +75,14 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
         film = film_together(store, console, words, output)
     except (NoRenderer, UsageError) as reason:
         film = None
-        console.print(f"no film: {reason}", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"no film: {reason}")
     if film is not None:
-        console.print(shown_path(film), markup=False, highlight=False, soft_wrap=True)
+        tell(console, shown_path(film))
     told = joined_text(output)
     if told != before and loaded[0].recipe.execution.track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
         record_figures(request.runs, f"compare-{name}", {}, told, files)
-    console.print(f"next:\n  iowbc report {name}", markup=False, highlight=False, soft_wrap=True)
+    tell(console, f"next:\n  iowbc report {name}")
 
 
 def joined_text(folder: Path) -> str:
@@ -87,6 +90,18 @@ def joined_text(folder: Path) -> str:
     paths = [folder / "tables" / f"{name}.md" for name in (*TABLES, "differences")]
     found = [path.read_text(encoding="utf-8") for path in (*paths, folder / "metrics.md") if path.is_file()]
     return "\n".join(found)
+
+
+@contextmanager
+def engine(options: Options, execution: Execution) -> "Iterator[Cluster | None]":
+    """The cluster that was asked for, to the end of the block; None where stages run here. Raises `UsageError`."""
+    if (options.engine or execution.engine) == "local":
+        yield None
+        return
+    from iowbc.pipeline.cluster.cluster import connected
+
+    with connected(options.address or execution.address, copy=execution.copy_files) as cluster:
+        yield cluster
 
 
 def run_recipe(
@@ -168,7 +183,7 @@ def _display(
     loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], load: Callable[[], str], manner: Manner
 ) -> Display:
     if manner == "quiet":
-        return SilentDisplay()
+        return Display()
     if manner == "verbose":
         return PlainDisplay(0.0, console.file)
     if console.is_terminal:

@@ -3,15 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
+from rich.columns import Columns
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.as_json import artifact_data, print_json
 from iowbc.commands.named import named
-from iowbc.commands.results import shown_path
-from iowbc.commands.tables import metric_columns
+from iowbc.commands.printed import artifact_data, print_json, shown_path, tell
 from iowbc.errors import shown
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
 from iowbc.pipeline.nested import flattened
@@ -35,7 +34,8 @@ def show(store: Store, console: Console, word: str, as_json: bool = False) -> No
             manifest = artifact.manifest
             took = f"made {ago(manifest.made)}, took {duration(manifest.seconds)}"
             console.print(Text.assemble((stage, "bold"), f" {manifest.key[:KEY_LENGTH]}, {took}"))
-            console.print(Padding(metric_columns(artifact), (0, 0, 0, 2)))
+            cells = [Text.assemble((f"{name} ", "dim"), figure(value)) for name, value in artifact.metrics.items()]
+            console.print(Padding(Columns(cells, padding=(0, 2), equal=True, column_first=True), (0, 0, 0, 2)))
         return
     (artifact,) = found.artifacts.values()
     _show_artifact(store, artifact, console)
@@ -62,7 +62,7 @@ def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
             grid.add_row(Text(name, style="bold"), Text(text))
     console.print(grid)
     folder = named_folder(store.runs, manifest.recipe, manifest.stage, artifact.folder)
-    console.print(f"folder  {shown_path(folder)}", markup=False, highlight=False, soft_wrap=True)
+    tell(console, f"folder  {shown_path(folder)}")
 
 
 def _unusual(slices: Mapping[str, Any]) -> list[str]:

@@ -9,10 +9,8 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
-from iowbc.commands.as_json import print_json
 from iowbc.commands.named import known_recipes, last_used
-from iowbc.commands.results import shown_path
-from iowbc.commands.tables import plain_table
+from iowbc.commands.printed import plain_table, print_json, shown_path, tell
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration
 from iowbc.pipeline.store.last_used import recall
@@ -35,7 +33,7 @@ def print_status(store: Store, console: Console, as_json: bool = False) -> None:
         if not holder(store.runs, folder.name) and record.get("command"):
             stopped.append(str(record["command"]))
     for command in dict.fromkeys(stopped):
-        console.print(f"to go on: {command}", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"to go on: {command}")
     recipes = known_recipes(store)
     if recipes:
         table = plain_table("recipe", "finished stages", "last")

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
-from iowbc.commands.engine import engine
 from iowbc.commands.members import record_sweep
 from iowbc.commands.named import Named, named
 from iowbc.commands.points import Endings, PointRun, run_processes, run_threads
+from iowbc.commands.printed import shown_path, tell
 from iowbc.commands.request import Request, in_order, prepared
-from iowbc.commands.results import shown_path
-from iowbc.commands.run import run_recipe
+from iowbc.commands.run import engine, run_recipe
 from iowbc.commands.sweep_plan import Planned, in_all, planned, print_plan
 from iowbc.commands.training import require_training
 from iowbc.errors import Problem, RecipeError, UsageError
@@ -232,9 +231,9 @@ def _conclude(
         return
     console.print(drawn(results, console.width))
     for path in paths:
-        console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
+        tell(console, shown_path(path))
     if len(finished) > 1:
-        console.print(f"next:\n  iowbc compare {found.name}", markup=False, highlight=False, soft_wrap=True)
+        tell(console, f"next:\n  iowbc compare {found.name}")
 
 
 def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -> None:

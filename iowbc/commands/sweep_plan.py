@@ -8,8 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.as_json import print_json
-from iowbc.commands.tables import plain_table
+from iowbc.commands.printed import plain_table, print_json
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.ingredients import key_values
 from iowbc.pipeline.planner import Planner

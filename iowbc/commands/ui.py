@@ -9,6 +9,7 @@ import sys
 from rich.console import Console
 
 from iowbc.commands.ports import HOST, require_free
+from iowbc.commands.printed import tell
 from iowbc.commands.training import require_training
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, set_up
@@ -37,7 +38,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
         start_sender(runs)
     page = f"http://{HOST}:{port}/#/experiments/{shown}/runs?workflowType=machine_learning&viewStateShareKey={VIEW}"
     console.print("MLflow's page of the runs, ready in about a quarter of a minute; Ctrl-C ends it:", highlight=False)
-    console.print(page, markup=False, highlight=False, soft_wrap=True)
+    tell(console, page)
     command = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(port), "--workers", "1"]
     command += ["--backend-store-uri", uri, "--artifacts-destination", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.interrupt import INTERRUPTED, leave
+from iowbc.commands.ending import INTERRUPTED, leave
 
 ROOT = Path(__file__).parents[2]
 INTERRUPTED_IMPORT = """
 import signal
-from iowbc.commands.interrupt import leave
+from iowbc.commands.ending import leave
 signal.signal(signal.SIGINT, leave)
 try:
     import interrupted

@@ -77,7 +77,7 @@ def test_only_a_policy_that_sees_s_priv_is_played_with_its_parts_in_a_users_file
 def test_a_film_that_is_terminated_leaves_no_part_of_it(tmp_path: Path, number: signal.Signals) -> None:
     program = (
         "import os, signal\nfrom pathlib import Path\nimport numpy as np\n"
-        "from iowbc.commands.interrupt import close_on_termination, leave\n"
+        "from iowbc.commands.ending import close_on_termination, leave\n"
         "from iowbc.evaluation.films import Film\n"
         "signal.signal(signal.SIGINT, leave)\nclose_on_termination()\n"
         "with Film(Path('x.mp4'), 10) as film:\n"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.robot_check import check_against_robot
+from iowbc.commands.request import check_against_robot
 from iowbc.errors import RecipeError
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import robot_folder

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import IO, Protocol
+from typing import IO
 
 from iowbc.pipeline.console.wording import duration, pace
 
@@ -86,8 +86,8 @@ class StageView:
         return min(1.0, self.done / self.total) if self.total else 0.0
 
 
-class Display(Protocol):
-    """Where a run shows how it goes."""
+class Display:
+    """Where a run shows how it goes; this one shows nothing."""
 
     def begin(self, views: Sequence[StageView]) -> None:
         """Start to show these stages."""
@@ -105,7 +105,7 @@ class Display(Protocol):
         """Nothing more comes."""
 
 
-class PlainDisplay:
+class PlainDisplay(Display):
     """Lines for logs: each change of state, and progress once in a while."""
 
     def __init__(self, interval: float, stream: IO[str] | None = None, load: Callable[[], str] = lambda: "") -> None:
@@ -114,9 +114,6 @@ class PlainDisplay:
         self.stream = stream or sys.stdout
         self._load = load
         self._last = time.monotonic()
-
-    def begin(self, views: Sequence[StageView]) -> None:
-        """Start to show these stages."""
 
     def changed(self, view: StageView) -> None:
         """A stage changed its state: shown at once."""
@@ -146,25 +143,3 @@ class PlainDisplay:
             print(text, file=self.stream, flush=True)
         except BrokenPipeError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
-
-    def end(self) -> None:
-        """Nothing more comes."""
-
-
-class SilentDisplay:
-    """Shows nothing."""
-
-    def begin(self, views: Sequence[StageView]) -> None:
-        """Start to show these stages."""
-
-    def changed(self, view: StageView) -> None:
-        """A stage changed its state."""
-
-    def moved(self, view: StageView) -> None:
-        """A stage made progress."""
-
-    def say(self, text: str) -> None:
-        """One line."""
-
-    def end(self) -> None:
-        """Nothing more comes."""

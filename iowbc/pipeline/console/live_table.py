@@ -10,7 +10,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.pipeline.console.display import StageView
+from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import duration, pace
 
 BLOCKS = "▁▂▃▄▅▆▇█"
@@ -46,7 +46,7 @@ def sparkline(values: Sequence[float], width: int = CURVE_WIDTH) -> str:
     return "".join(BLOCKS[round((mean - low) * scale)] for mean in means)
 
 
-class LiveTable:
+class LiveTable(Display):
     """One row a stage, redrawn in place, with what the stages note beneath; lines that are said scroll by above it."""
 
     def __init__(
@@ -68,9 +68,6 @@ class LiveTable:
     def changed(self, view: StageView) -> None:
         """A stage changed its state: shown at once."""
         self._live.refresh()
-
-    def moved(self, view: StageView) -> None:
-        """A stage made progress: the next redraw shows it."""
 
     def say(self, text: str) -> None:
         """One line."""

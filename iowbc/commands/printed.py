@@ -1,0 +1,80 @@
+"""How commands print: lines as they are, plain tables, paths, and JSON for other programs."""
+
+import json
+import math
+import os
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from iowbc.pipeline.store.artifact import Artifact
+
+FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why")
+"""Columns whose text may go on in the next line."""
+NARROW = 100
+"""Terminals of fewer characters than this leave out what `show` tells."""
+
+
+def plain_table(*columns: str) -> Table:
+    """An empty table with these columns."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for name in columns:
+        table.add_column(name, no_wrap=name not in FOLDED, overflow="fold")
+    return table
+
+
+def hanging(line: str, width: int, indent: int) -> str:
+    """A line to the right of its heading, and what of it does not fit two characters further to the right."""
+    first, others = " " * indent, " " * (indent + 2)
+    return textwrap.fill(line, width, initial_indent=first, subsequent_indent=others, break_on_hyphens=False)
+
+
+def tell(console: Console, text: str) -> None:
+    """Print a text as it is, however wide."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def shown_path(path: Path) -> str:
+    """A path as short as it can be said from here."""
+    relative = os.path.relpath(path)
+    return relative if not relative.startswith("..") else str(path)
+
+
+def print_json(console: Console, data: Any) -> None:
+    """Print data as JSON; what is no number is null."""
+    tell(console, json.dumps(_finite(data), indent=2, ensure_ascii=False))
+
+
+def artifact_data(artifact: Artifact) -> dict[str, Any]:
+    """What an artifact is."""
+    manifest = artifact.manifest
+    return {
+        "stage": manifest.stage,
+        "key": manifest.key,
+        "version": manifest.version,
+        "content": manifest.digest,
+        "recipe": manifest.recipe,
+        "folder": shown_path(artifact.folder),
+        "published": artifact.published,
+        "made": manifest.made,
+        "seconds": manifest.seconds,
+        "attempts": manifest.attempts,
+        "workers": manifest.workers,
+        "host": manifest.host,
+        "bytes": artifact.size,
+        "files": {name: record.size for name, record in manifest.files.items()},
+        "versions": manifest.versions,
+        "metrics": artifact.metrics,
+    }
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {str(name): _finite(value) for name, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
