@@ -48,7 +48,6 @@ COSMETIC = {
     "distill.experts",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",
-    "distill.experts",
     "eval.label",
     "eval.success.capacity_rate",
     "eval.video",
