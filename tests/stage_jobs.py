@@ -41,7 +41,7 @@ class Backwards:
 
     def __init__(self) -> None:
         self.calls = 0
-        self.crews: list[int] = []
+        self.pools: list[int] = []
 
     def __call__(
         self, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
@@ -50,10 +50,10 @@ class Backwards:
             self.calls += 1
             yield place, function(*calls[place], **folders)
 
-    def crew(
+    def actor_pool(
         self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> "Remade":
-        self.crews.append(len(calls))
+        self.pools.append(len(calls))
         return Remade([partial(make, *own, **folders) for own in calls])
 
 

@@ -101,6 +101,14 @@ def test_add_an_object(place: Path) -> None:
             env.close()
 
 
+def test_an_object_for_a_trained_policy_changes_the_trials_alone(place: Path) -> None:
+    write("tutorials/object.md", place)
+    bucket, full = (load_recipe(place / "recipes" / f"{name}.yaml").recipe for name in ("bucket", "full"))
+    assert (bucket.simulation, bucket.task, bucket.teacher) == (full.simulation, full.task, full.teacher)
+    assert bucket.eval.scenes["bucket"].scene.object is not None
+    assert set(bucket.eval.scenes) > set(full.eval.scenes)
+
+
 def test_add_a_robot(place: Path) -> None:
     write("tutorials/robot.md", place)
     subprocess.run([sys.executable, "make_g1_23.py"], cwd=place, check=True)

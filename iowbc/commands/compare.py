@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from iowbc.commands.as_json import print_json
-from iowbc.commands.compared import FILM, film_of, record
 from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
 from iowbc.commands.filming import Filming
+from iowbc.commands.members import FILM, film_of, members_of, points_of, record_comparison
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
-from iowbc.commands.swept import members_of, points_of
 from iowbc.commands.training import require_training
 from iowbc.commands.trainings import trainings_table
 from iowbc.errors import UsageError
@@ -57,7 +56,7 @@ def compare(
     require_training("compare")
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
-    record([run.word for run in found], output)
+    record_comparison([run.word for run in found], output)
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = _having(found, TRIALS)
     missing = [name for name in members if name not in {run.word for run in tried}]

@@ -7,7 +7,7 @@ DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 
 
 @dataclass(frozen=True)
-class Ending:
+class RunEnding:
     """Of one run."""
 
     code: int

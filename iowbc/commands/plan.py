@@ -1,6 +1,7 @@
 """`iowbc plan`: what would run, why, and how long that takes."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -11,6 +12,7 @@ from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned, time_of
 from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import KEY_LENGTH, short
+from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.step import Step
 
@@ -24,7 +26,12 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_j
     """Print what would run, and why; of a recipe of recipes a table of what would run of each."""
     asked = [prepared(one, request, registry)[0] for one in recipes(request)]
     each = [one for planner in asked for one in in_order(planner)]
-    planners = list({(one.loaded.file, one.loaded.overrides): one for one in each}.values())
+    longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
+    for one in each:  # a recipe may be asked for, and be what another one begins from
+        known = longest.setdefault((one.loaded.file, one.loaded.overrides), one)
+        if len(one.stages) > len(known.stages):
+            longest[one.loaded.file, one.loaded.overrides] = one
+    planners = list(longest.values())
     if as_json:
         names = [planner.loaded.recipe.name for planner in planners]
         steps = [[_data(step) for step in planner.plan()] for planner in planners]

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, Ending
+from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.pipeline.console.board import Board, last_line
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.processes import die_with_parent
@@ -29,23 +29,23 @@ PATIENCE = 10.0
 """Seconds that an aborted run has to end by itself."""
 LOG_WIDTH = 160
 """Characters in a line of a table in a log."""
-Endings = dict[str, Ending | None]
+Endings = dict[str, RunEnding | None]
 """How each run has ended, by its name; None for one that never began."""
 
 
 @dataclass(frozen=True)
-class Task:
+class PointRun:
     """A recipe's run among others."""
 
     name: str
     log: Path
     """What it prints."""
-    run: Callable[[Console], Ending]
+    run: Callable[[Console], RunEnding]
     """Runs it and prints to a console."""
 
 
 def run_threads(
-    tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board, abort: Callable[[], None]
+    tasks: Sequence[PointRun], jobs: int, stop: StopRequest, board: Board, abort: Callable[[], None]
 ) -> Endings:
     """Run all as `run_processes` does, in threads of this process: for runs whose stages are carried out elsewhere.
 
@@ -69,7 +69,7 @@ def run_threads(
     return endings
 
 
-def _begin(task: Task, stop: StopRequest, board: Board) -> Ending | None:
+def _begin(task: PointRun, stop: StopRequest, board: Board) -> RunEnding | None:
     """Run a task in this thread, unless a stop was asked for before."""
     if stop():
         return None
@@ -80,17 +80,17 @@ def _begin(task: Task, stop: StopRequest, board: Board) -> Ending | None:
             return task.run(Console(file=log, width=LOG_WIDTH))
         except Exception as error:
             log.write(traceback.format_exc())
-            return Ending(STAGE_FAILED, f"{type(error).__name__}: {error}")
+            return RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
 
 
-def run_processes(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board) -> Endings:
+def run_processes(tasks: Sequence[PointRun], jobs: int, stop: StopRequest, board: Board) -> Endings:
     """Run all, each in a process, at most `jobs` at a time.
 
     One that fails does not stop the others. Once `stop` is asked for, all that run are asked to stop after a
     checkpoint, and none begins. Raises `KeyboardInterrupt` when asked twice, after all have ended.
     """
     endings: Endings = {task.name: None for task in tasks}
-    waiting, running = deque(tasks), dict[Task, PointProcess]()
+    waiting, running = deque(tasks), dict[PointRun, PointProcess]()
     told = False
     try:
         while (waiting and not stop()) or running:
@@ -121,17 +121,17 @@ class PointProcess:
     process: ForkProcess
     said: Connection
 
-    def ending(self, task: Task) -> Ending:
+    def ending(self, task: PointRun) -> RunEnding:
         """How the run has ended, also where its process could not say it."""
         if self.said.poll():
             with contextlib.suppress(EOFError):
-                ending: Ending = self.said.recv()
+                ending: RunEnding = self.said.recv()
                 return ending
         code = self.process.exitcode or STAGE_FAILED
-        return Ending(code, f"killed by {signal.Signals(-code).name}" if code < 0 else last_line(task.log))
+        return RunEnding(code, f"killed by {signal.Signals(-code).name}" if code < 0 else last_line(task.log))
 
 
-def _started(task: Task) -> PointProcess:
+def _started(task: PointRun) -> PointProcess:
     """A run in a process of its own. It is a copy of this one, which has no other threads: it starts at once, knows the
     same stages, and hears a signal from its first moment."""
     context = multiprocessing.get_context("fork")
@@ -142,7 +142,7 @@ def _started(task: Task) -> PointProcess:
     return PointProcess(process, said)
 
 
-def _run(task: Task, parent: int, saying: Connection) -> None:
+def _run(task: PointRun, parent: int, saying: Connection) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the sweep alone, which passes it on once
     die_with_parent(parent)
     task.log.parent.mkdir(parents=True, exist_ok=True)
@@ -155,7 +155,7 @@ def _run(task: Task, parent: int, saying: Connection) -> None:
     sys.exit(ending.code)
 
 
-def _outcome(task: Task, ending: Ending) -> tuple[str, str]:
+def _outcome(task: PointRun, ending: RunEnding) -> tuple[str, str]:
     """The state that is shown of a run which has ended, and what to say about it."""
     if ending.code in (DONE, INTERRUPTED):
         return ("done" if ending.code == DONE else "stopped"), ""

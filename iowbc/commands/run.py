@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 
 from iowbc.commands.compare import compare, film_together
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, Ending
+from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.engine import engine
 from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.results import TABLES, described, print_results, shown_path
@@ -100,7 +100,7 @@ def run_recipe(
     cluster: "Cluster | None" = None,
     errors: Console | None = None,
     workers: int | None = None,
-) -> Ending:
+) -> RunEnding:
     """Run one recipe.
 
     within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
@@ -110,7 +110,7 @@ def run_recipe(
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
-    status, ending, closing, delivered = "KILLED", Ending(INTERRUPTED), "", True
+    status, ending, closing, delivered = "KILLED", RunEnding(INTERRUPTED), "", True
     try:
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
@@ -127,11 +127,11 @@ def run_recipe(
                 workers=workers or planner.workers,
             )
             runner.run()
-            status, ending = "FINISHED", Ending(DONE)
+            status, ending = "FINISHED", RunEnding(DONE)
             if tracker is not None:
                 tracker.describe(described(runner.artifacts))
         except PipelineFailed as error:
-            status, ending = "FAILED", Ending(STAGE_FAILED, str(error).splitlines()[0])
+            status, ending = "FAILED", RunEnding(STAGE_FAILED, str(error).splitlines()[0])
             closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"
         except Interrupted as error:
             closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
@@ -140,7 +140,7 @@ def run_recipe(
                 wait = within is None and bool(_made(runner)) and not stop()
                 delivered = tracker.close(status, wait) or not wait
     except KeyboardInterrupt:
-        ending, closing = Ending(INTERRUPTED), _resumption(request, runner)
+        ending, closing = RunEnding(INTERRUPTED), _resumption(request, runner)
     if ending.code == DONE and runner is not None and manner != "quiet":
         print_results(request.runs, loaded.recipe.name, runner.artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):

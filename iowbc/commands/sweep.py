@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from iowbc.commands.drawn_table import drawn, read_table
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, Ending
+from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.engine import engine
+from iowbc.commands.members import record_sweep
 from iowbc.commands.named import Named, named
-from iowbc.commands.points import Endings, Task, run_processes, run_threads
+from iowbc.commands.points import Endings, PointRun, run_processes, run_threads
 from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.results import shown_path
 from iowbc.commands.run import run_recipe
 from iowbc.commands.sweep_plan import Planned, in_all, planned, print_plan
-from iowbc.commands.swept import record
 from iowbc.commands.training import require_training
 from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.console.board import Board, RunView
@@ -120,7 +120,7 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     require_training("sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
-    record(found, folder)
+    record_sweep(found, folder)
     before = planned([one.planner for one in points])
     if not quiet:
         console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
@@ -150,7 +150,7 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
                 else:
                     endings = run_threads(tasks, jobs, stop, board, cluster.abort)
     except KeyboardInterrupt:
-        endings = dict.fromkeys(before, Ending(INTERRUPTED))
+        endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
     code = _code(endings)
     status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
     try:
@@ -174,10 +174,10 @@ def _shared_out(points: Sequence[ReadyPoint], asked: SweepRequest, cluster: "Clu
 
 def _task(
     one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None, cluster: "Cluster | None", workers: int
-) -> Task:
+) -> PointRun:
     wanted = one.planner.options.workers or one.planner.loaded.recipe.execution.workers
 
-    def run(console: Console) -> Ending:
+    def run(console: Console) -> RunEnding:
         return run_recipe(
             one.planner,
             one.robot,
@@ -190,7 +190,7 @@ def _task(
             workers=wanted or workers,
         )
 
-    return Task(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
+    return PointRun(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
 
 
 def _all_cached(before: Planned) -> bool:

@@ -11,7 +11,7 @@ from rich.console import Console
 from iowbc.commands.ports import HOST, require_free
 from iowbc.commands.training import require_training
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, let_files_move, set_up
+from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, set_up
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
@@ -31,7 +31,6 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     with set_up(runs):
         mlflow = client(uri)
         mlflow.search_experiments(max_results=1)
-        let_files_move(runs)
         shown = experiment(mlflow, Execution.model_fields["experiment"].default, runs)
         mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):

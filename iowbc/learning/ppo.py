@@ -29,7 +29,7 @@ from iowbc.learning.side_by_side import SideBySide
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.pilots import Explorer
+from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
 FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
@@ -122,8 +122,8 @@ class Learner(PPO):  # type: ignore[misc]
         with self._timed("simulation"), torch.inference_mode():
             self.normalization.move(policy.normalizer)
             noise = torch.randn(self.n_steps, self.n_envs, self.action_space.shape[0]) * torch.exp(policy.log_std)
-            pilot = Explorer(acting_policy(policy), noise.numpy(), block_size(self.n_envs))
-            found = env.roll(pilot, self.n_steps)
+            rollout_policy = ExploringPolicy(acting_policy(policy), noise.numpy(), block_size(self.n_envs))
+            found = env.roll(rollout_policy, self.n_steps)
         self.seconds["simulation"] -= found.acting
         self.seconds["inference"] += found.acting
         self.num_timesteps += self.n_steps * self.n_envs

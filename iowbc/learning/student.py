@@ -20,7 +20,7 @@ from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.history import History
-from iowbc.rollouts.pilots import Apprentice, Past
+from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class StudentTraining:
         rows, history = self.rows, self.history
         if self.observation is None:
             self.observation = self.environments.reset()
-        pilot = Apprentice(
+        rollout_policy = DaggerPolicy(
             student=student_policy(self.network),
             teachers=self.teachers,
             teacher_of=self.teacher_of,
@@ -150,7 +150,7 @@ class StudentTraining:
             block=block_size(len(self.starts)),
             past=Past(history.frames, self.starts),
         )
-        found = self.environments.roll(pilot, self.settings.rollout)
+        found = self.environments.roll(rollout_policy, self.settings.rollout)
         facts = (found.observation[:-1][..., rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
         frames, targets = found.observation[:-1, :, rows.observation], found.told["answer"]
         for frame, target, fact, ended in zip(frames, targets, facts, found.ended, strict=True):

@@ -44,7 +44,7 @@ class Member(Protocol):
         """Inverse of `state`."""
 
 
-class Crew(Protocol):
+class ActorPool(Protocol):
     """Members that are asked side by side. Who is lost is remade in the state after the last request."""
 
     @property
@@ -82,9 +82,9 @@ class Spread(Protocol):
         Raises `Interrupted` once the job is asked to stop.
         """
 
-    def crew(
+    def actor_pool(
         self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> Crew:
+    ) -> ActorPool:
         """Members of one core each on any machines, made by a function of a module from each of these arguments and
         `folders`, as above. `called`: what users know a member as."""
 

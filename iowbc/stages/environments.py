@@ -13,7 +13,7 @@ from iowbc.arrays import Array
 from iowbc.pipeline.stage import Job, Spread
 from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.specification import Specification
-from iowbc.task.vector.requests import Request, Roll
+from iowbc.task.vector.messages import Message, Roll
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
 from iowbc.task.vector.vector_env import PATIENCE, VectorEnv
@@ -31,11 +31,11 @@ def training_environments(job: Job, *, count: int, seed: int, divergences: Path 
     actors = job.recipe.execution.rollout_actors
     workers: int | Callable[[Setup], Workers] = job.workers
     if actors is not None and job.spread is not None:
-        workers = partial(Elsewhere, job.spread, min(actors, job.spread.width))
+        workers = partial(RemoteWorkers, job.spread, min(actors, job.spread.width))
     return VectorEnv(world, num_envs=count, workers=workers, seed=seed, divergences=divergences)
 
 
-class Elsewhere(Workers):
+class RemoteWorkers(Workers):
     """Environments in groups on other machines; what is here is a copy of their buffers after the last request."""
 
     def __init__(self, spread: Spread, count: int, setup: Setup) -> None:
@@ -45,24 +45,24 @@ class Elsewhere(Workers):
         self.groups = shares_in_blocks(setup.count, count)
         self.buffers = private_buffers(setup.buffer_fields(), setup.count)
         self._divergences = setup.divergences
-        self._crew = spread.crew(ACTOR, Group, [(setup, *group) for group in self.groups], folders)
+        self._pool = spread.actor_pool(ACTOR, RolloutActor, [(setup, *group) for group in self.groups], folders)
         self._changes = True
 
-    def ask(self, requests: Sequence[Request]) -> None:
+    def ask(self, messages: Sequence[Message]) -> None:
         """See `Workers`."""
-        self._changes = requests[0].changes
-        messages = [
-            ({name: self.buffers[name][first:last] for name in WRITTEN}, request)
-            for (first, last), request in zip(self.groups, requests, strict=True)
+        self._changes = messages[0].changes
+        written = [
+            ({name: self.buffers[name][first:last] for name in WRITTEN}, message)
+            for (first, last), message in zip(self.groups, messages, strict=True)
         ]
-        steps = requests[0].steps if isinstance(requests[0], Roll) else 0
-        self._crew.ask(messages, changes=self._changes, patience=STARTING + steps * PATIENCE)
+        steps = messages[0].steps if isinstance(messages[0], Roll) else 0
+        self._pool.ask(written, changes=self._changes, patience=STARTING + steps * PATIENCE)
 
     def answers(self) -> list[Any]:
         """See `Workers`."""
-        found = self._crew.answers()
+        found = self._pool.answers()
         if self._changes:
-            for group, state in zip(self.groups, self._crew.states, strict=True):
+            for group, state in zip(self.groups, self._pool.states, strict=True):
                 for name, values in self.buffers.rows(*group).arrays.items():
                     values[:] = state[f"buffer/{name}"]
         for _, files in found:
@@ -74,10 +74,10 @@ class Elsewhere(Workers):
 
     def close(self) -> None:
         """See `Workers`."""
-        self._crew.close()
+        self._pool.close()
 
 
-class Group:
+class RolloutActor:
     """A group of environments where it is stepped: a `Member`."""
 
     def __init__(self, setup: Setup, first: int, last: int, *, robot: Path, generator: Path | None = None) -> None:
@@ -87,13 +87,13 @@ class Group:
         here = replace(setup, specification=world, divergences=folder)
         self._batch = here.batch(first, last, private_buffers(here.buffer_fields(), last - first))
 
-    def ask(self, message: tuple[Mapping[str, Array], Request]) -> tuple[Any, dict[str, bytes]]:
+    def ask(self, message: tuple[Mapping[str, Array], Message]) -> tuple[Any, dict[str, bytes]]:
         """The answer of the batch, and the files of simulations that have diverged meanwhile. `message`: rows of the
-        buffers in `WRITTEN`, and the request."""
-        written, request = message
+        buffers in `WRITTEN`, and the message to the batch."""
+        written, own = message
         for name, values in written.items():
             self._batch.buffers[name][:] = values
-        answer = request.carry_out(self._batch)
+        answer = own.carry_out(self._batch)
         files = {path.name: path.read_bytes() for path in sorted(self._kept.glob("*"))}
         if files:
             shutil.rmtree(self._kept)

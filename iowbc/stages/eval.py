@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from iowbc.evaluation.trials.plan import Trial
     from iowbc.evaluation.trials.protocol import Batches
-    from iowbc.learning.acting import Policy
+    from iowbc.evaluation.trials.rollout import Acting
     from iowbc.task.specification import Specification
 
 
@@ -27,9 +27,10 @@ FORCES = ("handle_force_p95", "hand_force_p95")
 """Shown of each behaviour of the partner."""
 
 
-def acting_stage(recipe: Recipe) -> str:
-    """The stage whose artifact holds the policy to evaluate."""
-    return policy_stage(recipe) if recipe.eval.policy == "student" else "teacher"
+def acting_stage(recipe: Recipe) -> tuple[str, ...]:
+    """The stage whose artifact holds the policy to evaluate; none for the quadratic program."""
+    stages = {"student": (policy_stage(recipe),), "teacher": ("teacher",), "model": ()}
+    return stages[recipe.eval.policy]
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -37,6 +38,8 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     if recipe.eval.policy == "student" and not leaves_student(recipe):
         text = "asks for the student, and no stage of the recipe trains one: add `distill` to its stages, or evaluate "
         yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
+    if recipe.eval.policy == "model" and recipe.eval.probe is not None:
+        yield "eval.probe", "reads what a trained policy knows of its load: leave it out, or evaluate the student"
 
 
 def defaults(recipe: Recipe) -> dict[str, object]:
@@ -53,14 +56,14 @@ def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
     import torch
 
+    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.trials.protocol import evaluated_world
-    from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe = job.recipe
-    policy = load_policy(job.inputs[acting_stage(recipe)])
     world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
+    policy = evaluated_policy(world, read_by_trials(job).get("policy"))
     metrics: dict[str, float] = {}
     try:
         if recipe.eval.measured:
@@ -73,7 +76,7 @@ def run(job: Job) -> None:
     job.summarize(metrics)
 
 
-def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import Film, film_trial, filmed
@@ -108,7 +111,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
     return headline(summary)
 
 
-def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
     from iowbc.evaluation.probe.readings import read
     from iowbc.evaluation.probe.regression import inferred_masses
@@ -139,8 +142,8 @@ def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float
 
 def read_by_trials(job: Job) -> dict[str, Path]:
     """Folders from which a batch of trials can be played on another machine; see `play_batch`."""
-    generator = {"generator": job.inputs["rg-fit"]} if "rg-fit" in job.inputs else {}
-    return {"robot": job.robot, "policy": job.inputs[acting_stage(job.recipe)], **generator}
+    read = [("generator", "rg-fit"), *(("policy", stage) for stage in acting_stage(job.recipe))]
+    return {"robot": job.robot} | {name: job.inputs[stage] for name, stage in read if stage in job.inputs}
 
 
 def play_everywhere(
@@ -153,19 +156,25 @@ def play_everywhere(
 
 
 def play_batch(
-    recipe: Recipe, name: str, trials: "Sequence[Trial]", *, robot: Path, policy: Path, generator: Path | None = None
+    recipe: Recipe,
+    name: str,
+    trials: "Sequence[Trial]",
+    *,
+    robot: Path,
+    policy: Path | None = None,
+    generator: Path | None = None,
 ) -> bytes:
     """The file of one batch."""
     import torch
 
+    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-    from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as in the stage
     world = evaluated_world(Specification(recipe, robot, generator))
     with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
-        return Protocol(world, load_policy(policy), work=Path(folder), workers=0).play(name, trials)
+        return Protocol(world, evaluated_policy(world, policy), work=Path(folder), workers=0).play(name, trials)
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
@@ -200,7 +209,7 @@ STAGE = Stage(
     name="eval",
     version=6,
     slice=("rg.height", "simulation", "task", "eval"),
-    reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
+    reads=lambda recipe: (*generator_stage(recipe), *acting_stage(recipe)),
     run=run,
     problems=problems,
     defaults=defaults,

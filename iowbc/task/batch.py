@@ -11,7 +11,7 @@ from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, roll
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import MeasuredState
@@ -155,9 +155,9 @@ class Batch:
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)
 
-    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
-        """Lets a pilot of these environments drive for some control steps."""
-        return roll(self, pilot, steps)
+    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+        """Make a rollout of some control steps."""
+        return roll(self, rollout_policy, steps)
 
     def _finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""

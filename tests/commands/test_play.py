@@ -19,10 +19,15 @@ from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import in_training
 from iowbc.commands.play import _source, named_source
 from iowbc.errors import UsageError
+from iowbc.evaluation.play import requested_episode
+from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.recipe import Recipe
+from iowbc.stages.registry import STAGES
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
@@ -110,3 +115,25 @@ def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     with Filming(Console(file=silent), None) as told:
         told(5.0, 40.0)
     assert silent.getvalue() == ""
+
+
+def test_a_recipe_that_plans_cached_is_played_by_its_own_sequence_and_film_settings(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
+    own = tmp_path / "own.yaml"
+    own.write_text(
+        f"extends: {ROOT / 'recipes' / 'full.yaml'}\n"
+        "name: own\n"
+        "stages: [rg-dataset, rg-fit, teacher, distill, eval]\n"
+        "eval:\n"
+        "  sequence: [{duration: 2.0, ramp: 0.0}, {duration: 3.0, velocity: [0.3, 0.0, 0.0]}]\n"
+        "  video: {width: 96, height: 64}\n"
+    )
+    store, console = Store(Runs(tmp_path / "runs")), Console(file=io.StringIO())
+    source = named_source(store, console, str(own), None, "wide_box", STAGES)
+    assert source.policy.parent.name == "distill"
+    assert requested_episode(source.world.recipe, PlayRequest()).duration == 5.0
+    assert requested_episode(source.world.recipe, PlayRequest(scene="wide_box")).scene == "wide_box"
+    assert source.world.recipe.eval.video.width == 96
+    with pytest.raises(UsageError, match="did you mean 'wide_box'"):
+        named_source(store, console, str(own), None, "wide_bx", STAGES)

@@ -65,6 +65,11 @@ def test_phase_tells_spring_damper_and_mass_apart(stiffness: float, damping: flo
     assert np.angle(value) == pytest.approx(phase * np.pi, abs=1e-3)
 
 
+def test_what_does_not_move_has_no_impedance_that_can_be_measured() -> None:
+    force, _ = pulled(0.5)
+    assert np.isnan(impedance(force, np.zeros_like(force), 0.5, DT))
+
+
 def test_stiffness_damping_and_mass_follow_from_several_frequencies() -> None:
     frequencies = np.array([0.2, 0.5, 1.0, 2.0])
     values = np.array([impedance(*pulled(one), one, DT) for one in frequencies])

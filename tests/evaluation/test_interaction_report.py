@@ -66,7 +66,9 @@ def test_partners_are_told_apart_by_force_work_and_who_follows_whom(partners: pd
     follower = rows["follower (4 kg)", "IO-WBC"]
     assert follower[:2] == ("5/5", "5/5")
     assert (follower[2], follower[4], follower[7]) == ("1 / 2 / 3", "-0.2", "0.050")
-    assert rows["leader (4 kg)", "IO-WBC"] == ("0/5", "0/5", *["Fails"] * 6)
+    assert rows["leader (4 kg)", "IO-WBC"] == ("0/5", "0/5", "1 / 1 / 1", "1 / 1 / 1", "+1.0", *["Fails"] * 3), (
+        "it fell"
+    )
     blocked = rows["blocked crate (65 kg)", "IO-WBC"]
     assert blocked[2:5] == ("–", "60 / 99 / 150", "–")
     assert rows["follower (4 kg)", "stands still"][1] == "none"
@@ -113,9 +115,10 @@ def test_heat_maps_have_the_numbers_of_their_cells(grid: pd.DataFrame) -> None:
 
 def test_the_figure_of_compliance_marks_whom_nobody_survived(partners: pd.DataFrame, pulls: pd.DataFrame) -> None:
     figure = compliance_figure(aggregate(pd.concat([partners, pulls])))
-    handle, hands, _, impedance = figure.axes
+    handle, hands, followed, impedance = figure.axes
     assert [label.get_text().split("\n")[0] for label in handle.get_xticklabels()] == ["follower", "leader"]
-    assert [text.get_text() for text in handle.texts] == ["", "×"]
+    assert [text.get_text() for text in handle.texts] == ["", ""]
+    assert [text.get_text() for text in followed.texts] == ["", "×"]
     assert len(hands.get_xticklabels()) == 3
     assert [len(line.get_xdata()) for line in impedance.lines] == [4, 4]
 

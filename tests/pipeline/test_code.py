@@ -60,7 +60,6 @@ def test_a_stage_outside_of_the_package_records_none(package: Path) -> None:
     ("stage", "module"),
     [
         ("eval", "recipe.evaluation.sequences"),
-        ("teacher", "evaluation.paper"),
         ("teacher", "stages.environments"),
         ("distill", "stages.environments"),
     ],

@@ -45,6 +45,7 @@ COSMETIC = {
     "simulation.physics.divergences_kept",
     "teacher.check.films",
     "teacher.start",
+    "distill.experts",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",
     "eval.label",

@@ -11,10 +11,10 @@ from stage_jobs import Backwards
 from iowbc.stages import scaling
 
 
-def timed(count: int, work: Callable[[], None]) -> scaling.Pace:
+def timed(count: int, work: Callable[[], None]) -> scaling.Throughput:
     """Two seconds, on a machine that is half busy."""
     work()
-    return scaling.Pace(count, 2.0, 1.0)
+    return scaling.Throughput(count, 2.0, 1.0)
 
 
 def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,12 +30,12 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import distill, export, teacher
 from iowbc.stages import eval as evaluate
-from iowbc.stages.environments import WRITTEN, Group
+from iowbc.stages.environments import WRITTEN, RolloutActor
 from iowbc.stages.inputs import leaves_student
 from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
-from iowbc.task.vector.requests import Reset
+from iowbc.task.vector.messages import Reset
 from iowbc.task.vector.setup import Setup
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -69,7 +69,7 @@ def test_rollouts_by_other_machines_that_are_lost_all_the_time_change_nothing(tr
         job = make_job(tmp_path / stage.name, asked, inputs=inputs, workers=0)
         elsewhere = Backwards()
         stage.run(dataclasses.replace(job, spread=elsewhere))
-        assert elsewhere.crews == [2], "two groups, each by a member of its own"
+        assert elsewhere.pools == [2], "two groups, each by a member of its own"
         for name in stage.results:
             assert (job.out / name).read_bytes() == (trained / stage.name / "out" / name).read_bytes(), name
         assert rows(job.work) == rows(trained / stage.name / "work")
@@ -78,7 +78,7 @@ def test_rollouts_by_other_machines_that_are_lost_all_the_time_change_nothing(tr
 def test_a_group_on_another_machine_reads_what_lies_there() -> None:
     there = Path("/nowhere")
     world = Specification(small_recipe(), there / "g1", there / "rg")
-    group = Group(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
+    group = RolloutActor(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
     written = {name: group.state()[f"buffer/{name}"] for name in WRITTEN}
     answer, files = group.ask((written, Reset()))
     assert (answer, files) == (None, {})

@@ -230,3 +230,16 @@ def test_every_number_of_the_recipes_reward_that_is_a_weight_has_its_term() -> N
 
 def test_squared_norm_goes_over_all_but_the_first_axis() -> None:
     assert squared_norm(np.ones((2, 3, 4))).tolist() == [12.0, 12.0]
+
+
+def test_a_group_left_out_counts_nothing_and_the_others_as_before(make: Make) -> None:
+    found = []
+    for without in ((), ("gait",)):
+        env = make(num_envs=2, changes=QUIET | {"task.reward.without": without})
+        env.reset()
+        rollout(env, 10)
+        found.append(env.statistics())
+    before, after = found
+    assert any(before[f"reward/{term}"] for term in TERMS if term.startswith("gait."))
+    for term in TERMS:
+        assert after[f"reward/{term}"] == (0.0 if term.startswith("gait.") else before[f"reward/{term}"]), term

@@ -47,13 +47,6 @@ COSTS = (
     "friction_use",
     "friction_use_high",
     "action_second_difference",
-    "hand_force_mean",
-    "hand_force_p95",
-    "hand_force_peak",
-    "handle_force_mean",
-    "handle_force_p95",
-    "handle_force_peak",
-    "partner_work",
     "push_force",
     "push_force_share",
     "impedance_real",
@@ -61,7 +54,11 @@ COSTS = (
 )
 """Other columns averaged over the surviving trials."""
 WAYS = ("transport_robot", "transport_object")
-"""Columns averaged over all trials."""
+FORCES = (
+    *("hand_force_mean", "hand_force_p95", "hand_force_peak"),
+    *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
+)
+"""Columns averaged over all trials, up to their end: who falls has pulled before."""
 SETTINGS = (
     *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
     *("height", "gait_period"),
@@ -87,9 +84,9 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving trials and
     `<error>_half`, half its 95 % interval; `norm`, the norm of the four means; `torque_rms` of the worst joint by the
     means of all, and its name `torque_rms_joint`. Intervals take `WORLD` as clusters. NaN where no trial survived (or
-    one alone, for the half widths): "Fails" in the tables; and in columns that trials of an earlier version do not have.
+    one alone, for the half widths): "Fails" in the tables; and in columns that trials of an earlier version lack.
     """
-    missing = [name for name in (*COSTS, *SETTINGS) if name not in trials]
+    missing = [name for name in (*COSTS, *FORCES, *SETTINGS) if name not in trials]
     trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
     rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
     table = pd.DataFrame(rows)
@@ -135,7 +132,7 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
     worst = max(by_joint, key=lambda name: by_joint[name], default="")
     row[TORQUE] = by_joint.get(worst, np.nan)
     row[f"{TORQUE}_joint"] = worst.removeprefix(f"{TORQUE}/")
-    for name in (*WAYS, *STILL):
+    for name in (*WAYS, *FORCES, *STILL):
         row[name] = float(group[name].mean())
     return row | {name: group[name].iloc[0] for name in SETTINGS}
 

@@ -36,12 +36,12 @@ def compliance_table(summary: pd.DataFrame) -> Table:
     )
     before = ", ".join(f"{variant} {low} to {high} N" for variant, (low, high) in BLOCKED_BEFORE.items())
     caption = (
-        "Interaction with partners of different behaviour: means over surviving trials. Forces are horizontal: mean / "
-        "95th percentile / peak over a trial, at the partner's handle, and at the hand with more. Work: horizontal, "
-        "done on the partner. E_v against the command, averaged over a gait period and raw; E_v partner: velocity of "
-        f"the handle against the one that the partner intends. {FAILS}: no trial survived. {STANDS_STILL}: what doing "
-        "nothing scores, from the script. Peak force of a hand on a blocked crate, of the first published controllers: "
-        f"{before}. In simulation, undisturbed, {partner(chosen)}."
+        "Interaction with partners of different behaviour. Forces are horizontal: mean / 95th percentile / peak over a "
+        "trial, at the partner's handle, and at the hand with more; work: horizontal, done on the partner; means over "
+        "all trials up to their end. E_v against the command, averaged over a gait period and raw; E_v partner: "
+        "velocity of the handle against the one that the partner intends; means over surviving trials. "
+        f"{FAILS}: none survived. {STANDS_STILL}: what doing nothing scores, from the script. Peak force of a hand on "
+        f"a blocked crate, of the first published controllers: {before}. In simulation, undisturbed, {partner(chosen)}."
         f"{trainings(chosen)}"
     )
     return Table("compliance", caption, head, head, tuple(rows), chosen)
@@ -114,22 +114,25 @@ def compliance_figure(summary: pd.DataFrame) -> Figure:
     _impedance_curves(panels[3], pulls, variants_of(summary))
     letter(panels)
     legend(figure, panels[0] if len(behaviours) else panels[3])
-    figure.suptitle("means over surviving trials; whiskers: peaks; × none survived", fontsize=9)
+    figure.suptitle(
+        "forces: means over all trials, whiskers: peaks; (c), (d): over surviving trials, × none", fontsize=9
+    )
     return figure
 
 
 def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str) -> None:
-    """A bar for each case that has such a figure or that nobody survived; whiskers up to the mean peak of a force."""
+    """A bar for each case with such a figure, or a cross where nobody survived; whiskers up to the peak of a force."""
     names = [
         (suite, case, mass)
         for (suite, case, mass), group in chosen.groupby(["suite", "case", "mass"], sort=False)
-        if (group[column].notna() | (group["survived"] == 0)).any()
+        if group["handle_force_p95" if column == "E_v_partner" else column].notna().any()
     ]
     groups = {}
     for variant in variants_of(chosen):
         rows = chosen[chosen["variant"] == variant].set_index(["suite", "case", "mass"]).reindex(names)
-        failed = rows["survived"].to_numpy(np.float64) == 0
-        heights = np.where(failed, 0.0, rows[column].to_numpy(np.float64))
+        heights = rows[column].to_numpy(np.float64)
+        failed = np.isnan(heights) & (rows["survived"].to_numpy(np.float64) == 0)
+        heights = np.where(failed, 0.0, heights)
         intervals = None
         if column.endswith("_p95"):
             above = rows[column.replace("_p95", "_peak")].to_numpy(np.float64) - heights
@@ -165,18 +168,16 @@ def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> N
 
 
 def _interaction(row: pd.Series) -> list[str]:
-    counts = [_survived(row), f"{row['succeeded']}/{row['trials']}"]
-    if not row["survived"]:
-        return [*counts, *[FAILS] * 6]
     forces = [[float(row[f"{name}_{part}"]) for part in SPREAD] for name in ("handle_force", "hand_force")]
     spreads = [ABSENT if np.isnan(sizes).any() else " / ".join(f"{size:.0f}" for size in sizes) for sizes in forces]
     work = float(row["partner_work"])
     errors = [float(row[name]) for name in ("E_v", "E_v_raw", "E_v_partner")]
     return [
-        *counts,
+        _survived(row),
+        f"{row['succeeded']}/{row['trials']}",
         *spreads,
         ABSENT if np.isnan(work) else f"{work:+.1f}",
-        *(ABSENT if np.isnan(value) else f"{value:.3f}" for value in errors),
+        *(FAILS if not row["survived"] else ABSENT if np.isnan(value) else f"{value:.3f}" for value in errors),
     ]
 
 

@@ -26,7 +26,7 @@ def impedance(force: Array, position: Array, frequency: float, dt: float) -> com
 
     force: along the pull, held over each control period at its value in the middle; position: at the end of the
     period; (T,) [N, m]. The amplitudes are a least-squares fit of sine and cosine beside a drift of second order, which
-    the robot has of its own.
+    the robot has of its own. NaN for what does not move at all.
     """
     time = dt * np.arange(len(force))
     angle = 2.0 * np.pi * frequency * time
@@ -34,7 +34,7 @@ def impedance(force: Array, position: Array, frequency: float, dt: float) -> com
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(time), scaled, np.square(scaled)], axis=1)
     fitted = np.linalg.lstsq(basis, np.stack([force, position], axis=1), rcond=None)[0]
     pulled, moved = (fitted[0] - 1j * fitted[1]) * np.array([1.0, np.exp(-1j * np.pi * frequency * dt)])
-    return complex(pulled / (2j * np.pi * frequency * moved))
+    return complex(pulled / (2j * np.pi * frequency * moved)) if moved else complex(np.nan, np.nan)
 
 
 def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float]:

@@ -32,9 +32,9 @@ from iowbc.task.vector.setup import shares
 
 def evaluated_world(specification: Specification) -> Specification:
     """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's.
-    A student's has no part of s_priv that is in a user's file."""
+    Where the policy does not see s_priv, that has no part that is in a user's file."""
     recipe = specification.recipe
-    world = specification.deployed if recipe.eval.policy == "student" else specification
+    world = specification if recipe.eval.policy == "teacher" else specification.deployed
     if recipe.eval.simulation is not None:
         world = replace(world, recipe=world.recipe.model_copy(update={"simulation": recipe.eval.simulation}))
     return replace(world, recipe=_with_trial_scenes(world.recipe)) if recipe.eval.scenes else world
@@ -45,7 +45,9 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
     further, simulation, task = recipe.eval.scenes, recipe.simulation, recipe.task
     references = task.references
     grasps = {**dict(references.grasps), **{name: own.wrists for name, own in further.items()}}
-    loads = {**dict(references.loads), **{name: own.load for name, own in further.items()}}
+    usual = references.loads.lift
+    expected = {name: usual if own.load is None else own.load for name, own in further.items()}
+    loads = {**dict(references.loads), **expected}
     own = {"grasps": Grasps.model_validate(grasps), "loads": Loads.model_validate(loads)}
     scenes = {"scenes": with_scenes(simulation.scenes, further)}
     return recipe.model_copy(

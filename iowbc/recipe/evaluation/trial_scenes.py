@@ -13,8 +13,8 @@ class TrialScene(Section):
     """The object and how it is held; it may also replace a scene of the training."""
     wrists: tuple[float, float, float]
     """Base grasp: left wrist from the pelvis, heading frame [m]; as an entry of `task.references.grasps`."""
-    load: float = Field(default=0.0, ge=0.0)
-    """What the arms expect to carry [kg]; as an entry of `task.references.loads`."""
+    load: float | None = Field(default=0.0, ge=0.0)
+    """What the arms expect to carry [kg], as an entry of `task.references.loads`; empty takes that of `lift`."""
 
 
 BESIDE = 0.035
@@ -24,7 +24,7 @@ BESIDE = 0.035
 def box(width: float) -> TrialScene:
     """The box of the scene `lift` in another width [m], held as there."""
     thing = Object(shape="box", size=(0.30, width, 0.30), mass=7.0)
-    return TrialScene(scene=Scene(kind="lift", object=thing), wrists=(0.30, width / 2 + BESIDE, 0.26), load=3.5)
+    return TrialScene(scene=Scene(kind="lift", object=thing), wrists=(0.30, width / 2 + BESIDE, 0.26), load=None)
 
 
 SIZES = {"narrow_box": box(0.2), "wide_box": box(0.45)}

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, side_by_side
 from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
@@ -25,7 +25,17 @@ from iowbc.task.record.statistics import Statistics
 from iowbc.task.rewards.own import load_terms
 from iowbc.task.rewards.reward import term_names
 from iowbc.task.specification import Specification
-from iowbc.task.vector.requests import Drawn, Levels, Request, Reset, Restore, Roll, SetLevels, Snapshot, Step
+from iowbc.task.vector.messages import (
+    GetDrawn,
+    GetLevels,
+    GetSnapshot,
+    MakeStep,
+    Message,
+    Reset,
+    Restore,
+    Roll,
+    SetLevels,
+)
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.snapshots import join, split
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
@@ -110,7 +120,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             rows = np.flatnonzero(~np.isfinite(given).all(axis=1))
             raise ValueError(f"actions of environments {rows.tolist()} are not finite, the first is {given[rows[0]]}")
         self._buffers["action"][:] = given
-        self.workers.ask([Step() for _ in self.workers.groups])
+        self.workers.ask([MakeStep() for _ in self.workers.groups])
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Results of the step: observations, rewards, dones, infos; ended environments have begun anew."""
@@ -122,10 +132,10 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             infos[index] = self._ending(index)
         return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
 
-    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
-        """Lets a pilot drive for some control steps, each group of environments where it is: one message to each worker
+    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+        """Make a rollout of some control steps, each group of environments where it is: one message to each worker
         and one back. What comes of it does not depend on the workers."""
-        return side_by_side(self._call([Roll(pilot.part(*group), steps) for group in self.workers.groups]))
+        return side_by_side(self._call([Roll(rollout_policy.part(*group), steps) for group in self.workers.groups]))
 
     def _ending(self, index: int) -> dict[str, Any]:
         """What stable-baselines3 wants to know of an episode's end, and why it ended."""
@@ -148,7 +158,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (num_envs,) or (num_envs, k)."""
-        return join(self._call_all(Drawn()))
+        return join(self._call_all(GetDrawn()))
 
     def curriculum(self) -> dict[str, Any]:
         """How far the curriculum is, for JSON: the levels of each axis in each scene, ascending."""
@@ -174,7 +184,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def state(self) -> dict[str, Array]:
         """Everything that the future depends on; the same however many workers there are."""
-        return join(self._call_all(Snapshot())) | {"statistics": self._statistics.carried.copy()}
+        return join(self._call_all(GetSnapshot())) | {"statistics": self._statistics.carried.copy()}
 
     def restore(self, state: Mapping[str, Array]) -> None:
         """Inverse of `state`: the environments then take bit for bit the same course."""
@@ -232,13 +242,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return [False for _ in self._get_indices(indices)]
 
     def _levels(self) -> Array:
-        return np.concatenate(self._call_all(Levels()))
+        return np.concatenate(self._call_all(GetLevels()))
 
-    def _call_all(self, request: Request) -> list[Any]:
-        return self._call([request for _ in self.workers.groups])
+    def _call_all(self, message: Message) -> list[Any]:
+        return self._call([message for _ in self.workers.groups])
 
-    def _call(self, requests: Sequence[Request]) -> list[Any]:
-        self.workers.ask(requests)
+    def _call(self, messages: Sequence[Message]) -> list[Any]:
+        self.workers.ask(messages)
         return self.workers.answers()
 
 

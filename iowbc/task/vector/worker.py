@@ -15,7 +15,7 @@ from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
 
 if TYPE_CHECKING:
-    from iowbc.task.vector.requests import Request
+    from iowbc.task.vector.messages import Message
 
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
 """With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def _serve(connection: Connection, memory: int) -> None:
-    """Answers requests."""
+    """Answers messages."""
     try:
         from iowbc.task.vector.setup import Setup
         from iowbc.task.vector.shared import attach_shared
@@ -54,8 +54,8 @@ def _serve(connection: Connection, memory: int) -> None:
         gc.freeze()  # what lives as long as the process need not be looked through at every collection
         connection.send((True, None))
         while True:
-            request: Request = connection.recv()
-            connection.send_bytes(pickle.dumps((True, request.carry_out(batch))))
+            message: Message = connection.recv()
+            connection.send_bytes(pickle.dumps((True, message.carry_out(batch))))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
     except IowbcError as error:

@@ -22,7 +22,7 @@ from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.batch import Batch
 from iowbc.task.record.signals import COUNTERS
 from iowbc.task.vector import worker
-from iowbc.task.vector.requests import Request
+from iowbc.task.vector.messages import Message
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import Buffers, create_shared, private_buffers
 
@@ -46,8 +46,8 @@ class Workers(Protocol):
     buffers: Buffers
     """What all environments read and write."""
 
-    def ask(self, requests: Sequence[Request]) -> None:
-        """Sends each group its request, in their order."""
+    def ask(self, messages: Sequence[Message]) -> None:
+        """Sends each group its message, in their order."""
 
     def answers(self) -> list[Any]:
         """What the groups answered, in their order."""
@@ -65,10 +65,10 @@ class InProcess:
         self.batch: Batch = setup.batch(0, setup.count, self.buffers)
         self._answer: Any = None
 
-    def ask(self, requests: Sequence[Request]) -> None:
+    def ask(self, messages: Sequence[Message]) -> None:
         """See `Workers`."""
-        (request,) = requests
-        self._answer = request.carry_out(self.batch)
+        (message,) = messages
+        self._answer = message.carry_out(self.batch)
 
     def answers(self) -> list[Any]:
         """See `Workers`."""
@@ -124,13 +124,13 @@ class WorkerProcesses:
         """Process numbers of the workers."""
         return [process.popen.pid for process in self._processes]
 
-    def ask(self, requests: Sequence[Request]) -> None:
+    def ask(self, messages: Sequence[Message]) -> None:
         """See `Workers`. Answers that an interruption left lying are thrown away first."""
         if not self._ended.alive:
             raise WorkerFailed("the worker processes have ended; make a new vector environment")
         self._wait(self._patience)
-        messages = [pickle.dumps(request) for request in requests]
-        for index, (process, message) in enumerate(zip(self._processes, messages, strict=True)):
+        pickled = [pickle.dumps(message) for message in messages]
+        for index, (process, message) in enumerate(zip(self._processes, pickled, strict=True)):
             try:
                 process.connection.send_bytes(message)
             except (BrokenPipeError, ConnectionResetError):

@@ -1,5 +1,4 @@
-"""What can be asked of a group of environments, wherever it is stepped: each request is a message that carries out
-itself."""
+"""Messages to a group of environments, wherever it is stepped; each carries itself out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories
 from iowbc.task.batch import Batch
 
 
-class Request(Protocol):
+class Message(Protocol):
     """A message to one group of environments."""
 
     changes: ClassVar[bool]
@@ -32,32 +31,32 @@ class Reset:
     changes: ClassVar[bool] = True
 
     def carry_out(self, batch: Batch) -> None:
-        """See `Request`."""
+        """See `Message`."""
         batch.reset(self.seeds)
 
 
 @dataclass(frozen=True)
-class Step:
+class MakeStep:
     """Make a control step with the actions in the buffers."""
 
     changes: ClassVar[bool] = True
 
     def carry_out(self, batch: Batch) -> None:
-        """See `Request`."""
+        """See `Message`."""
         batch.step()
 
 
 @dataclass(frozen=True)
 class Roll:
-    """Let a pilot drive for some control steps."""
+    """Make a rollout of some control steps."""
 
-    pilot: Pilot
+    rollout_policy: RolloutPolicy
     steps: int
     changes: ClassVar[bool] = True
 
     def carry_out(self, batch: Batch) -> Trajectories:
-        """See `Request`."""
-        return batch.roll(self.pilot, self.steps)
+        """See `Message`."""
+        return batch.roll(self.rollout_policy, self.steps)
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class Restore:
     changes: ClassVar[bool] = True
 
     def carry_out(self, batch: Batch) -> None:
-        """See `Request`."""
+        """See `Message`."""
         batch.restore(self.saved)
 
 
@@ -80,38 +79,38 @@ class SetLevels:
     changes: ClassVar[bool] = True
 
     def carry_out(self, batch: Batch) -> None:
-        """See `Request`."""
+        """See `Message`."""
         batch.set_levels(self.levels)
 
 
 @dataclass(frozen=True)
-class Levels:
+class GetLevels:
     """The curriculum's levels, (n, axes)."""
 
     changes: ClassVar[bool] = False
 
     def carry_out(self, batch: Batch) -> Array:
-        """See `Request`."""
+        """See `Message`."""
         return batch.levels()
 
 
 @dataclass(frozen=True)
-class Drawn:
+class GetDrawn:
     """What was drawn for the current episodes, by name."""
 
     changes: ClassVar[bool] = False
 
     def carry_out(self, batch: Batch) -> dict[str, Array]:
-        """See `Request`."""
+        """See `Message`."""
         return batch.drawn()
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class GetSnapshot:
     """Everything that the future depends on."""
 
     changes: ClassVar[bool] = False
 
     def carry_out(self, batch: Batch) -> dict[str, Array]:
-        """See `Request`."""
+        """See `Message`."""
         return batch.snapshot()

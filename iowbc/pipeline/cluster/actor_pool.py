@@ -17,13 +17,13 @@ TRIES = 5
 POLL = 0.2
 """Seconds between two looks at the members."""
 CORE_PATIENCE = 30.0
-"""Seconds after which a member that waits for a core shares one: those that are there may be held by crews that wait
+"""Seconds after which a member that waits for a core shares one: those that are there may be held by pools that wait
 for this one's, or may have gone for good."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """How the members of a crew are made."""
+    """How the members of an actor pool are made."""
 
     driver: Identity
     make: Callable[..., Member]
@@ -31,7 +31,7 @@ class Origin:
     copy: bool
 
 
-class Holder:
+class ActorHost:
     """What Ray holds on a node: one member, made from these arguments."""
 
     def __init__(self, origin: Origin, arguments: tuple[Any, ...]) -> None:
@@ -100,8 +100,8 @@ class Place:
     """Ray's references to what it has not answered yet."""
 
 
-class NodeCrew:
-    """Members on the nodes of the cluster. See `Crew`."""
+class NodeActorPool:
+    """Members on the nodes of the cluster. See `ActorPool`."""
 
     def __init__(
         self,
@@ -119,24 +119,24 @@ class NodeCrew:
         self._origin, self._interrupted, self._say = origin, interrupted, say
         self._request: tuple[Sequence[Any], bool] = ((), False)
         self._patience = 0.0
-        self._holder = ray.remote(Holder)
+        self._holder = ray.remote(ActorHost)
         self._places = [Place(arguments) for arguments in calls]
         for place in self._places:
             self._send(place)
 
     @property
     def states(self) -> list[Any]:
-        """See `Crew`."""
+        """See `ActorPool`."""
         return [place.state for place in self._places]
 
     def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
-        """See `Crew`."""
+        """See `ActorPool`."""
         self._request, self._patience = (messages, changes), patience
         for index in range(len(self._places)):
             self._begin(index)
 
     def answers(self) -> list[Any]:
-        """See `Crew`."""
+        """See `ActorPool`."""
         import ray
 
         while waiting := {one: place for place in self._places for one in place.waiting}:
@@ -151,7 +151,7 @@ class NodeCrew:
         return [place.answer for place in self._places]
 
     def close(self) -> None:
-        """See `Crew`."""
+        """See `ActorPool`."""
         import ray
 
         for place in self._places:

@@ -1,4 +1,4 @@
-"""Who drives environments through a rollout. A pilot is a message: it is sent to where the environments are."""
+"""Policies that make rollouts, with noise or teachers beside them. They are sent to where the environments are."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,14 +16,14 @@ Decision = tuple[Array, Mapping[str, Array]]
 """The action, (n, A), and what is recorded beside it, (n, ...) by name."""
 
 
-class Pilot(Protocol):
+class RolloutPolicy(Protocol):
     """Drives n environments through one rollout."""
 
     @property
     def starts(self) -> Mask:
         """Environments whose episode begins with the first row, (n,)."""
 
-    def part(self, first: int, last: int) -> "Pilot":
+    def part(self, first: int, last: int) -> "RolloutPolicy":
         """Of the environments from `first` to `last`, the latter excluded; `first` begins a block."""
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
@@ -51,7 +51,7 @@ class Past:
 
 
 @dataclass(frozen=True)
-class Explorer:
+class ExploringPolicy:
     """A policy with exploration noise. With a past it sees the history of the first part of the rows."""
 
     policy: RowPolicy | HistoryPolicy
@@ -63,11 +63,11 @@ class Explorer:
 
     @property
     def starts(self) -> Mask:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         return np.zeros(self.noise.shape[1], np.bool_) if self.past is None else self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         past = None if self.past is None else self.past.of(first, last)
         return replace(self, noise=self.noise[:, first:last], past=past)
 
@@ -76,7 +76,7 @@ class Explorer:
         return None if self.past is None else self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         seen = rows
         if self._history is not None:
             seen = self._history.push(rows[:, : self._history.frames.shape[2]], starts)
@@ -84,7 +84,7 @@ class Explorer:
 
 
 @dataclass(frozen=True)
-class Apprentice:
+class DaggerPolicy:
     """A student, and teachers that say what they would have done and drive some of the environments."""
 
     student: HistoryPolicy
@@ -105,11 +105,11 @@ class Apprentice:
 
     @property
     def starts(self) -> Mask:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         return self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         own = slice(first, last)
         return replace(self, teacher_of=self.teacher_of[own], taught=self.taught[own], past=self.past.of(first, last))
 
@@ -118,7 +118,7 @@ class Apprentice:
         return self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `Pilot`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
+        """See `RolloutPolicy`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
         del step
         answer = self._answer(0, rows)
         for place in range(1, len(self.teachers)):
