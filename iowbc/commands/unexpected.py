@@ -1,4 +1,4 @@
-"""What is said when a command meets what nobody foresaw: one sentence, where the details are, and what to type next."""
+"""The message of an unexpected error: one sentence, where the details are, and the next command."""
 
 import os
 import shlex
@@ -10,7 +10,7 @@ from pathlib import Path
 from iowbc.full_disk import nothing_fits, what_is_full
 
 
-def told(error: Exception, arguments: Sequence[str]) -> str:
+def described(error: Exception, arguments: Sequence[str]) -> str:
     """The sentence. Needs no disk: where the details cannot be written they follow it."""
     again = f"to go on: {shlex.join(['iowbc', *arguments])}"
     if nothing_fits(error):
@@ -24,4 +24,4 @@ def told(error: Exception, arguments: Sequence[str]) -> str:
         where = f"the details are in {file.name}"
     except OSError:
         where = f"the details could not be written:\n{details.rstrip()}"
-    return f"iowbc met something that nobody foresaw: {summary}; {where}\n{again}"
+    return f"unexpected error: {summary}; {where}\n{again}"

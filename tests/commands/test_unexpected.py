@@ -1,4 +1,4 @@
-"""What nobody foresaw ends with one sentence, the place of the details, and the command that goes on."""
+"""An unexpected error ends with one sentence, the place of the details, and the command that goes on."""
 
 import errno
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.unforeseen import told
+from iowbc.commands.unexpected import described
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -44,7 +44,7 @@ def test_an_unforeseen_error_is_told_in_one_sentence_with_its_details_kept(tmp_p
 
 
 def test_a_full_disk_is_named_with_the_command_that_goes_on() -> None:
-    text = told(OSError(errno.ENOSPC, "No space left on device", "runs/store/x"), ["run", "a b.yaml"])
+    text = described(OSError(errno.ENOSPC, "No space left on device", "runs/store/x"), ["run", "a b.yaml"])
     assert text.startswith("no space is left: runs/store/x cannot be written: No space left on device; make some")
     assert text.endswith("\nto go on: iowbc run 'a b.yaml'")
 
@@ -54,7 +54,7 @@ def test_details_that_cannot_be_written_are_told(monkeypatch: pytest.MonkeyPatch
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("tempfile.NamedTemporaryFile", full)
-    assert "ValueError: odd\n" in told(ValueError("odd"), ["ls"])
+    assert "ValueError: odd\n" in described(ValueError("odd"), ["ls"])
 
 
 @pytest.mark.parametrize(
