@@ -21,6 +21,7 @@ MAY_IMPORT = {
     "full_disk": set(),
     "processes": set(),
     "counter_random": {"recipe", "errors", "arrays"},
+    "results": set(),
     "recipe": {"errors", "files"},
     "robot": GROUND - {"counter_random"},
     "control": DESCRIPTIONS,
@@ -32,17 +33,17 @@ MAY_IMPORT = {
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts"},
     "task": WORLD | {"rollouts"},
-    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based"},
+    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "results"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
-    "report": {"learning", "pipeline", "recipe", "stages", "errors"},
+    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD
     | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
-    | {"live", "web", "stages"},
+    | {"live", "web", "stages", "results"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""

@@ -1,5 +1,6 @@
 """`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
 
+import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from iowbc.commands.as_json import print_json
-from iowbc.commands.drawn_table import drawn, read_table
-from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
+from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor, tables_of
 from iowbc.commands.filming import Filming
 from iowbc.commands.members import FILM, film_of, members_of, points_of, record_comparison
 from iowbc.commands.named import Named, named
@@ -22,6 +22,7 @@ from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
+from iowbc.results.table import Table, drawn, markdown, read_tables, write_table
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ def compare(
     a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
     `UsageError`.
     """
+    from iowbc.report.runs import metrics_table
+
     found = [named(store, word) for word in points_of(store, words)]
     members = [name for word in words for name in members_of(word)]
     if len(found) < 2 and not members:
@@ -57,7 +60,8 @@ def compare(
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
     record_comparison([run.word for run in found], output)
-    (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
+    metrics = metrics_table(_groups(found))
+    (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
     tried = _having(found, TRIALS)
     missing = [name for name in members if name not in {run.word for run in tried}]
     _report_probes(_having(found, PROBE), output)
@@ -72,9 +76,8 @@ def compare(
     if as_json:
         print_json(console, _data(found, output))
         return
-    for path in (output / "metrics.md", *sorted((output / "tables").glob("*.md"))):
-        cells = read_table(path.read_text(encoding="utf-8"))
-        console.print(drawn(cells, console.width) if cells.rows else "no metric differs")
+    for table in (metrics, *read_tables(output / "tables")):
+        console.print(drawn(table, console.width) if table.rows else "no metric differs")
         console.print()
     _print_curves(curves, console)
     if missing:
@@ -90,20 +93,6 @@ def _written(output: Path) -> list[str]:
     files = [shown_path(path) for path in sorted(output.glob("*.*"))]
     counts = {path: f"{count} file{'s' if count != 1 else ''}" for path, count in folders.items()}
     return [*files, *(f"{shown_path(path)}/ ({count})" for path, count in counts.items())]
-
-
-def metrics_table(found: Sequence[Named]) -> str:
-    """The metrics that differ as a Markdown table: a column for each recipe, seeds together, and Δ to the first."""
-    from iowbc.report.runs import metric_rows
-
-    groups = _groups(found)
-    heads = [groups[0].label, *(name for group in groups[1:] for name in (group.label, f"Δ {group.label}"))]
-    rows = ["| stage | metric | " + " | ".join(heads) + " |", "|---|---|" + "---:|" * len(heads)]
-    for row in metric_rows(groups):
-        if row.differs:
-            cells = [row.cells[0], *(text for pair in zip(row.cells[1:], row.deltas, strict=True) for text in pair)]
-            rows.append(f"| {row.stage} | {row.name} | " + " | ".join(cells) + " |")
-    return "\n".join(rows) + "\n"
 
 
 def _data(found: Sequence[Named], output: Path) -> dict[str, Any]:
@@ -124,12 +113,11 @@ def _groups(found: Sequence[Named]) -> "list[Group]":
 
 def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[Panel]]":
     """The main learning curves of all recipes by stage; also drawn under `output`, a picture a stage."""
-    from iowbc.report.curves import learning_panels
-    from iowbc.report.learning_figure import POINTS, learning_figure
-    from iowbc.report.picture_file import write_figure
+    from iowbc.report.curves import PICTURE_POINTS, learning_figure, learning_panels
+    from iowbc.results.picture import write_figure
 
     groups = _groups(found)
-    curves = {stage: panels for stage in STAGES if (panels := learning_panels(groups, stage, POINTS)[0])}
+    curves = {stage: panels for stage in STAGES if (panels := learning_panels(groups, stage, PICTURE_POINTS)[0])}
     for stage, panels in curves.items():
         write_figure(learning_figure(panels, stage), output / "figures" / f"learning_{stage}.png")
     return curves
@@ -140,10 +128,9 @@ def _print_curves(curves: "Mapping[str, Sequence[Panel]]", console: Console) -> 
     for stage, panels in curves.items():
         for panel in panels:
             console.print(f"{stage}: {panel.title}", markup=False, highlight=False)
-            for trace in panel.traces:
-                values = [value for value in trace["y"] if value is not None]
-                if trace.get("showlegend", True) and values:
-                    text = f"  {sparkline(values, CURVE_WIDTH)} {values[-1]:.4g}  {trace['name']}"
+            for curve in panel.curves:
+                if values := [value for value in curve.mean.tolist() if math.isfinite(value)]:
+                    text = f"  {sparkline(values, CURVE_WIDTH)} {values[-1]:.4g}  {curve.label}"
                     console.print(text, markup=False, highlight=False, no_wrap=True, overflow="ellipsis")
 
 
@@ -151,29 +138,24 @@ def _print_curves(curves: "Mapping[str, Sequence[Panel]]", console: Console) -> 
 class Joined:
     """What an evaluation, or several together, show."""
 
-    tables: dict[str, str]
-    """In Markdown, by name."""
+    tables: list[Table]
     media: dict[str, bytes]
     """Pictures of several together, and a film of them side by side where there is one, by file name."""
 
 
 def joined(store: Store, found: Sequence[Named]) -> Joined:
     """The result tables of one run; of several those over all their trials, with their pictures and film."""
-    evaluated = [run for run in found if "eval" in run.artifacts]
+    evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
+    if len(evaluated) < 2:
+        return Joined([table for one in evaluated for table in tables_of(one)], {})
     with tempfile.TemporaryDirectory() as folder:
-        output, tried = Path(folder), _having(evaluated, TRIALS)
-        if len(evaluated) == 1:
-            output = evaluated[0].artifacts["eval"].folder
-        else:
-            _report_probes(_having(evaluated, PROBE), output)
-            if len(tried) > 1:
-                report_together(tried, output)
-        tables = {path.stem: path.read_text(encoding="utf-8") for path in sorted((output / "tables").glob("*.md"))}
-        if len(evaluated) < 2:
-            return Joined(tables, {})
+        output, tried = Path(folder), _having(found, TRIALS)
+        _report_probes(_having(found, PROBE), output)
+        if len(tried) > 1:
+            report_together(tried, output)
         film = film_of(store.runs, [run.word for run in found])
         media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
-        return Joined(tables, {path.name: path.read_bytes() for path in media})
+        return Joined(read_tables(output / "tables"), {path.name: path.read_bytes() for path in media})
 
 
 def film_together(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
@@ -247,7 +229,6 @@ def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] 
     import pandas as pd
 
     from iowbc.evaluation.report.report import write_report
-    from iowbc.evaluation.report.tables import write_table
 
     trials, labels = _told_apart(runs, TRIALS)
     rates = {run.artifacts["eval"].recipe["eval"]["success"]["capacity_rate"] for run in runs}

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.named import Named, named
-from iowbc.commands.tables import NARROWEST, folded, hanging
+from iowbc.commands.tables import hanging
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
@@ -24,6 +24,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
+from iowbc.results.table import NARROWEST, folded
 
 ABSENT = "(absent)"
 """In place of a value that one of the two has not."""

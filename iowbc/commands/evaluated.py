@@ -1,4 +1,4 @@
-"""What an evaluation played: its world, its policy, its trials, to be played again."""
+"""What an evaluation left: its tables, and its world, policy and trials, to be played again."""
 
 from typing import TYPE_CHECKING
 
@@ -6,6 +6,7 @@ from iowbc.commands.origins import input_of, policy_of, world_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
+from iowbc.results.table import Table, read_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -13,6 +14,21 @@ if TYPE_CHECKING:
     from iowbc.evaluation.side_by_side import Actor
 
 TRIALS, PROBE = "trials.parquet", "probe.parquet"
+
+
+def tables_of(artifact: Artifact) -> list[Table]:
+    """The tables that an artifact holds; an evaluation that has them as text alone is read again."""
+    found, file = read_tables(artifact.folder / "tables"), artifact.folder / TRIALS
+    if found or not file.is_file():
+        return found
+    import pandas as pd
+
+    from iowbc.evaluation.report.aggregate import aggregate
+    from iowbc.evaluation.report.report import report_tables
+
+    trials = pd.read_parquet(file)
+    rate = float(artifact.recipe["eval"]["success"]["capacity_rate"])
+    return sorted(report_tables(trials, aggregate(trials), rate), key=lambda table: table.name)
 
 
 def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":

@@ -2,14 +2,14 @@
 
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.commands.evaluated import tables_of
 from iowbc.commands.named import last_used
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
@@ -17,6 +17,7 @@ from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.results.table import Table, drawn
 from iowbc.stages.registry import STAGES
 
 METRICS_SHOWN = 3
@@ -48,8 +49,8 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
         chosen = ", ".join(f"{name} {figure(value)}" for name, value in headline(stage, artifact.metrics))
         if chosen:
             console.print(Text(f"{stage:<10}  {chosen}"), no_wrap=True, overflow="ellipsis")
-    for folder in folders.values():
-        _print_tables(folder / "tables", console)
+    for stage, artifact in artifacts.items():
+        _print_tables(artifact, folders[stage] / "tables", console)
     for folder in folders.values():
         pictures = len(list((folder / "figures").glob("*")))
         if pictures:
@@ -97,22 +98,21 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
     return [shlex.join([*words, *elsewhere]) for words in (*seen, read)]
 
 
-def _print_tables(folder: Path, console: Console) -> None:
-    """Draw the main ones of a folder's tables, and say where the others are."""
-    others = []
-    for path in sorted(folder.glob("*.md"), key=_rank):
-        if path.stem in DRAWN:
-            console.print()
-            console.print(drawn(read_table(path.read_text(encoding="utf-8", errors="replace")), console.width))
-        else:
-            others.append(path.name)
+def _print_tables(artifact: Artifact, folder: Path, console: Console) -> None:
+    """Draw the main ones of an artifact's tables, and say where the others are."""
+    shown = {table.name: table for table in tables_of(artifact) if table.name in DRAWN}
+    for name in sorted(shown, key=DRAWN.index):
+        console.print()
+        console.print(drawn(shown[name], console.width))
+    others = [path.name for path in sorted(folder.glob("*.md"), key=_rank) if path.stem not in shown]
     if others:
         _line(console, f"more tables  {shown_path(folder)}: {', '.join(others)}")
 
 
-def split_tables(tables: Mapping[str, str]) -> tuple[list[str], list[str]]:
-    """Tables by name, as the main ones in their order and the others."""
-    return [tables[name] for name in TABLES if name in tables], [tables[name] for name in tables if name not in TABLES]
+def split_tables(tables: Sequence[Table]) -> tuple[list[Table], list[Table]]:
+    """The main tables in their order, and the others."""
+    main = [table for table in tables if table.name in TABLES]
+    return sorted(main, key=lambda table: TABLES.index(table.name)), [one for one in tables if one not in main]
 
 
 def _rank(path: Path) -> tuple[int, str]:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.engine import engine
 from iowbc.commands.members import record_sweep
@@ -30,6 +29,7 @@ from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
 from iowbc.recipe.sweep import MOST_POINTS
+from iowbc.results.table import drawn, markdown
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
@@ -214,7 +214,7 @@ def _conclude(
     quiet: bool,
 ) -> None:
     """Write and print what the finished points came to."""
-    from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, write_results
+    from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
 
     store = Store(runs)
     codes = {name: None if ending is None else ending.code for name, ending in endings.items()}
@@ -222,15 +222,15 @@ def _conclude(
     if not finished:
         return
     states = {name: STATES.get(code, "failed") for name, code in codes.items()}
-    paths = write_results(found, finished, states, folder)
-    text = (folder / TABLE).read_text(encoding="utf-8")
+    made = outcomes(found, finished)
+    results = table(found, made)
+    paths = write_results(found, made, finished, states, folder)
     if family is not None:
-        lines = outcomes(found, finished).lines
-        figures = {f"{line.label}/{name}": value for line in lines for name, value in line.means.items()}
-        family.describe(text, figures, [folder / FIGURE, folder / TABLE])
+        figures = {f"{line.label}/{name}": value for line in made.lines for name, value in line.means.items()}
+        family.describe(markdown(results), figures, [folder / FIGURE, folder / TABLE])
     if quiet:
         return
-    console.print(drawn(read_table(text), console.width))
+    console.print(drawn(results, console.width))
     for path in paths:
         console.print(shown_path(path), markup=False, highlight=False, soft_wrap=True)
     if len(finished) > 1:

@@ -15,7 +15,8 @@ from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.recipe.reading.sweep import Point, Sweep, written
 from iowbc.recipe.recipe import PIPELINE, SEEDS
 from iowbc.report.parallel import Line, parallel_coordinates
-from iowbc.report.picture_file import write_figure
+from iowbc.results.picture import write_figure
+from iowbc.results.table import Cell, Table, heads, markdown, measured
 
 OUTCOMES_SHOWN = 6
 """Metrics in the table and in the figure at most: those of the last stages."""
@@ -100,42 +101,36 @@ def _chosen(runs: Sequence[Named]) -> tuple[str, ...]:
     return tuple(sorted(chosen, key=known.index, reverse=True))
 
 
-def write_results(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], folder: Path) -> list[Path]:
+def write_results(
+    sweep: Sweep, made: Outcomes, found: Mapping[str, Named], states: Mapping[str, str], folder: Path
+) -> list[Path]:
     """Write table, figure and points; returns their paths."""
-    made = outcomes(sweep, found)
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / name for name in (TABLE, FIGURE, POINTS)]
-    paths[0].write_text(table(sweep, made), encoding="utf-8")
+    paths[0].write_text(markdown(table(sweep, made)), encoding="utf-8")
     title = f"{sweep.name}: means over seeds (thick), 95 % intervals (bars), single runs (thin)"
     write_figure(parallel_coordinates(made.settings, made.metrics, made.lines, title), paths[1])
     _write_points(sweep, found, states, paths[2])
     return paths
 
 
-def table(sweep: Sweep, made: Outcomes) -> str:
-    """A row for each setting in Markdown: means over seeds with half their 95 % interval."""
-    head = [*(path.rpartition(".")[2] for path in made.settings), "seeds", *made.metrics]
+def table(sweep: Sweep, made: Outcomes) -> Table:
+    """A row for each setting: means over seeds with half their 95 % interval."""
+    settings = [path.rpartition(".")[2] for path in made.settings]
     rows = [
-        f"*Sweep {sweep.name}: means over seeds with their 95 % interval.*",
-        "",
-        "| " + " | ".join(head) + " |",
-        "|" + "---|" * len(made.settings) + "---:|" * (1 + len(made.metrics)),
-    ]
-    for line in made.lines:
-        cells = [
+        (
             *map(written, line.settings.values()),
             str(len(line.runs)),
             *(_cell(line, name) for name in made.metrics),
-        ]
-        rows.append("| " + " | ".join(cells) + " |")
-    return "\n".join(rows) + "\n"
+        )
+        for line in made.lines
+    ]
+    caption = f"Sweep {sweep.name}: means over seeds with their 95 % interval."
+    return Table(sweep.name, caption, heads(*settings, "seeds", *made.metrics), rows, grouped=False)
 
 
-def _cell(line: Line, name: str) -> str:
-    if name not in line.means:
-        return ""
-    half = line.halves[name]
-    return f"{line.means[name]:.4g}" + (f" ± {half:.2g}" if math.isfinite(half) else "")
+def _cell(line: Line, name: str) -> Cell:
+    return measured(line.means[name], line.halves[name], ".4g", ".2g") if name in line.means else ""
 
 
 def _write_points(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], path: Path) -> None:

@@ -1,6 +1,5 @@
 """Tables without lines, as every command prints them."""
 
-import re
 import textwrap
 from collections.abc import Sequence
 
@@ -13,8 +12,6 @@ from iowbc.pipeline.store.artifact import Artifact
 
 FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why")
 """Columns whose text may go on in the next line."""
-NARROWEST = 20
-"""Characters that a folded name has room for at least."""
 NARROW = 100
 """Terminals of fewer characters than this leave out what `show` tells."""
 
@@ -31,12 +28,6 @@ def hanging(line: str, width: int, indent: int) -> str:
     """A line to the right of its heading, and what of it does not fit two characters further to the right."""
     first, others = " " * indent, " " * (indent + 2)
     return textwrap.fill(line, width, initial_indent=first, subsequent_indent=others, break_on_hyphens=False)
-
-
-def folded(name: str, width: int) -> str:
-    """A name on lines of a width, broken behind a slash or blank, else a point or underscore, else anywhere."""
-    line = f".{{1,{width}}}"
-    return "\n".join(re.findall(rf"{line}(?:(?<=[ /])|$)|{line}(?<=[._])|{line}", name))
 
 
 def metric_columns(artifact: Artifact) -> Columns:

@@ -3,20 +3,18 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from iowbc.results.table import ABSENT, Table, heads
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.report.tables import Table
     from iowbc.report.runs import Group, Run
 
 NOT_TRAINED = "not evaluated yet"
 
 
-def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> "Table":
+def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> Table:
     """A row for each run; `missing`: recipes that belong to the comparison and have not run."""
     import pandas as pd
-
-    from iowbc.evaluation.report.tables import ABSENT, Table
 
     methods = {name: stage.presentation.trained_by for name, stage in STAGES.items() if stage.presentation.trained_by}
     rows: list[tuple[str, ...]] = []
@@ -29,8 +27,8 @@ def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> "
             rows.append((run.label, label, seed, *told))
             numbers.append({"recipe": run.label, "algorithm": label, "seed": seed, **steps})
     rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(methods))) for name in missing]
-    head = ("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
-    return Table("trainings", _caption(numbers, missing), head, head, tuple(rows), pd.DataFrame(numbers))
+    columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
+    return Table("trainings", _caption(numbers, missing), columns, rows, pd.DataFrame(numbers))
 
 
 def steps_of(run: "Run", stage: str) -> int | None:

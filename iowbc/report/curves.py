@@ -1,4 +1,4 @@
-"""Interactive curves as plotly's own plain figures: learning curves over steps, errors over masses."""
+"""Learning curves over steps and errors over masses, which a page draws with plotly and a picture with matplotlib."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from iowbc.learning.curve_titles import title_of
@@ -21,8 +22,8 @@ MOST_POINTS = 400
 """Points of a curve; a longer one is averaged over neighbours."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 """Colours that colour-blind readers tell apart (Okabe and Ito), one for each group."""
-BAND = "33"
-"""Opacity of a band, as the last two digits of its colour."""
+BAND = 0.2
+"""Opacity of a band."""
 ERRORS = {
     "rate": "success rate",
     "E_v": "E_v [m/s]",
@@ -32,6 +33,50 @@ ERRORS = {
 }
 SWEPT = 2
 """Masses from which on a suite has a curve."""
+PICTURE_POINTS = 120
+"""Points of a curve in a picture, where noise cannot be zoomed into."""
+COLUMNS = 3
+"""Panels of a picture side by side."""
+PANEL_SIZE = (4.0, 2.6)
+"""Width and height of a panel of a picture [inch]."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line, and the band between two others behind it; values that are not known are NaN."""
+
+    label: str
+    place: int
+    """Of its group among all, which decides its colour."""
+    across: Values
+    mean: Values
+    low: Values
+    high: Values
+
+    @property
+    def colour(self) -> str:
+        return COLOURS[self.place % len(COLOURS)]
+
+    @property
+    def banded(self) -> NDArray[np.bool_]:
+        """Where there is a band: nowhere if it has no width."""
+        known = np.isfinite(self.low) & np.isfinite(self.high)
+        return known & (not np.array_equal(self.low[known], self.high[known]))
+
+    def traces(self, mode: str) -> list[dict[str, Any]]:
+        """What plotly draws: the edges of each unbroken part of the band, then the line."""
+        shown = {"name": self.label, "legendgroup": self.label}
+        edge = {**shown, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+        fill = {"fill": "tonexty", "fillcolor": f"{self.colour}{round(255 * BAND):02x}"}
+        found: list[dict[str, Any]] = []
+        banded = self.banded
+        for part in np.split(np.arange(len(banded)), np.flatnonzero(np.diff(banded)) + 1):
+            if banded[part].any():
+                across = {"x": _plain(self.across[part])}
+                found += [edge | across | {"y": _plain(self.low[part])}]
+                found += [edge | across | {"y": _plain(self.high[part])} | fill]
+        line = {"mode": mode, "line": {"color": self.colour, "width": 2}}
+        return [*found, {**shown, "x": _plain(self.across), "y": _plain(self.mean), **line}]
 
 
 @dataclass
@@ -39,10 +84,17 @@ class Panel:
     """One small figure."""
 
     title: str
-    traces: list[dict[str, Any]] = field(default_factory=list)
+    curves: list[Curve] = field(default_factory=list)
     across: str = "million environment steps"
+    mode: str = "lines"
+    """How plotly draws its curves."""
     from_zero: bool = False
     """Whether the upright axis begins at 0, so that heights compare."""
+
+    @property
+    def traces(self) -> list[dict[str, Any]]:
+        """Its curves as plotly draws them."""
+        return [trace for curve in self.curves for trace in curve.traces(self.mode)]
 
     @property
     def figure(self) -> dict[str, Any]:
@@ -70,7 +122,7 @@ def learning_panels(
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
             having = [columns for columns in runs if name in columns]
             curves = [_thinned(columns["step"] / 1e6, columns[name], most_points) for columns in having]
-            panel.traces += _band(group.label, place, *_joined(curves)) if curves else []
+            panel.curves += [Curve(group.label, place, *_joined(curves))] if curves else []
     return [panel for name, panel in panels.items() if name in first], [
         panel for name, panel in panels.items() if name not in first
     ]
@@ -86,9 +138,30 @@ def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
             for name, title in ERRORS.items():
                 curves = [sweep[name] for sweep in sweeps]
                 joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
-                panel = panels.setdefault((suite, name), Panel(f"{suite}: {title}", across="mass [kg]", from_zero=True))
-                panel.traces += _band(group.label, place, *joined, mode="lines+markers")
+                new = Panel(f"{suite}: {title}", across="mass [kg]", mode="lines+markers", from_zero=True)
+                panels.setdefault((suite, name), new).curves.append(Curve(group.label, place, *joined))
     return list(panels.values())
+
+
+def learning_figure(panels: Sequence[Panel], title: str) -> Figure:
+    """Panels of `learning_panels` side by side: a line for each group, a band from its least to its greatest seed."""
+    lines = -(-len(panels) // COLUMNS)
+    figure = Figure(figsize=(PANEL_SIZE[0] * COLUMNS, PANEL_SIZE[1] * lines), layout="constrained")
+    figure.suptitle(title)
+    labels: dict[str, Any] = {}
+    for position, panel in enumerate(panels, 1):
+        axes = figure.add_subplot(lines, COLUMNS, position)
+        for one in panel.curves:
+            (labels[one.label],) = axes.plot(one.across, one.mean, color=one.colour, linewidth=1.3)
+            if one.banded.any():
+                edges = (one.across, one.low, one.high)
+                axes.fill_between(*edges, where=one.banded, color=one.colour, alpha=BAND, linewidth=0)
+        axes.set_title(panel.title, fontsize=9)
+        axes.set_xlabel(panel.across, fontsize=8)
+        axes.tick_params(labelsize=8)
+        axes.grid(alpha=0.3)
+    figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)
+    return figure
 
 
 def _columns(folder: Path) -> dict[str, Values]:
@@ -156,26 +229,6 @@ def _joined(curves: Sequence[tuple[Values, Values]]) -> tuple[Values, Values, Va
     common = longest[(longest >= max(c[0][0] for c in curves)) & (longest <= min(c[0][-1] for c in curves))]
     values = np.stack([np.interp(common, *curve) for curve in curves])
     return common, values.mean(axis=0), values.min(axis=0), values.max(axis=0)
-
-
-def _band(
-    label: str, place: int, across: Values, mean: Values, low: Values, high: Values, mode: str = "lines"
-) -> list[dict[str, Any]]:
-    """A line, and behind it the band between two others where they differ; a gap of the band is left open."""
-    colour = COLOURS[place % len(COLOURS)]
-    shown = {"name": label, "legendgroup": label, "x": _plain(across)}
-    traces: list[dict[str, Any]] = []
-    known = np.isfinite(low) & np.isfinite(high)
-    if not np.array_equal(low[known], high[known]):
-        hidden = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
-        ends = np.flatnonzero(np.diff(known)) + 1
-        for part in (part for part in np.split(np.arange(len(known)), ends) if known[part[0]]):
-            edge = {**shown, **hidden, "x": _plain(across[part])}
-            traces += [
-                {**edge, "y": _plain(low[part])},
-                {**edge, "y": _plain(high[part]), "fill": "tonexty", "fillcolor": colour + BAND},
-            ]
-    return [*traces, {**shown, "y": _plain(mean), "mode": mode, "line": {"color": colour, "width": 2}}]
 
 
 def _plain(values: Values) -> list[float | None]:

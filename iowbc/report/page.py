@@ -14,6 +14,7 @@ from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.report.curves import Panel, evaluation_panels, learning_panels
 from iowbc.report.runs import Group, Run, metric_rows
+from iowbc.results.table import Table
 from iowbc.stages.registry import STAGES
 
 KINDS = {".png": "image/png", ".mp4": "video/mp4"}
@@ -23,14 +24,14 @@ def write_page(
     path: Path,
     runs: Sequence[Run],
     groups: Sequence[Group],
-    tables: Sequence[str],
-    more_tables: Sequence[str],
+    tables: Sequence[Table],
+    more_tables: Sequence[Table],
     differences: Sequence[str],
     together: Mapping[str, bytes] = MappingProxyType({}),
 ) -> None:
     """Write the page about some runs.
 
-    tables: result tables in Markdown; more_tables: those that can be unfolded. differences: lines that say how the
+    tables: the main result tables; more_tables: those that can be unfolded. differences: lines that say how the
     runs differ. together: pictures and films of all of them, by file name.
     """
     from jinja2 import Environment
@@ -52,8 +53,8 @@ def write_page(
         runs=runs,
         groups=groups,
         rows=[row for row in metric_rows(groups) if row.differs],
-        tables=[_table(markdown) for markdown in tables],
-        more_tables=[_table(markdown) for markdown in more_tables],
+        tables=tables,
+        more_tables=more_tables,
         learning=[entry for entry in learning if entry[1] or entry[2]],
         evaluation=evaluation,
         films=[*_together(together, ".mp4"), *_media(runs, "videos")],
@@ -109,11 +110,3 @@ def _beside(artifact: Artifact) -> list[tuple[str, str]]:
     """What the key was computed from, and the recipe."""
     paths = [artifact.folder / name for name in (INGREDIENTS, RECIPE)]
     return [(path.name, path.read_text(encoding="utf-8", errors="replace")) for path in paths if path.is_file()]
-
-
-def _table(markdown: str) -> tuple[str, list[list[str]]]:
-    """Caption of a Markdown table, and its rows of cells, of which the first is its head."""
-    lines = markdown.splitlines()
-    caption = next((line.strip("*") for line in lines if line.startswith("*")), "")
-    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines if line.startswith("|")]
-    return caption, rows[:1] + rows[2:]

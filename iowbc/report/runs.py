@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
+from iowbc.results.table import Cell, Column, Measured, Table, heads
 
 EVAL = "eval"
 NAMING = ("name", "description", "execution")
@@ -52,7 +53,7 @@ class MetricRow:
 
     stage: str
     name: str
-    cells: tuple[str, ...]
+    cells: tuple[Cell, ...]
     """A mean with half the spread over the seeds, a cell for each group; empty where it has none."""
     deltas: tuple[str, ...]
     """Of each further group to the first."""
@@ -88,6 +89,16 @@ def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
     return [_row(groups, stage, metric) for stage, metric in names]
 
 
+def metrics_table(groups: Sequence[Group]) -> Table:
+    """The metrics that differ: a column for each recipe, seeds together, and Δ to the first."""
+    others = [head for group in groups[1:] for head in (Column(group.label, role="detail"), f"Δ {group.label}")]
+    rows = []
+    for row in metric_rows(groups):
+        further = [cell for pair in zip(row.cells[1:], row.deltas, strict=True) for cell in pair]
+        rows += [(row.stage, row.name, row.cells[0], *further)] if row.differs else []
+    return Table("metrics", "", heads("stage", "metric", groups[0].label, *others), rows, grouped=False)
+
+
 def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
     values = [group.values(stage, metric) for group in groups]
     first = float(values[0].mean()) if len(values[0]) else None
@@ -96,11 +107,9 @@ def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
     return MetricRow(stage, metric, tuple(map(_cell, values)), deltas, differs or len(groups) == 1)
 
 
-def _cell(values: NDArray[np.float64]) -> str:
-    if not len(values):
-        return ""
-    spread = f" ± {np.ptp(values) / 2:.2g}" if len(values) > 1 else ""
-    return f"{figure(values.mean())}{spread}"
+def _cell(values: NDArray[np.float64]) -> Cell:
+    mean = figure(values.mean()) if len(values) else ""
+    return Measured(mean, f"{np.ptp(values) / 2:.2g}") if len(values) > 1 else mean
 
 
 def _of_one_variant(first: Run, second: Run) -> bool:

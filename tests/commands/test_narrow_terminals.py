@@ -14,18 +14,18 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
-from iowbc.commands.drawn_table import Cells, drawn
 from iowbc.commands.ls import list_artifacts
 from iowbc.commands.named import named
 from iowbc.commands.show import show
 from iowbc.commands.status import print_status
 from iowbc.commands.sweep_plan import PlannedStage, plan_table
-from iowbc.commands.tables import folded, hanging
+from iowbc.commands.tables import hanging
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.step import Step
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.results.table import Column, Table, drawn, folded, heads
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 WIDTH = 80
@@ -78,7 +78,9 @@ def test_a_narrow_comparison_folds_names_then_leaves_out_what_a_difference_tells
     width: int, head: str, folds: bool
 ) -> None:
     numbers = ("0.012345", "0.654322", "+0.64197", "0.111111", "+0.09876")
-    cells = Cells("", ("stage", "metric", "a", "b", "Δ b", "c", "Δ c"), (("teacher", LONG, *numbers),))
+    compared = [Column(name, role="detail") for name in "bc"]
+    columns = heads("stage", "metric", "a", compared[0], "Δ b", compared[1], "Δ c")
+    cells = Table("metrics", "", columns, [("teacher", LONG, *numbers)])
     written = io.StringIO()
     Console(file=written, width=width).print(drawn(cells, width))
     first, row, *others = written.getvalue().splitlines()

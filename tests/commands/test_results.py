@@ -8,23 +8,29 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from rich.console import Console
 
-from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.named import last_used
 from iowbc.commands.results import headline, next_commands, print_results
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.results.table import Column, Measured, Table, drawn, heads, read_tables, write_table
 
 PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
-LIFTING = """*Command tracking errors under lifting: means over surviving trials with their 95 % interval.*
-
-| Mass | Algorithm | E_α [rad] | E_h [m] | Survived | paper E_α |
-| --- | --- | --- | --- | --- | --- |
-| 0 kg | IO-WBC | 0.039 ± 0.024 | 0.02 ± 1.2e-03 | 5/5 | 0.125 |
-|  | stands still | 0.047 | 0.017 | – | – |
-"""
+LIFTING = Table(
+    "lifting",
+    "Command tracking errors under lifting: means over surviving trials with their 95 % interval.",
+    heads(
+        *("Mass", "Algorithm", Column("E_α", "rad"), Column("E_h", "m"), "Survived"), Column("paper E_α", role="paper")
+    ),
+    [
+        ("0 kg", "IO-WBC", Measured("0.039", "0.024"), Measured("0.02", "1.2e-03"), "5/5", "0.125"),
+        ("0 kg", "stands still", "0.047", "0.017", "–", "–"),
+    ],
+    pd.DataFrame(),
+)
 
 
 def shown(width: int, make: Callable[[Console], object]) -> str:
@@ -35,15 +41,17 @@ def shown(width: int, make: Callable[[Console], object]) -> str:
 
 
 def on_screen(width: int) -> str:
-    return shown(width, lambda console: console.print(drawn(read_table(LIFTING), console.width)))
+    return shown(width, lambda console: console.print(drawn(LIFTING, console.width)))
 
 
-def test_a_table_of_results_is_drawn_without_its_markdown() -> None:
-    text = on_screen(100)
+def test_a_table_that_was_stored_is_drawn_as_it_was_made(tmp_path: Path) -> None:
+    write_table(LIFTING, tmp_path)
+    (table,) = read_tables(tmp_path)
+    text = shown(100, lambda console: console.print(drawn(table, console.width)))
+    assert text == on_screen(100)
     assert text.splitlines()[0] == "Command tracking errors under lifting"
     assert "0.039 ± 0.024" in text
-    assert "|" not in text
-    assert "---" not in text
+    assert text.count("0 kg") == 1, "the first column groups rows that repeat it"
 
 
 @pytest.mark.parametrize(
@@ -77,7 +85,7 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
     films = runs.root / "first" / "eval" / "videos"
     films.mkdir()
     (films / "box.mp4").write_bytes(b"")
-    (films.parent / "tables" / "lifting.md").write_text(LIFTING)
+    write_table(LIFTING, films.parent / "tables")
     lines = shown(82, lambda console: print_results(runs, "first", artifacts, console)).splitlines()
     assert lines[0].startswith("film  ")
     assert lines[0].endswith("runs/first/eval/videos/box.mp4")
@@ -93,11 +101,16 @@ def test_the_end_of_a_run_is_short_names_links_and_the_next_commands(folder: Pat
     assert len(lines) < 35
 
 
+def only_results(_: str, names: list[str]) -> list[str]:
+    """All but the tables and trials of an evaluation."""
+    return [name for name in names if name != "tables" and not name.endswith((".md", ".parquet"))]
+
+
 def test_the_end_of_the_largest_run_fits_a_screen_of_80_columns(folder: Path) -> None:
     runs = Runs(folder / "runs")
     artifacts = last_used(Store(runs), "first")
     tables = max((PUBLISHED / "eval").glob("*/tables"), key=lambda path: (path / "pushing.md").stat().st_size)
-    shutil.copytree(tables, runs.root / "first" / "eval" / "tables", dirs_exist_ok=True)
+    shutil.copytree(tables.parent, runs.root / "first" / "eval", ignore=only_results, dirs_exist_ok=True)
     lines = shown(80, lambda console: print_results(runs, "first", artifacts, console)).splitlines()
     assert len(lines) < 70
     assert "Success in the heavy tasks" in lines

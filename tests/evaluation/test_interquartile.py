@@ -12,7 +12,7 @@ from iowbc.evaluation.report.error_tables import error_table
 from iowbc.evaluation.report.interquartile import blocks, figures, improvement, interquartile_table
 from iowbc.evaluation.report.report import report_tables
 from iowbc.evaluation.report.statistics import interquartile_mean, percentile_interval
-from iowbc.evaluation.report.tables import latex, markdown
+from iowbc.results.table import latex, markdown
 
 
 def training(seed: str, survivors: dict[float, int], error: float = 0.1, variant: str = "IO-WBC") -> pd.DataFrame:

@@ -18,6 +18,7 @@ from iowbc.learning.acting import StudentPolicy, TeacherPolicy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 
 RANDOM = np.random.default_rng(0)
+KINDS = ("md", "tex", "csv", "json", "png")
 TRIALS, MOMENTS = 60, 6
 
 
@@ -124,7 +125,9 @@ def test_the_probes_of_several_variants_stand_in_one_table_and_figure(inferred: 
     blind = inferred.assign(variant="IO-WBC, blind", inferred=5.5)
     both = pd.concat([blind, inferred], ignore_index=True)
     write_probe(both, tmp_path)
-    assert {path.name for path in tmp_path.rglob("*.*")} == {"probe.md", "probe.tex", "probe.csv", "probe.png"}
+    assert {path.name for path in tmp_path.rglob("*.*")} == {
+        f"probe.{kind}" for kind in ("md", "tex", "csv", "json", "png")
+    }
     table = probe_table(both)
     assert [row[:2] for row in table.rows[:2]] == [("sensor (6)", "IO-WBC"), ("sensor (6)", "IO-WBC, blind")]
     assert "1.2 to 10.0 kg in 30 trials, without a partner" in table.caption

@@ -16,10 +16,10 @@ from iowbc.commands.results import split_tables
 from iowbc.pipeline.store.artifact import Manifest, write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.report.curves import MOST_POINTS, evaluation_panels, learning_panels
-from iowbc.report.learning_figure import learning_figure
+from iowbc.report.curves import MOST_POINTS, evaluation_panels, learning_figure, learning_panels
 from iowbc.report.page import write_page
 from iowbc.report.runs import Run, grouped, metric_rows
+from iowbc.results.table import Table, heads
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 STEPS = 1000
@@ -81,7 +81,7 @@ def test_seeds_belong_together_and_rows_that_are_alike_are_left_out(runs: list[R
     groups = grouped(runs)
     assert [(group.label, len(group.runs)) for group in groups] == [("first (2 seeds)", 2), ("other", 1)]
     rows = {(row.stage, row.name): row for row in metric_rows(groups)}
-    assert rows["teacher", "score"].cells == ("2 ± 1", "5")
+    assert [str(cell) for cell in rows["teacher", "score"].cells] == ["2 ± 1", "5"]
     assert rows["teacher", "score"].deltas == ("+3",)
     assert rows["teacher", "score"].differs
     assert not rows["teacher", "same"].differs
@@ -205,7 +205,7 @@ def hostile(tmp_path: Path) -> list[Run]:
 
 def hostile_page(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
-    table = f"*{HOSTILE}*\n\n| {HOSTILE} | b |\n|---|---|\n| {HOSTILE} | 2 |\n"
+    table = Table("t", HOSTILE, heads(HOSTILE, "b"), [(HOSTILE, "2")])
     media = {f"{HOSTILE}.png": b"picture", f"{HOSTILE}.mp4": b"film"}
     write_page(path, runs, grouped(runs), [table], [table], [HOSTILE], media)
     return path
@@ -240,7 +240,9 @@ def test_the_main_tables_are_shown_at_once_and_the_others_folded(runs: list[Run]
     assert "<td>main</td>" in shown
     assert '<p class="caption">A caption.</p><div class="wide"><table><tr>' in shown
     assert "<td>folded</td>" in folded.partition("</details>")[0]
-    assert split_tables({"joints": "a", "heavy": "b", "lifting": "c", "pushes": "d"}) == (["c", "b"], ["a", "d"])
+    tables = [Table(name, "", (), []) for name in ("joints", "heavy", "lifting", "pushes")]
+    main, others = split_tables(tables)
+    assert ([one.name for one in main], [one.name for one in others]) == (["lifting", "heavy"], ["joints", "pushes"])
 
 
 def test_the_picture_of_curves_that_the_page_draws_is_left_out(runs: list[Run], tmp_path: Path) -> None:
@@ -275,7 +277,7 @@ def test_a_wide_table_scrolls_by_itself_and_does_not_widen_the_page(
 
 def written(runs: list[Run], folder: Path) -> Path:
     path = folder / "page.html"
-    table, other = (f"*A caption.*\n\n| a | b |\n|---|---|\n| {cell} | <2> |\n" for cell in ("main", "folded"))
+    table, other = (Table(cell, "A caption.", heads("a", "b"), [(cell, "<2>")]) for cell in ("main", "folded"))
     write_page(path, runs, grouped(runs), [table], [other], ["teacher.gamma: 0.99 -> 0.9"])
     return path
 

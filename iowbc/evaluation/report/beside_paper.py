@@ -7,11 +7,10 @@ import pandas as pd
 
 from iowbc.evaluation.paper import TABLES, VARIANTS, reported
 from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of
-from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.error_tables import ANY_MASS, LATEX_TOLD, NO_LABELS, NUMBERS, RAW, STANDS_STILL, TOLD
-from iowbc.evaluation.report.regime import regime
-from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
+from iowbc.evaluation.report.captions import in_common, regime
+from iowbc.evaluation.report.error_tables import ANY_MASS, NO_LABELS, NUMBERS, RAW, STANDS_STILL, TOLD
 from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 CELL = "{} / {} = {}"
 """Ours, the paper's, and ours in parts of it."""
@@ -57,16 +56,14 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
             rows.append((f"{NUMBERS[kind]}, {suite}", STANDS_STILL, ANY_MASS, ABSENT, *still))
     if not rows:
         return None
-    columns = ("Table", "Algorithm", "Mass", "Survived")
     return Table(
         "paper",
         "Tables II and III cell by cell: ours / the paper's = ratio, means over surviving trials; the paper's are for "
         f"its own commands. {FAILS}: no trial survived. Cells with a number of the paper's in which ours is at most as "
         f"large: {', '.join(counted)}. {STANDS_STILL}: what doing nothing scores, from the script. "
         f"{in_common(summary)}",
-        (*columns, *TOLD.values()),
-        (*columns, *LATEX_TOLD.values()),
-        tuple(rows),
+        heads("Table", "Algorithm", "Mass", "Survived", *TOLD.values()),
+        rows,
         pd.DataFrame(numbers),
     )
 

@@ -11,8 +11,8 @@ from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner, trainings
 from iowbc.evaluation.report.error_tables import STANDS_STILL
 from iowbc.evaluation.report.figures import Bars, broken, draw_bars, legend, letter, style_of, tidy
-from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.impedance import Apparent, apparent
+from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 BLOCKED_BEFORE = {"IO-WBC": (113, 231), "w/o Distill.": (73, 109)}
 """Peak forces of a hand on a blocked crate [N] over the trials of the first published controllers, which were trained
@@ -30,7 +30,7 @@ def compliance_table(summary: pd.DataFrame) -> Table:
         rows += [(name, str(row["variant"]), *_interaction(row)) for _, row in group.iterrows()]
         still = f"{float(group['still_E_v'].mean()):.3f}"
         rows.append((name, STANDS_STILL, ABSENT, "none", *[ABSENT] * 3, still, still, ABSENT))
-    head = (
+    columns = heads(
         *("Partner", "Algorithm", "Survived", "Success", "Handle force [N]", "Hand force [N]", "Work on partner [J]"),
         *("E_v [m/s]", "E_v raw [m/s]", "E_v partner [m/s]"),
     )
@@ -44,7 +44,7 @@ def compliance_table(summary: pd.DataFrame) -> Table:
         f"a blocked crate, of the first published controllers: {before}. In simulation, undisturbed, {partner(chosen)}."
         f"{trainings(chosen)}"
     )
-    return Table("compliance", caption, head, head, tuple(rows), chosen)
+    return Table("compliance", caption, columns, rows, chosen)
 
 
 def impedance_table(summary: pd.DataFrame) -> Table:
@@ -68,7 +68,7 @@ def impedance_table(summary: pd.DataFrame) -> Table:
                 {"variant": variant, "pull_direction": direction, "stiffness": found.stiffness}
                 | {"damping": found.damping, "mass_apparent": found.mass}
             )
-    head = (
+    columns = heads(
         *("Pull", "Algorithm", "Survived", "Impedance [N·s/m]", "Phase [°]"),
         *("Stiffness [N/m]", "Damping [N·s/m]", "Mass [kg]"),
     )
@@ -81,7 +81,7 @@ def impedance_table(summary: pd.DataFrame) -> Table:
     )
     keys = ["variant", "pull_direction"]
     told = chosen.merge(pd.DataFrame(numbers), how="left", on=keys) if numbers else chosen
-    return Table("impedance", caption, head, head, tuple(rows), told)
+    return Table("impedance", caption, columns, rows, told)
 
 
 def fits(within: pd.DataFrame) -> Iterator[tuple[str, Apparent]]:

@@ -5,10 +5,10 @@ import pandas as pd
 
 from iowbc.evaluation.report.aggregate import TRAINING, WORLD, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL
+from iowbc.evaluation.report.error_tables import HEADS, STANDS_STILL
 from iowbc.evaluation.report.statistics import mean_half_width, mean_p, sign_flip_p
-from iowbc.evaluation.report.tables import ABSENT, Table
 from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.results.table import ABSENT, Cell, Column, Table, heads, measured
 
 PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
 """What two trials have in common that meet the same world and commands; the first training of a variant is compared
@@ -88,20 +88,15 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
         "take the worlds as clusters, in each of which all masses and trainings stand or fall together. "
         f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
         f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}",
-        ("Suite", "Algorithm", "Pairs", *(f"Δ{head}" for head in HEADS.values()), "Δ success"),
-        (
-            "Suite",
-            "Algorithm",
-            "Pairs",
-            *(rf"$\Delta {head[1:]}" for head in LATEX_HEADS.values()),
-            r"$\Delta$ success",
+        heads(
+            *("Suite", "Algorithm", "Pairs"),
+            *(Column(f"Δ{one.name}", one.unit, rf"$\Delta {one.latex[1:]}") for one in HEADS.values()),
+            Column("Δ success", latex=r"$\Delta$ success"),
         ),
-        tuple(rows),
+        rows,
         pd.DataFrame(numbers),
     )
 
 
-def _cell(mean: float, half: float, p: float) -> str:
-    if np.isnan(mean):
-        return ABSENT
-    return f"{mean:+.3f}" if np.isnan(half) else f"{mean:+.3f} ± {half:.3f} (p {p:.2g})"
+def _cell(mean: float, half: float, p: float) -> Cell:
+    return measured(mean, half, "+.3f", note=f" (p {p:.2g})")

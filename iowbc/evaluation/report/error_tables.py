@@ -8,19 +8,22 @@ import pandas as pd
 
 from iowbc.evaluation.paper import VARIANTS, reported
 from iowbc.evaluation.report.aggregate import asks_for_steps
-from iowbc.evaluation.report.captions import conditions, measures
-from iowbc.evaluation.report.regime import regime
-from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
+from iowbc.evaluation.report.captions import conditions, measures, regime
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.transport import SHORTEST_WAY
+from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measured
 
-HEADS = {"E_alpha": "E_α [rad]", "E_h": "E_h [m]", "E_v": "E_v [m/s]", "E_psi": "E_ψ [rad]"}
-LATEX_HEADS = {"E_alpha": r"$E_{\alpha}$", "E_h": "$E_{h}$", "E_v": "$E_{v}$", "E_psi": r"$E_{\psi}$"}
 RAW = "E_v_raw"
 """E_v without the mean over a gait period."""
-TOLD = {name: HEADS.get(name, "E_v raw [m/s]") for name in ("E_alpha", "E_h", "E_v", RAW, "E_psi")}
-LATEX_TOLD = {name: LATEX_HEADS.get(name, "$E_{v}$ raw") for name in TOLD}
-"""Heads of the errors with it."""
+TOLD = {
+    "E_alpha": Column("E_α", "rad", r"$E_{\alpha}$"),
+    "E_h": Column("E_h", "m", "$E_{h}$"),
+    "E_v": Column("E_v", "m/s", "$E_{v}$"),
+    RAW: Column("E_v raw", "m/s", "$E_{v}$ raw", "detail"),
+    "E_psi": Column("E_ψ", "rad", r"$E_{\psi}$"),
+}
+"""Columns of the errors with it."""
+HEADS = {name: TOLD[name] for name in ERRORS}
 NUMBERS = {"lifting": "II", "pushing": "III"}
 SWEPT = (*NUMBERS, "squeezing")
 """Kinds of suites that go over masses; the paper has no table of the last."""
@@ -54,17 +57,14 @@ def error_table(
     if swept:
         nothing = [ABSENT] * len(ERRORS) if with_paper else []
         rows.append((ANY_MASS, STANDS_STILL, *_still(chosen), *_still_outcome(chosen), *nothing))
-    columns = ("Mass" if swept else "Case", "Algorithm")
-    outcome = ("Survived", "Success", "Transport", "Kept")
-    paper = [f"paper {head.split()[0]}" for head in HEADS.values() if with_paper]
-    latex_paper = [f"paper {head}" for head in LATEX_HEADS.values() if with_paper]
+    paper = [Column(f"paper {one.name}", latex=f"paper {one.latex}", role="paper") for one in HEADS.values()]
+    outcome = ("Survived", "Success", "Transport", "Kept", *(paper if with_paper else ()))
     return Table(
-        name=name or slug(suite),
-        caption=_caption(chosen, kind, with_paper),
-        head=(*columns, *TOLD.values(), *outcome, *paper),
-        latex_head=(*columns, *LATEX_TOLD.values(), *outcome, *latex_paper),
-        rows=tuple(rows),
-        numbers=_with_papers(chosen, kind, labels) if with_paper else chosen,
+        name or slug(suite),
+        _caption(chosen, kind, with_paper),
+        heads("Mass" if swept else "Case", "Algorithm", *TOLD.values(), *outcome),
+        rows,
+        _with_papers(chosen, kind, labels) if with_paper else chosen,
     )
 
 
@@ -79,15 +79,13 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
             rows.append((first, STANDS_STILL, *_still(group, "_moving")))
     if swept:
         rows.append((ANY_MASS, STANDS_STILL, *_still(chosen, "_moving")))
-    columns = ("Mass" if swept else "Case", "Algorithm")
     return Table(
-        name=f"{slug(suite)}_moving",
-        caption=f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
+        f"{slug(suite)}_moving",
+        f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
         f"95 % interval. {conditions(chosen)} {measures(chosen)}",
-        head=(*columns, *TOLD.values()),
-        latex_head=(*columns, *LATEX_TOLD.values()),
-        rows=tuple(rows),
-        numbers=chosen,
+        heads("Mass" if swept else "Case", "Algorithm", *TOLD.values()),
+        rows,
+        chosen,
     )
 
 
@@ -106,11 +104,10 @@ def _groups(chosen: pd.DataFrame, swept: bool) -> list[tuple[str, pd.DataFrame]]
     ]
 
 
-def _errors(row: pd.Series, part: str = "") -> list[str]:
+def _errors(row: pd.Series, part: str = "") -> list[Cell]:
     if not row["survived"]:
         return [FAILS] * len(TOLD)
-    halves = [row.get(f"{name}{part}_half", np.nan) for name in TOLD]
-    return [with_half(row[f"{name}{part}"], half) for name, half in zip(TOLD, halves, strict=True)]
+    return [measured(row[f"{name}{part}"], row.get(f"{name}{part}_half", np.nan)) for name in TOLD]
 
 
 def _outcome(row: pd.Series) -> list[str]:
@@ -194,10 +191,3 @@ def _with_whom(chosen: pd.DataFrame, kind: str) -> str:
     if shares == {0.0}:
         return f"{kind} alone"
     return f"cooperative {kind}" if min(shares) > 0 else kind
-
-
-def with_half(value: float, half: float) -> str:
-    """A mean with half its interval; a dash for none."""
-    if np.isnan(value):
-        return ABSENT
-    return f"{value:.3f}" if np.isnan(half) else f"{value:.3f} ± {half:.3f}"

@@ -5,7 +5,6 @@ Beside them what the paper does not show: success under harder conditions, and p
 
 import textwrap
 from dataclasses import dataclass
-from pathlib import Path
 from string import ascii_lowercase
 
 import numpy as np
@@ -36,7 +35,6 @@ MARKS = "means over the trials survived; at the upper edge: how many where not a
 STILL_NOTE = "grey: a robot that stands still"
 PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
 STILL_COLOUR = "0.55"
-DPI = 150
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
 ROOMY = 4
@@ -142,11 +140,6 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     letter(panels)
     legend(figure, panels[0])
     return figure
-
-
-def write_figure(figure: Figure, path: Path) -> None:
-    """Save as PNG without the time of day in it, so that equal trials give equal files."""
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
 def _note(with_paper: bool) -> str:

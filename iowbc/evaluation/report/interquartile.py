@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL, SWEPT, asks_for_transport
+from iowbc.evaluation.report.error_tables import HEADS, STANDS_STILL, SWEPT, asks_for_transport
 from iowbc.evaluation.report.statistics import RESAMPLES, interquartile_mean, percentile_interval
-from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
+from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 KINDS = (*SWEPT, "heavy", "robustness")
 """Kinds of suites in which errors tell how good a controller is."""
@@ -86,7 +86,6 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
             numbers.append({"suite": suite, "variant": STANDS_STILL, **still})
     if not rows:
         return None
-    columns = ("Suite", "Algorithm", "Seeds", "Trials", "Success")
     return Table(
         "interquartile",
         "All masses or cases of a suite together that every variant played: success, and interquartile means of the "
@@ -95,9 +94,8 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
         "P: probability that a trial has a smaller norm of the four errors than one of the first algorithm at the same "
         "mass. Few trainings say little of how much another one would differ: their own rows stand below. "
         f"{STANDS_STILL}: what doing nothing scores, from the script. {in_common(played)}",
-        (*columns, *HEADS.values(), "P"),
-        (*columns, *LATEX_HEADS.values(), "P"),
-        tuple(rows),
+        heads("Suite", "Algorithm", "Seeds", "Trials", "Success", *HEADS.values(), "P"),
+        rows,
         pd.DataFrame(numbers),
     )
 

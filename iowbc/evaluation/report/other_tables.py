@@ -10,7 +10,7 @@ from iowbc.evaluation.report.aggregate import GROUP, TORQUE, suites_of, variants
 from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.error_tables import NO_LABELS, STANDS_STILL, SWEPT
-from iowbc.evaluation.report.tables import ABSENT, Table
+from iowbc.results.table import ABSENT, Table, heads
 
 TYRE_MASS = 18.0
 PROBING = ("pushes", "impedance", "map")
@@ -52,9 +52,9 @@ def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) 
             )
         if (group["commanded_distance"] > 0).any():
             rows.append((f"{case} ({mass:g} kg)", STANDS_STILL, ABSENT, "none", "0 %", ABSENT, ABSENT))
-    head = ("Task", "Algorithm", "Survived", "Success", "Rate", "95 % interval", "Paper")
+    columns = heads("Task", "Algorithm", "Survived", "Success", "Rate", "95 % interval", "Paper")
     caption = f"Success in the heavy tasks. {conditions(chosen)}"
-    return Table("heavy", caption, head, head, tuple(rows), chosen)
+    return Table("heavy", caption, columns, rows, chosen)
 
 
 def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
@@ -65,12 +65,12 @@ def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
     }
     still = ["none" if (summary.loc[summary["suite"] == s, "commanded_distance"] > 0).any() else ABSENT for s in suites]
     rows = [(variant, *(_cell(one, "kg") for one in row)) for variant, row in found.items()]
-    head = ("Variant", *(suite.capitalize() for suite in suites))
+    columns = heads("Variant", *(suite.capitalize() for suite in suites))
     caption = (
         f"Load capacity: the largest mass up to which every mass reached {100 * rate:.0f} % success; "
         "≥ where the heaviest tried did. In simulation."
     )
-    return Table("capacity", caption, head, head, (*rows, (STANDS_STILL, *still)), _numbers(found, suites))
+    return Table("capacity", caption, columns, [*rows, (STANDS_STILL, *still)], _numbers(found, suites), grouped=False)
 
 
 def push_table(summary: pd.DataFrame, rate: float) -> Table:
@@ -79,13 +79,13 @@ def push_table(summary: pd.DataFrame, rate: float) -> Table:
     directions = list(dict.fromkeys(pushes["case"]))
     found = {v: [push_capacity(summary, d, v, rate) for d in directions] for v in variants_of(pushes)}
     rows = [(variant, *(_cell(one, "N·s") for one in row)) for variant, row in found.items()]
-    head = ("Variant", *directions)
+    columns = heads("Variant", *directions)
     caption = (
         f"Impulse on the base survived with {float(pushes['mass'].iloc[0]):g} kg in the hands, by its direction, while "
         f"standing or walking: the largest up to which every one tried reached {100 * rate:.0f} % survival and a walk "
         "after it. In simulation, without a partner."
     )
-    return Table("pushes", caption, head, head, tuple(rows), _numbers(found, directions))
+    return Table("pushes", caption, columns, rows, _numbers(found, directions), grouped=False)
 
 
 def joint_table(summary: pd.DataFrame) -> Table:
@@ -99,12 +99,12 @@ def joint_table(summary: pd.DataFrame) -> Table:
         numbers += [{**keys, "joint": j, "saturated": s, "peak_torque": t} for s, t, j in by_joint]
         worst = sorted(by_joint, key=lambda entry: (-entry[0], entry[2]))[:JOINTS_SHOWN]
         rows += [(load, str(row["variant"]), j, f"{t:.1f}", f"{100 * s:.1f} %") for s, t, j in worst]
-    head = ("Load", "Algorithm", "Joint", "Peak torque [N·m]", "At its limit")
+    columns = heads("Load", "Algorithm", "Joint", "Peak torque [N·m]", "At its limit")
     caption = (
         "The joints most often at their torque limit at the heaviest load survived: mean over surviving trials of the "
         "peak torque, and the share of the time at the limit. In simulation."
     )
-    return Table("joints", caption, head, head, tuple(rows), pd.DataFrame(numbers))
+    return Table("joints", caption, columns, rows, pd.DataFrame(numbers))
 
 
 def contact_table(summary: pd.DataFrame) -> Table:
@@ -119,7 +119,7 @@ def contact_table(summary: pd.DataFrame) -> Table:
         )
         for _, row in heaviest(summary).iterrows()
     ]
-    head = ("Load", "Algorithm", *CONTACT, "Torque, worst joint")
+    columns = heads("Load", "Algorithm", *CONTACT, "Torque, worst joint")
     caption = (
         "Contact with the ground and effort at the heaviest load survived: means over surviving trials. Touchdown: "
         "speed of the lowest corner of a sole before it touches. Peak force: of the ground on a foot, in any physics "
@@ -128,7 +128,7 @@ def contact_table(summary: pd.DataFrame) -> Table:
         "square of its second difference over a control period. Torque: root mean square as a part of the limit, of "
         "the joint with the most. In simulation."
     )
-    return Table("contact", caption, head, head, tuple(rows), summary[[*GROUP, *CONTACT_COLUMNS, *_efforts(summary)]])
+    return Table("contact", caption, columns, rows, summary[[*GROUP, *CONTACT_COLUMNS, *_efforts(summary)]])
 
 
 def heaviest(summary: pd.DataFrame) -> pd.DataFrame:

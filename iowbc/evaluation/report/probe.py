@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from iowbc.evaluation.probe.readings import PRIVILEGED
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner
-from iowbc.evaluation.report.figures import style_of, write_figure
+from iowbc.evaluation.report.figures import style_of
 from iowbc.evaluation.report.statistics import determination, determination_interval, root_mean_square
-from iowbc.evaluation.report.tables import ABSENT, Table, write_table
+from iowbc.results.picture import write_figure
+from iowbc.results.table import ABSENT, Column, Table, heads, write_table
 
 LINES = ("-", "--", ":")
 """Of what the mass is read from, in order; s_priv, which holds it, has none."""
@@ -29,12 +30,9 @@ def write_probe(inferred: pd.DataFrame, folder: Path) -> pd.DataFrame:
 
     inferred: `probe.parquet` of one variant, or of several one after another.
     """
-    tables, figures = folder / "tables", folder / "figures"
-    for each in (tables, figures):
-        each.mkdir(parents=True, exist_ok=True)
     table = probe_table(inferred)
-    write_table(table, tables)
-    write_figure(probe_figure(inferred), figures / "probe.png")
+    write_table(table, folder / "tables")
+    write_figure(probe_figure(inferred), folder / "figures" / "probe.png")
     return table.numbers
 
 
@@ -62,8 +60,8 @@ def probe_table(inferred: pd.DataFrame) -> Table:
                 )
             )
     head = ("Read from", "Algorithm", "Readings", "R²", "95 % interval", "RMSE [kg]", "R² of 1 s", "R² of a trial")
-    latex_head = tuple(text.replace("R²", "$R^2$") for text in head)
-    return Table("probe", _caption(inferred), head, latex_head, tuple(rows), pd.DataFrame(numbers))
+    columns = [Column(name, latex=name.replace("R²", "$R^2$")) for name in head]
+    return Table("probe", _caption(inferred), heads(*columns), rows, pd.DataFrame(numbers))
 
 
 def figures_of(found: pd.DataFrame) -> dict[str, float]:

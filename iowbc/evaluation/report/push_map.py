@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import measures, partner, trainings
 from iowbc.evaluation.report.figures import letter
-from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
+from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 MAP = "map"
 PANELS = {
@@ -32,14 +32,14 @@ def map_table(summary: pd.DataFrame) -> Table:
         for variant in variants_of(group):
             cells = group[group["variant"] == variant].set_index("mass").reindex(masses)
             rows.append((f"μ {resistance:g}", variant, *(_cell(row) for _, row in cells.iterrows())))
-    head = ("Rolling resistance", "Algorithm", *(f"{mass:g} kg" for mass in masses))
+    columns = heads("Rolling resistance", "Algorithm", *(f"{mass:g} kg" for mass in masses))
     caption = (
         "Pushes by rolling resistance and mass: trials that succeeded, E_v / E_v raw [m/s], mean horizontal force of "
         "the hands along the command [N]; means over surviving trials. A crate resists with μ m g, and in the paper's "
         f"tests μ is unknown. {FAILS}: no trial survived. In simulation, {partner(chosen)}. {measures(chosen)}"
         f"{trainings(chosen)}"
     )
-    return Table("push_map", caption, head, head, tuple(rows), chosen)
+    return Table("push_map", caption, columns, rows, chosen)
 
 
 def map_figure(summary: pd.DataFrame) -> Figure:

@@ -10,7 +10,7 @@ from iowbc.evaluation.report.beside_paper import paper_table
 from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
 from iowbc.evaluation.report.error_tables import NO_LABELS, SWEPT, error_table, moving_table, slug
-from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, write_figure
+from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness
 from iowbc.evaluation.report.interquartile import interquartile_table
 from iowbc.evaluation.report.other_tables import (
     capacity_table,
@@ -21,7 +21,8 @@ from iowbc.evaluation.report.other_tables import (
     success_table,
 )
 from iowbc.evaluation.report.push_map import MAP, map_figure, map_table
-from iowbc.evaluation.report.tables import Table, write_table
+from iowbc.results.picture import write_figure
+from iowbc.results.table import Table, write_table
 
 
 def write_report(
@@ -35,8 +36,6 @@ def write_report(
     labels: `eval.label` of each variant that goes by another name here, to find the paper's numbers for it.
     """
     tables, figures = folder / "tables", folder / "figures"
-    tables.mkdir(parents=True, exist_ok=True)
-    figures.mkdir(parents=True, exist_ok=True)
     summary = aggregate(trials)
     for table in report_tables(trials, summary, capacity_rate, labels):
         write_table(table, tables)
@@ -55,7 +54,7 @@ def write_report(
 
 
 def report_tables(
-    trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str]
+    trials: pd.DataFrame, summary: pd.DataFrame, capacity_rate: float, labels: Mapping[str, str] = NO_LABELS
 ) -> list[Table]:
     """All tables that the trials give; of walking and of joints only where somebody was to walk, or survived."""
     swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])

@@ -1,0 +1,193 @@
+"""A table of results, written as Markdown, LaTeX, CSV and JSON, and drawn on a terminal of any width."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, TypeAdapter
+from pydantic.dataclasses import dataclass
+from rich.cells import cell_len
+from rich.console import Group
+from rich.table import Table as Drawing
+from rich.text import Text
+
+FAILS = "Fails"
+ABSENT = "–"
+LATEX_SIGNS = str.maketrans(
+    {"±": r"$\pm$", "–": "--", "≥": r"$\geq$", "μ": r"$\mu$", "·": r"$\cdot$", "Δ": r"$\Delta$", "<": "$<$"}
+)
+NARROWEST = 20
+"""Characters that a folded name has room for at least."""
+NAMES = 1
+"""The column whose names may go on in the next line."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """The head of a column."""
+
+    name: str
+    unit: str = ""
+    latex: str = ""
+    """Its head in LaTeX, where it is another one."""
+    role: Literal["own", "paper", "detail"] = "own"
+    """Whether it holds the paper's figures, or a detail that other columns nearly tell; narrow terminals leave these
+    out first."""
+
+    @property
+    def head(self) -> str:
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A mean with half its interval, and a note behind it; narrow terminals leave the interval out."""
+
+    value: str
+    half: str
+    note: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.value} ± {self.half}{self.note}"
+
+
+Cell = str | Measured
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of finished cells."""
+
+    name: str
+    caption: str
+    columns: tuple[Column, ...]
+    rows: Sequence[tuple[Cell, ...]]
+    numbers: Any = Field(default=None, exclude=True, repr=False)
+    """The same figures as numbers, a pandas DataFrame, for the CSV."""
+    grouped: bool = True
+    """Whether the first column groups rows that repeat it."""
+
+    @property
+    def head(self) -> tuple[str, ...]:
+        return tuple(column.head for column in self.columns)
+
+    def texts(self, intervals: bool = True) -> list[list[str]]:
+        """The cells as text, with or without intervals; what groups rows stands in the first of them."""
+        found = [
+            [cell if isinstance(cell, str) else str(cell) if intervals else cell.value + cell.note for cell in row]
+            for row in self.rows
+        ]
+        group = ""
+        for row in found if self.grouped else ():
+            row[0], group = "" if row[0] == group else row[0], row[0]
+        return found
+
+
+STORED = TypeAdapter(Table)
+
+
+def heads(*names: str | Column) -> tuple[Column, ...]:
+    """Columns, of which those with nothing but a name are given as texts."""
+    return tuple(Column(name) if isinstance(name, str) else name for name in names)
+
+
+def measured(value: float, half: float, form: str = ".3f", half_form: str = ".3f", note: str = "") -> Cell:
+    """A mean with half its interval; a dash for none, the mean alone without an interval."""
+    if np.isnan(value):
+        return ABSENT
+    return Measured(f"{value:{form}}", f"{half:{half_form}}", note) if np.isfinite(half) else f"{value:{form}}"
+
+
+def markdown(table: Table) -> str:
+    """GitHub Markdown with the caption above."""
+    caption = [f"*{table.caption}*", ""] if table.caption else []
+    rows = [table.head, ["---"] * len(table.head), *table.texts()]
+    return "\n".join([*caption, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
+
+
+def latex(table: Table) -> str:
+    """A booktabs table with the paper's row groups, no wider than the text; needs the packages booktabs, multirow and
+    adjustbox."""
+    import pandas as pd
+
+    head = [column.latex or column.head for column in table.columns]
+    frame = pd.DataFrame([[str(cell) for cell in row] for row in table.rows], columns=head)
+    if table.grouped:
+        style = frame.set_index(head[:2]).style.format_index(escape="latex")
+    else:
+        style = frame.style.hide(axis="index")
+    text = (
+        style.format(escape="latex")
+        .format_index(escape="latex-math", axis="columns")
+        .to_latex(
+            caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
+            label=f"tab:{table.name}",
+            position="h",
+            position_float="centering",
+            hrules=True,
+            clines="skip-last;data" if table.grouped else None,
+            multirow_align="c",
+            column_format="ll" + "c" * (len(head) - 2),
+        )
+    )
+    fitted = str(text).replace(r"\begin{tabular}", "\\begin{adjustbox}{max width=\\textwidth}\n\\begin{tabular}")
+    return fitted.replace(r"\end{tabular}", "\\end{tabular}\n\\end{adjustbox}").translate(LATEX_SIGNS)
+
+
+def write_table(table: Table, folder: Path) -> None:
+    """Write `<name>.md`, `<name>.tex`, `<name>.csv`, and `<name>.json`, which `read_tables` reads."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{table.name}.md").write_text(markdown(table), encoding="utf-8")
+    (folder / f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
+    (folder / f"{table.name}.json").write_bytes(STORED.dump_json(table))
+    table.numbers.to_csv(folder / f"{table.name}.csv", index=False)
+
+
+def read_tables(folder: Path) -> list[Table]:
+    """The tables that were written into a folder, by name."""
+    return [STORED.validate_json(path.read_bytes()) for path in sorted(folder.glob("*.json"))]
+
+
+def drawn(table: Table, width: int) -> Group:
+    """A table of at most so many characters, below the first words of its caption.
+
+    Numbers stay whole; the names in the second column are folded. What does not fit even so goes in this order: the
+    paper's figures, the intervals, columns from the right, of which details go first.
+    """
+    shown, rows = list(range(len(table.columns))), table.texts()
+
+    def widths() -> tuple[int, int]:
+        """Characters that the table takes on one line a row, and by how many its names can be folded."""
+        found = [max(map(cell_len, [table.head[place], *(row[place] for row in rows)])) for place in shown]
+        return sum(width + 2 for width in found), max([0, *(width - NARROWEST for width in found[NAMES : NAMES + 1])])
+
+    def fits() -> bool:
+        whole, spare = widths()
+        return whole - spare <= width
+
+    if not fits():
+        shown = [place for place in shown if table.columns[place].role != "paper"]
+    if not fits():
+        rows = table.texts(intervals=False)
+    while len(shown) > 2 and not fits():
+        shown.remove(next((p for p in reversed(shown) if table.columns[p].role == "detail"), shown[-1]))
+    whole, spare = widths()
+    names = NARROWEST + max(spare - max(whole - width, 0), 0)
+    drawing = Drawing(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for number, place in enumerate(shown):
+        drawing.add_column(Text(table.head[place]), justify="left" if number < 2 else "right", overflow="fold")
+    for row in rows:
+        cells = [folded(row[place], names) if number == NAMES else row[place] for number, place in enumerate(shown)]
+        drawing.add_row(*map(Text, cells))
+    title = re.split(r"[:.](?: |$)", table.caption, maxsplit=1)[0]
+    left_out = ", ".join(name for place, name in enumerate(table.head) if place not in shown)
+    below = [Text(f"(wider terminals show {left_out})", style="dim")] if left_out else []
+    return Group(*([Text(title, style="italic")] if title else []), drawing, *below)
+
+
+def folded(name: str, width: int) -> str:
+    """A name on lines of a width, broken behind a slash or blank, else a point or underscore, else anywhere."""
+    line = f".{{1,{width}}}"
+    return "\n".join(re.findall(rf"{line}(?:(?<=[ /])|$)|{line}(?<=[._])|{line}", name))
