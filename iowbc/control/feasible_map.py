@@ -31,6 +31,14 @@ class FeasibleMap:
         low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
         return height.clip(low, high), kept
 
+    def up_to(self, pitch: float | None) -> "FeasibleMap":
+        """The part of the map with pitches of at most `pitch` [rad]; all of it for None."""
+        if pitch is None or pitch >= self.pitch[-1]:
+            return self
+        kept = np.append(self.pitch[self.pitch < pitch], pitch)
+        low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
+        return FeasibleMap(kept, low, high)
+
     def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
         """Whether commands are inside, shape (n,)."""
         clamped_height, clamped_pitch = self.clamp(height, pitch)

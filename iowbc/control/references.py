@@ -35,7 +35,7 @@ class ReferenceLayer:
             from iowbc.control.generator import ReferenceNetwork
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
-            self.feasible = FeasibleMap.load(rg / FEASIBLE)
+            self.feasible = FeasibleMap.load(rg / FEASIBLE).up_to(references.largest_pitch)
         self._start, self._lean = references.arms, references.lean
         self._gravity = ArmGravity(robot) if references.arms.gravity else None
         self._compliance = 1.0 / robot.kp[robot.interaction]

@@ -23,8 +23,10 @@ class Drives:
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
         """Strengths of new episodes."""
-        self.effort[which] = self._robot.effort * drawn["motor_strength"][which]
-        self.effort[which[:, None, None], self._robot.linkages] = drawn["linkage_effort"][which][..., None]
+        pairs, strength = self._robot.linkages, drawn["motor_strength"][which]
+        self.effort[which] = self._robot.effort * strength
+        together = drawn["linkage_effort"][which] * strength[:, pairs].mean(axis=2)
+        self.effort[which[:, None, None], pairs] = together[..., None]
 
     def ranges(self, target: Array, state: SimulationState) -> Array:
         """Least and greatest torque of each motor over the period to come, (n, joints, 2) [N·m]; `target` (n, joints)

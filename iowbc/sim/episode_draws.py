@@ -8,6 +8,7 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.distribution import Distribution
 from iowbc.recipe.simulation.holding import SWITCHES
+from iowbc.recipe.simulation.partner import Partner
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import GRAVITY, Robot
@@ -51,9 +52,9 @@ class Table:
         self._ratio = 1.0 + self._span[self._logarithmic] / self._low[self._logarithmic]
         self._probability = np.array([kind.probability for kind in kinds])
 
-    def draw(self, key: Keys) -> Array:
-        """A row for each key, (k, width)."""
-        chances = random.uniform(key, "episode", self.width + len(self._probability))
+    def draw(self, key: Keys, stream: str) -> Array:
+        """A row for each key from a stream of random numbers, (k, width)."""
+        chances = random.uniform(key, stream, self.width + len(self._probability))
         row = self._low + self._span * chances[:, : self.width]
         logarithmic = self._logarithmic
         row[:, logarithmic] = self._low[logarithmic] * self._ratio ** chances[:, logarithmic]
@@ -81,7 +82,13 @@ class Draws:
             elif name in WITH_WHEELS:
                 self._present[~self._pushing, place] = 0.0
         self._rows = np.tile(self._table.nominal, (n, 1))
+        self._habits = Table(_habits(recipe.partner))
+        self._habit_rows = np.tile(self._habits.nominal, (n, 1))
+        chances = np.array([share for _, share in recipe.partner.behaviours])
+        self._behaviours = np.cumsum(chances)[:-1] / chances.sum()
         self.values: dict[str, Array] = {name: np.ones(n) for name in SWITCHES}
+        self.values["partner_behaviour"] = np.zeros(n)
+        self.values |= {name: self._habit_rows[:, place.start] for name, place in self._habits.columns.items()}
         for name, place in self._table.columns.items():
             if name != PUSH_SHARE:
                 single = place.stop - place.start == 1
@@ -106,10 +113,14 @@ class Draws:
             values[name][which] = 1.0
         if not self.recipe.sensing.enabled:
             values["noise_scale"][which] = 0.0
-        row = self._table.draw(key)
+        self._habit_rows[which] = self._habits.draw(key, "partner")
+        chance = random.uniform(key, "partner/behaviour", 1)[:, 0]
+        values["partner_behaviour"][which] = np.searchsorted(self._behaviours, chance, side="right")
+        row = self._table.draw(key, "episode")
         share, push_share = self._table.columns["partner_share"], self._table.columns[PUSH_SHARE]
         pushing = self._pushing[which]
         row[pushing, share] = row[pushing, push_share]
+        self._draw_uncommon(row, key)
         self._rows[which] = row
         for name, held in fixed.items():
             if name != "object_mass":
@@ -128,6 +139,21 @@ class Draws:
         borne = values["partner_share"][which].clip(0.0, 1.0 - TINY)
         values["grip_shift"][which] = np.minimum(borne / (1.0 - borne) * self._far[which], self._near[which])
         values["slip_force"][which] = values["surface_friction"][which] * self._strength[which]
+
+    def _draw_uncommon(self, row: Array, key: Keys) -> None:
+        """Makes objects light and both latencies long in a part of the episodes; rows (k, width)."""
+        settings = self.recipe.randomization
+        if not settings.enabled or not (settings.light_share or settings.slow_share):
+            return
+        chance = random.uniform(key, "uncommon", 5)
+        light, slow = chance[:, 0] < settings.light_share, chance[:, 1] < settings.slow_share
+        low = settings.object_mass_scale.low
+        scale = low * (max(settings.light_end, low) / low) ** chance[:, 2]
+        row[light, self._table.columns["object_mass_scale"].start] = scale[light]
+        for place, name in enumerate(("action_latency", "sensor_latency"), 3):
+            low, high = getattr(settings, name).low, getattr(settings, name).high
+            latency = high - (high - low) / 3.0 * chance[:, place]
+            row[slow, self._table.columns[name].start] = latency[slow]
 
     def _hold(self, name: str, which: Indices, values: Array) -> None:
         held = which[~np.isnan(values[which])]
@@ -151,6 +177,17 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
     for name in ("share_drift", "stiffness", "damping", "delay", "pace", "noise"):
         entries[f"partner_{name}"] = (getattr(partner, name), 1)
     return entries
+
+
+def _habits(partner: Partner) -> dict[str, tuple[Distribution, int]]:
+    """What is drawn of behaviours; a table of their own, so that they leave all other draws as they are."""
+    sections = {"leader": partner.leader, "stopping": partner.stopping}
+    return {
+        f"{section}_{name}": (value, 1)
+        for section, habits in sections.items()
+        for name, value in habits
+        if isinstance(value, Distribution)
+    }
 
 
 def _off(distribution: Distribution) -> Distribution:

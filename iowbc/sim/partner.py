@@ -1,13 +1,14 @@
 """The second carrier: a spring, a damper and a preload at the object's far handle, on a path of its own.
 
-The path is that of the command, integrated from where the episode began: it knows neither where the robot is nor where
-it heads. All is real sums, products and roots, which round alike however many environments there are; NumPy's complex
-products do not.
+The path is that of the command, integrated from where the episode began, and changed by the partner's behaviour; a
+follower goes where the handle goes. All is real sums, products and roots, which round alike however many environments
+there are; NumPy's complex products do not.
 """
 
 import numpy as np
 
 from iowbc.arrays import Array, Indices
+from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.simulation.partner import Partner as Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
@@ -22,9 +23,13 @@ FEED = 4
 """What the partner hears of the command: v_x, v_y, yaw rate, height."""
 TINY = 1e-9
 """Keeps a division by a length from dividing by zero."""
+SLOW = 0.1
+"""Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
+PATH, FOLLOWER, LEADER, STOPPING, TUGGING, LAGGING = range(len(BEHAVIOURS))
 REMEMBERED = (
     *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
     *("present", "height", "heading", "offset", "aim", "unsteady", "centre", "at", "speed", "arm", "force", "energy"),
+    *("behaviour", "steps", "turning", "sideways", "rise", "stop", "halted", "followed", "attention", "slow"),
 )
 
 
@@ -35,6 +40,7 @@ class Partner:
         n = len(scenes)
         self._recipe, self._period = recipe, period
         things = [scene.object for scene in scenes]
+        self._things = any(things)
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
         ahead = np.array([measured(thing).high[0] if thing else 0.0 for thing in things])
         above = np.array([scene.grasp.height if scene.kind == "lift" else 0.0 for scene in scenes])
@@ -43,7 +49,7 @@ class Partner:
         self._places[:, 0, 0], self._places[:, 0, 2] = ahead, above
         slowest = np.array([measured(thing).about_axes[1:].min() if thing else 1.0 for thing in things])
         self._felt = 1.0 / (1.0 + (ahead * ahead + above * above) / slowest)
-        self._line = DelayLine(n, FEED, recipe.delay.high / period)
+        self._line = DelayLine(n, FEED, max(recipe.delay.high, recipe.lagging.delay) / period)
         self._stiffness, self._damping, self._weight = np.zeros(n), np.zeros(n), np.zeros(n)
         self._resistance, self._bound, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
         self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -52,6 +58,11 @@ class Partner:
         self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), self._places[:, 1]
         self._at, self._speed, self._arm = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._force, self._energy = np.zeros((n, 3)), np.zeros(n)
+        self._behaviour, self._steps, self._attention = np.zeros(n), np.zeros(n, np.int64), np.ones(n)
+        self._turning, self._sideways, self._rise = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._stop, self._halted = np.zeros((n, 2)), np.zeros(n)
+        """Begin and end of a stop [s]; part of the commanded velocity that remains in it."""
+        self._followed, self._slow = np.zeros((n, 2)), np.full(n, TINY)
         self._keep = float(np.exp(-period / recipe.noise_time))
         self._keep_share = float(np.exp(-period / recipe.drift_time))
         self._derive()
@@ -70,16 +81,15 @@ class Partner:
         self._bound[which] = np.where(
             pushing, np.minimum(self._recipe.push_yielding * np.abs(share) * resistance, strongest), strongest
         )
-        self._pace[which] = drawn["partner_pace"][which]
+        self._behave(which, drawn)
         self._present[which], self._share[which] = present, share
         unsteady = np.where(pushing, resistance / self._recipe.noise_resistance, 1.0) * drawn["partner_noise"][which]
         self._gust[which] = present * unsteady * np.sqrt(1.0 - self._keep**2)
         self._drift[which] = present * drawn["partner_share_drift"][which] * np.sqrt(1.0 - self._keep_share**2)
         self._centre[which] = drawn["object_com_offset"][which]
-        self._line.set_latency(which, drawn["partner_delay"][which] / self._period)
         self._line.fill(which, np.zeros((len(which), FEED)))
-        for values in (self._unsteady, self._wandering, self._energy, self._force):
-            values[which] = 0.0
+        for values in (self._unsteady, self._wandering, self._energy, self._force, self._followed, self._steps):
+            values[which] = 0
         self._height[which] = np.nan
         self._observe(state)
         self._aim[which] = self._at[which]
@@ -91,9 +101,27 @@ class Partner:
         self._offset[which, 1] = forward[:, 0] * away[:, 1] - forward[:, 1] * away[:, 0]
         self._derive()
 
+    def _behave(self, which: Indices, drawn: dict[str, Array]) -> None:
+        """Takes over what was drawn of the behaviours of some environments."""
+        behaviour, delay = drawn["partner_behaviour"][which], drawn["partner_delay"][which]
+        leads, lags = behaviour == LEADER, behaviour == LAGGING
+        self._behaviour[which] = behaviour
+        self._pace[which] = np.where(leads, drawn["leader_pace"][which], drawn["partner_pace"][which])
+        for name in ("turning", "sideways", "rise"):
+            getattr(self, f"_{name}")[which] = leads * drawn[f"leader_{name}"][which]
+        begin, duration = drawn["stopping_begin"][which], drawn["stopping_duration"][which]
+        self._stop[which] = np.stack([begin, begin + duration], axis=1)
+        self._halted[which] = -drawn["stopping_reverse"][which]
+        self._slow[which] = np.where(behaviour == FOLLOWER, SLOW, TINY)
+        self._attention[which] = 1.0 - np.exp(-self._period / np.maximum(delay, self._period))
+        self._damping[which] *= np.where(lags, self._recipe.lagging.damping, 1.0)
+        self._line.set_latency(which, np.where(lags, self._recipe.lagging.delay, delay) / self._period)
+
     def _derive(self) -> None:
-        """What follows from the shares that were drawn."""
+        """What follows from the shares and behaviours that were drawn."""
         self._any = bool(self._present.any())
+        there = self._present > 0.0
+        self._which = [np.flatnonzero(there & (self._behaviour == kind)) for kind in range(len(BEHAVIOURS))]
         sign = np.sign(self._share)
         self._least, self._most = np.minimum(0.0, sign), np.maximum(0.0, sign)
 
@@ -110,7 +138,8 @@ class Partner:
             return
         self._share_now(gust[:, 2], state)
         velocity = self._path(commanded)
-        along = velocity[:, :2] / (_length(velocity) + TINY)[:, None]
+        state.partner_velocity[:] = velocity * self._present[:, None]
+        along = velocity[:, :2] / (_length(velocity) + self._slow)[:, None]
         lead = self._aim + velocity * self._period - self._at
         lead[:, :2] *= np.minimum(1.0, self._recipe.leash / (_length(lead) + TINY))[:, None]
         lead[:, 2] = lead[:, 2].clip(-self._recipe.leash, self._recipe.leash)
@@ -127,7 +156,9 @@ class Partner:
         force[:, :2] += self._unsteady
         force[:, :2] += along * (state.partner_share * self._resistance)[:, None]
         force[:, 2] += state.partner_share * self._weight
+        self._tug(force)
         force *= self._present[:, None]
+        self._steps += 1
         out[:, :3] = force
         out[:, 3:] = rotations.cross(self._arm, force)
 
@@ -154,8 +185,56 @@ class Partner:
         velocity[:, 1] = sine * wanted[:, 0] + cosine * wanted[:, 1] + wanted[:, 2] * offset_x
         velocity[:, :2] *= self._pace[:, None]
         velocity[:, 2] = wanted[:, 3]
-        self._turn(wanted[:, 2] * self._period)
+        rate = wanted[:, 2]
+        if len(self._which[LEADER]):
+            rate = rate + self._lead(self._which[LEADER], wanted, velocity)
+        if len(self._which[STOPPING]):
+            self._halt(self._which[STOPPING], velocity)
+        if len(self._which[FOLLOWER]):
+            self._follow(self._which[FOLLOWER], velocity)
+        self._turn(rate * self._period)
         return velocity
+
+    def _lead(self, which: Indices, wanted: Array, velocity: Array) -> Array:
+        """Adds drift and height profile of leaders (k,) to their velocity; returns yaw rates to add, (n,) [rad/s]."""
+        walking = wanted[which, :2].any(axis=1)
+        aside = walking * self._sideways[which]
+        velocity[which, 0] -= self._heading[which, 1] * aside
+        velocity[which, 1] += self._heading[which, 0] * aside
+        pulse = 2.0 * np.pi / self._recipe.leader.rise_period
+        velocity[which, 2] += self._rise[which] * pulse * np.cos(pulse * self._period * self._steps[which])
+        rate = np.zeros(len(velocity))
+        rate[which] = walking * self._turning[which]
+        return rate
+
+    def _halt(self, which: Indices, velocity: Array) -> None:
+        """Stops or reverses partners (k,) during their stop, and brings them back to the handle after it."""
+        begin, end = self._stop[which].T
+        now = self._steps[which] * self._period
+        stopped, resumed = which[(now >= begin) & (now < end)], which[now >= end]
+        velocity[stopped, :2] *= self._halted[stopped, None]
+        velocity[resumed, :2] += (self._at - self._aim)[resumed, :2] / self._recipe.stopping.catching_up
+
+    def _follow(self, which: Indices, velocity: Array) -> None:
+        """Lets the aim of followers (k,) go with the handle: the handle's low-passed velocity, and the distance from
+        where it was a period ago over the reaction time, so that a steady motion leaves no distance."""
+        attention = self._attention[which, None]
+        followed = self._followed[which] + attention * (self._speed[which, :2] - self._followed[which])
+        away = (self._at - self._aim)[which, :2] - followed * self._period
+        self._followed[which] = followed
+        velocity[which, :2] = followed + away * attention / self._period
+
+    def _tug(self, force: Array) -> None:
+        """Adds the pulls of tugging partners: forward, left, backward, right in turn, in their heading."""
+        which, tugging = self._which[TUGGING], self._recipe.tugging
+        if not len(which):
+            return
+        turns, within = np.divmod(self._steps[which] * self._period, tugging.interval)
+        pull = tugging.force * (within < tugging.duration)
+        ahead, left = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])[:, turns.astype(np.int64) % 4] * pull
+        cosine, sine = self._heading[which].T
+        force[which, 0] += cosine * ahead - sine * left
+        force[which, 1] += sine * ahead + cosine * left
 
     def _turn(self, angle: Array) -> None:
         """Turns the path's heading by small angles (n,) [rad], by Cayley's form of a rotation."""
@@ -168,10 +247,12 @@ class Partner:
 
     def observe(self, state: SimulationState) -> None:
         """Follows the handle over a period, and adds up the work done on it."""
-        if not self._any:
+        if not self._things:
             return
         before = self._at
         self._observe(state)
+        if not self._any:
+            return
         way = self._at - before
         self._energy += self._force[:, 0] * way[:, 0] + self._force[:, 1] * way[:, 1] + self._force[:, 2] * way[:, 2]
         state.partner_force[:] = self._force
@@ -182,6 +263,7 @@ class Partner:
         out = places[:, 0]
         self._at = state.object_position + out
         self._speed = state.object_linear_velocity + rotations.cross(state.object_angular_velocity, out)
+        state.handle_velocity[:] = self._speed
         self._arm = out - places[:, 1]
 
     def handle(self, env: int) -> Array:

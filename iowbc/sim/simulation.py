@@ -32,6 +32,7 @@ STARTS_AT_ZERO = (
     "joint_acceleration",
     "slipped",
     "partner_force",
+    "partner_velocity",
     "partner_energy",
     "partner_share",
     "external_force",

@@ -82,6 +82,10 @@ class SimulationState(_Arrays):
     """Size of the force of links other than the hands, or of the ground, on the object, (n,) [N]."""
     partner_force: Array
     """Force of the partner on the object, (n, 3) [N]."""
+    partner_velocity: Array
+    """Velocity that the partner intends for the handle, (n, 3) [m/s]; zero without a partner."""
+    handle_velocity: Array
+    """Of the object's far handle, where a partner takes hold, (n, 3) [m/s]; zero without an object."""
     partner_share: Array
     """Share of the weight, or in a push of the rolling resistance, that the partner bears at the time, (n,)."""
     partner_energy: Array

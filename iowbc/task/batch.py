@@ -136,7 +136,12 @@ class Batch:
         memory.steps += 1
         self.guidance.turn(memory)
         judgement = self.judge.judge(
-            simulation.state, memory, action, self.guidance.object_place(memory), simulation.disturbed
+            simulation.state,
+            memory,
+            action,
+            place=self.guidance.object_place(memory),
+            disturbed=simulation.disturbed,
+            resistance=simulation.drawn["rolling_resistance"],
         )
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
         if self._schedule.repeats:

@@ -17,6 +17,7 @@ from iowbc.task.motion import Motion, low_pass, motion
 from iowbc.task.progress import follow, heading_error
 from iowbc.task.rewards.reward import RewardFunction, Scored
 from iowbc.task.rewards.table import Step
+from iowbc.task.yielding import Admittance, excess_force
 
 
 @dataclass(frozen=True)
@@ -53,21 +54,34 @@ class Judge:
         self._support, self._lateral = support, lateral
         self._holding, self._followable, self._period = holding, followable, period
         self._reward = RewardFunction(recipe.task.reward, period, own=own_terms)
+        self._admittance = Admittance(recipe.task.reward.yielding, holding)
         self._velocity = np.zeros((len(holding), 3))
 
     def motion(self, state: SimulationState) -> Motion:
         """The motion in a simulation state."""
         return motion(state, self._height)
 
-    def judge(self, state: SimulationState, memory: Memory, action: Array, place: Array, disturbed: Mask) -> Judgement:
+    def judge(
+        self,
+        state: SimulationState,
+        memory: Memory,
+        action: Array,
+        *,
+        place: Array,
+        disturbed: Mask,
+        resistance: Array,
+    ) -> Judgement:
         """The step just made with an action (n, 15).
 
-        `place`: where a held object belongs, (n, 3) [m]; `disturbed`: where an impulse or a push acted, (n,).
+        `place`: where a held object belongs, (n, 3) [m]; `disturbed`: where an impulse or a push acted, (n,);
+        `resistance`: of a crate's wheels, (n,) [N].
         """
         moved = self.motion(state)
-        self._filter(memory, moved)
+        needed = np.where(memory.infeasible, 0.0, resistance * (1.0 - state.partner_share))
+        self._filter(memory, moved, needed)
         error = heading_error(moved, memory)
-        follow(memory, error, disturbed, self._task.termination, self._period)
+        target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
+        follow(memory, target, error, disturbed, self._task.termination, self._period)
         ending = self._ending(state, memory, moved, place, error)
         foot_phase, stance = gait.foot_phase(np, memory.phase), self._task.references.gait.stance
         step = Step(
@@ -77,6 +91,8 @@ class Judge:
             support=self._support,
             lateral=self._lateral,
             command=memory.command,
+            target_velocity=target,
+            unyielded_force=self._admittance.unyielded(memory.command[:, :YAW_RATE], memory.excess_force),
             height_rate=memory.height_rate,
             support_reference=memory.support,
             filtered_velocity=memory.filtered_velocity,
@@ -93,11 +109,13 @@ class Judge:
         )
         return Judgement(moved, ending, self._reward(step, ending.diverged), memory.command.copy(), error)
 
-    def _filter(self, memory: Memory, moved: Motion) -> None:
+    def _filter(self, memory: Memory, moved: Motion, needed: Array) -> None:
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
         self._velocity[:, YAW_RATE] = moved.yaw_rate
         time_constant = self._task.reward.sync.filter_time
         memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
+        force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
+        memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(
         self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array

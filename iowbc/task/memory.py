@@ -18,7 +18,18 @@ SCALARS = (
 )
 """Real numbers, one an environment."""
 OF_EPISODE = (
-    *("action", "filtered_velocity", "lag", "tracking", "walked", "commanded", "covered", "heading_error", "total"),
+    *(
+        "action",
+        "filtered_velocity",
+        "excess_force",
+        "lag",
+        "tracking",
+        "walked",
+        "commanded",
+        "covered",
+        "heading_error",
+        "total",
+    ),
 )
 """What begins at zero with every episode."""
 LONG_AGO = 1_000_000
@@ -67,6 +78,8 @@ class Memory:
     """a_{t−1}, (n, 15)."""
     filtered_velocity: Array
     """Low-passed v_sys in the plane, heading frame [m/s], and yaw rate [rad/s], (n, 3)."""
+    excess_force: Array
+    """Low-passed horizontal force on the hands beyond what the transport needs, heading frame, (n, 2) [N]."""
     heading_offset: Array
     """Measured less true heading at the start of the episode, (n,) [rad]: the origin of what is measured."""
     heading_reference: Array
@@ -110,6 +123,7 @@ class Memory:
             support=np.zeros((n, support)),
             action=np.zeros((n, support)),
             filtered_velocity=np.zeros((n, 3)),
+            excess_force=np.zeros((n, 2)),
             object_place=np.zeros((n, 3)),
         )
 

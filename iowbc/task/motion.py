@@ -41,6 +41,8 @@ class Motion:
     """Force of the ground on each foot, (n, 2, 3) [N]."""
     object_offset: Array
     """Object from the base, (n, 3) [m]; zero without an object."""
+    hand_force: Array
+    """Force of the object on both hands together, (n, 3) [N]."""
     external_force: Array
     """Force of partner and impulses on the object, (n, 3) [N]."""
     external_torque: Array
@@ -52,7 +54,7 @@ class Motion:
 def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") -> Motion:
     """The motion in a simulation state; `height`: what H speaks of."""
     rotation, base = state.base_rotation, state.base_position
-    vectors = np.empty((len(base), 10, 3))
+    vectors = np.empty((len(base), 11, 3))
     vectors[:, 0] = state.system_velocity
     vectors[:, 1] = state.base_linear_velocity
     np.subtract(state.foot_position, base[:, None], out=vectors[:, 2:4])
@@ -61,6 +63,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
     vectors[:, 6] *= state.has_object[:, None]
     vectors[:, 7:9] = state.external_force.reshape(-1, 2, 3)
     vectors[:, 9] = state.push_force
+    np.add(state.grip_force[:, 0], state.grip_force[:, 1], out=vectors[:, 10])
     to_heading(rotation, vectors)
     return Motion(
         heading=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]),
@@ -75,6 +78,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
         foot_position=vectors[:, 2:4],
         foot_force=vectors[:, 4:6],
         object_offset=vectors[:, 6],
+        hand_force=vectors[:, 10],
         external_force=vectors[:, 7],
         external_torque=vectors[:, 8],
         push_force=vectors[:, 9],

@@ -21,11 +21,13 @@ def heading_error(moved: Motion, memory: Memory) -> Array:
     return error
 
 
-def follow(memory: Memory, error: Array, disturbed: Mask, termination: Termination, period: float) -> None:
-    """Takes the step just made, of `period` [s], into the sums; `error`: of the heading, (n,) [rad]."""
-    command = memory.command[:, :YAW_RATE]
-    speed = np.hypot(command[:, 0], command[:, 1])
-    along = progress(memory.filtered_velocity[:, :YAW_RATE], command)
+def follow(
+    memory: Memory, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
+) -> None:
+    """Takes the step just made, of `period` [s], into the sums; `target`: velocity asked for, heading frame, (n, 2)
+    [m/s]; `error`: of the heading, (n,) [rad]."""
+    speed = np.hypot(target[:, 0], target[:, 1])
+    along = progress(memory.filtered_velocity[:, :YAW_RATE], target)
     memory.walked += memory.command[:, VELOCITY].any(axis=1)
     memory.commanded += speed * period
     memory.covered += along * period

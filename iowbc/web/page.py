@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from iowbc.control.feasible_map import FEASIBLE
+from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.deploy import exported_folder
 from iowbc.evaluation.exported import exported_world
 from iowbc.robot.description import load_robot
@@ -25,17 +25,19 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     parts = npm_parts(cache, say)
     world = exported_world(exported)
     out.mkdir(parents=True, exist_ok=True)
-    feasible = f"{exported_folder.GENERATOR}/{FEASIBLE}"
-    taken = [name for name in (exported_folder.GOLDEN, feasible) if (exported / name).is_file()]
-    for name in (exported_folder.GRAPH, exported_folder.CONTRACT, *taken):
-        shutil.copyfile(exported / name, out / Path(name).name)
+    golden = [exported_folder.GOLDEN] if (exported / exported_folder.GOLDEN).is_file() else []
+    for name in (exported_folder.GRAPH, exported_folder.CONTRACT, *golden):
+        shutil.copyfile(exported / name, out / name)
+    feasible = exported / exported_folder.GENERATOR / FEASIBLE
+    if feasible.is_file():
+        FeasibleMap.load(feasible).up_to(world.recipe.task.references.largest_pitch).save(out / FEASIBLE)
     robot = load_robot(world.robot)
     about = {
         "scenes": web_scenes(world, robot),
         "first": first_scene(world.recipe),
         "kinematics": kinematics(robot),
-        "feasible": FEASIBLE if feasible in taken else None,
-        "golden": exported_folder.GOLDEN if exported_folder.GOLDEN in taken else None,
+        "feasible": FEASIBLE if feasible.is_file() else None,
+        "golden": exported_folder.GOLDEN if golden else None,
     }
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")
     bundle(parts, out)

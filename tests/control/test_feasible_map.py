@@ -38,6 +38,16 @@ def test_clamping_is_idempotent_and_keeps_what_is_inside(region: FeasibleMap) ->
     assert not region.contains(np.array([0.55]), np.array([0.0]))[0]
 
 
+def test_a_map_ends_at_the_largest_pitch_that_is_asked_for(region: FeasibleMap) -> None:
+    shorter = region.up_to(0.75)
+    np.testing.assert_allclose(shorter.pitch, [0.0, 0.5, 0.75])
+    np.testing.assert_allclose([shorter.low[-1], shorter.high[-1]], [0.6, 0.75])
+    height, pitch = shorter.clamp(np.array([0.9]), np.array([1.0]))
+    np.testing.assert_allclose([height[0], pitch[0]], [0.75, 0.75])
+    assert region.up_to(None) is region
+    assert region.up_to(2.0) is region
+
+
 def test_a_longer_run_elsewhere_does_not_draw_the_map_from_the_nominal_command() -> None:
     """An island of refused heights splits one pitch; the part with the nominal height goes on, however short."""
     heights = np.linspace(0.5, 0.8, 7)

@@ -89,3 +89,12 @@ def test_explicit_joint_control_at_a_step_that_buzzes_is_refused_with_the_longes
         Simulation(robot, explicit, envs=np.arange(1), seed=0, scenes=["free"])
     stable = changed(explicit, "physics.timestep", 0.002)
     Simulation(robot, stable, envs=np.arange(1), seed=0, scenes=["free"])
+
+
+def test_weak_motors_weaken_the_linkages_that_they_move(robot):
+    motors = Drives(robot, Physics(), 1)
+    strength = np.full((1, len(robot.joints)), 0.8)
+    motors.reset(np.arange(1), {"motor_strength": strength, "linkage_effort": np.full((1, len(robot.linkages)), 40.0)})
+    assert motors.effort[0, robot.linkages] == pytest.approx(32.0)
+    others = np.setdiff1d(np.arange(len(robot.joints)), robot.linkages)
+    assert motors.effort[0, others] == pytest.approx(0.8 * robot.effort[others])

@@ -101,3 +101,32 @@ def test_slip_force_is_surface_friction_times_the_strength_of_the_grasp(start):
 def test_latency_beyond_the_delay_line_names_the_recipe(start):
     with pytest.raises(ValueError, match=r"latency of 9 periods.*randomization\.longest_latency"):
         start(Recipe(), ["lift"], action_latency=9.0)
+
+
+def test_a_share_of_the_objects_is_light(start):
+    recipe = changed(Recipe(), "randomization.object_mass_scale.low", 0.05 / 7.0)
+    recipe = changed(recipe, "randomization.light_share", 0.5)
+    mass = start(recipe, ["lift"] * 400).drawn["object_mass"]
+    light = mass < 0.7
+    assert light.mean() == pytest.approx(0.5 + 0.5 * 0.65 / 10.45, abs=0.08)
+    assert 0.05 <= mass.min() < 0.07, "down to the lower end"
+    assert np.median(mass[light]) == pytest.approx(np.sqrt(0.05 * 0.7), rel=0.3), "evenly in the logarithm"
+
+
+def test_a_share_of_the_episodes_has_both_latencies_long(start):
+    def both(recipe):
+        drawn = start(recipe, ["lift"] * 400).drawn
+        return ((drawn["action_latency"] > 2.0 / 3.0) & (drawn["sensor_latency"] > 2.0 / 3.0)).mean()
+
+    assert both(Recipe()) == pytest.approx(1.0 / 9.0, abs=0.05)
+    slow = changed(Recipe(), "randomization.slow_share", 0.4)
+    assert both(slow) == pytest.approx(0.4 + 0.6 / 9.0, abs=0.08)
+    assert max(start(slow, ["lift"] * 400).drawn[f"{name}_latency"].max() for name in ("action", "sensor")) <= 1.0
+
+
+def test_shares_of_uncommon_episodes_leave_the_others_as_they_are(start):
+    usual = start(Recipe(), ["lift"] * COUNT).drawn
+    slow = start(changed(Recipe(), "randomization.slow_share", 0.3), ["lift"] * COUNT).drawn
+    same = usual["action_latency"] == slow["action_latency"]
+    assert 0 < (~same).sum() < COUNT
+    assert np.array_equal(usual["object_mass"], slow["object_mass"])

@@ -178,7 +178,7 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
         update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
     )
     RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]))  # type: ignore[arg-type]
-    idle = {"alive", "sync.support_reference", "sync.lateral_reference", "object.beside"}
+    idle = {"alive", "sync.support_reference", "sync.lateral_reference", "object.beside", "yielding.force"}
     assert set(TERMS) - set(called) == idle
 
 

@@ -1,11 +1,11 @@
 """Scenes, and quantities of an episode that a trial may hold at a value, by name: checked when a recipe is read."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from iowbc.recipe.simulation.distribution import Distribution
-from iowbc.recipe.simulation.partner import Partner
+from iowbc.recipe.simulation.partner import BEHAVIOURS, Leader, Partner, Stopping
 from iowbc.recipe.simulation.randomization import Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
@@ -24,8 +24,15 @@ HOLDABLE = (
         for name, field in Partner.model_fields.items()
         if field.annotation is Distribution and name != "push_share"  # in a push it is drawn as the partner's share
     ),
+    *(
+        f"{section}_{name}"
+        for section, kind in (("leader", Leader), ("stopping", Stopping))
+        for name, field in kind.model_fields.items()
+        if field.annotation is Distribution
+    ),
     *SWITCHES,
     "object_mass",
+    "partner_behaviour",
 )
 """Names of what is drawn for an episode."""
 
@@ -43,8 +50,17 @@ def _known_quantities(held: dict[str, float]) -> dict[str, float]:
     return held
 
 
+def _behaviour_by_name(held: Any) -> Any:
+    """`partner_behaviour: leader` becomes its place in `BEHAVIOURS`."""
+    if not (isinstance(held, dict) and isinstance(name := held.get("partner_behaviour"), str)):
+        return held
+    if name not in BEHAVIOURS:
+        raise ValueError(f"no partner behaviour {name!r}; valid: {', '.join(BEHAVIOURS)}")
+    return held | {"partner_behaviour": float(BEHAVIOURS.index(name))}
+
+
 ObjectScene = Annotated[
     str, AfterValidator(_with_object), Field(json_schema_extra={"examples": [name for name in SCENES if name != FREE]})
 ]
 """A scene with an object; which ones there are, the recipe says."""
-Held = Annotated[dict[str, float], AfterValidator(_known_quantities)]
+Held = Annotated[dict[str, float], AfterValidator(_known_quantities), BeforeValidator(_behaviour_by_name)]

@@ -1,14 +1,87 @@
 """The second carrier, at the object's far handle."""
 
-from pydantic import Field
+from typing import Self
 
-from iowbc.recipe.section import Section
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.distribution import Distribution
+
+TRAINED = ("path", "follower", "leader", "stopping")
+"""Behaviours that training may draw."""
+BEHAVIOURS = (*TRAINED, "tugging", "lagging")
+"""All behaviours; a trial holds `partner_behaviour` at a place in this list. The last two are for evaluation alone."""
+
+
+class Behaviours(Section):
+    """How often a partner behaves in which way; only the proportions matter. An absent partner has the share 0."""
+
+    path: float = Field(default=1.0, ge=0.0)
+    """Follows the commanded motion and height from where the episode began, wherever the robot is."""
+    follower: float = Field(default=0.0, ge=0.0)
+    """Carries its share and moves with the handle: no horizontal force at a constant velocity."""
+    leader: float = Field(default=0.0, ge=0.0)
+    """Has a pace, a heading, a sideways drift and a height of its own, which the command does not contain."""
+    stopping: float = Field(default=0.0, ge=0.0)
+    """Follows the commanded motion, stops or reverses suddenly, and resumes."""
+
+    @model_validator(mode="after")
+    def _one_is_possible(self) -> Self:
+        if self.path + self.follower + self.leader + self.stopping <= 0.0:
+            raise ValueError("every behaviour has the share 0: give at least one of them a positive share")
+        return self
+
+
+class Leader(Section):
+    """Motion of a leading partner beside the commanded one."""
+
+    pace: Distribution = Distribution(low=0.0, high=1.5, nominal=1.0)
+    """Speed as a part of the commanded one: from standing to half as fast again."""
+    turning: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
+    """Yaw rate that is added to the commanded one while walking [rad/s]: up to half a radian of drift in a trial."""
+    sideways: Distribution = Distribution(low=-0.1, high=0.1, nominal=0.0)
+    """Velocity to the left that is added while walking [m/s]; up to half of the largest commanded one."""
+    rise: Distribution = Distribution(low=0.0, high=0.06, nominal=0.0)
+    """Amplitude of its own height profile, a sine [m]; hands rise and sink by this in a natural gait with a load."""
+    rise_period: float = Field(default=4.0, gt=0.0)
+    """Period of that profile [s]; three or four steps."""
+
+
+class Stopping(Section):
+    """A sudden stop of the partner."""
+
+    begin: Distribution = Distribution(low=2.0, high=10.0, nominal=5.0)
+    """Time of the stop in the episode [s]."""
+    duration: Distribution = Distribution(low=1.0, high=4.0, nominal=2.5)
+    """Time until the partner resumes [s]."""
+    reverse: Distribution = Distribution(low=0.2, high=0.6, nominal=0.0, probability=0.5)
+    """Backward speed during the stop as a part of the commanded one; 0 stands still."""
+    catching_up: float = Field(default=1.0, gt=0.0)
+    """Time in which the partner comes back to the handle after the stop [s]; without, it would hold back for ever."""
+
+
+class Tugging(Section):
+    """Periodic pulls of a partner that otherwise follows the path."""
+
+    force: float = Field(default=40.0, ge=0.0)
+    """Horizontal force of a pull [N]; a firm pull of one arm, half of `strongest`."""
+    interval: float = Field(default=2.0, gt=0.0)
+    """Time from one pull to the next [s]."""
+    duration: float = Field(default=0.5, gt=0.0)
+    """Time that a pull lasts [s]; longer than a step, so that it cannot be waited out."""
+
+
+class Lagging(Section):
+    """A partner that reacts late and hardly damps."""
+
+    delay: float = Field(default=0.6, ge=0.0)
+    """Time by which it lags behind the commanded motion [s]: twice the largest that training draws."""
+    damping: float = Field(default=0.25, ge=0.0)
+    """Part of the drawn damping that it has."""
 
 
 class Partner(Section):
-    """A compliant carrier: a spring, a damper and a preload at the far handle, on the path and at the height that the
-    commands describe from where the episode began."""
+    """A compliant carrier: a spring, a damper and a preload at the far handle. Its behaviour decides where it goes."""
 
     enabled: bool = True
     """Off leaves the robot alone with the object."""
@@ -26,8 +99,18 @@ class Partner(Section):
     """Damping at the handle [N·s/m]."""
     delay: Distribution = Distribution(low=0.05, high=0.3, nominal=0.15)
     """Time by which the partner lags behind the commanded motion [s]; human reaction times."""
+    behaviours: Behaviours = Field(default=Behaviours(), json_schema_extra=LATER)
+    """Behaviours that are drawn for the episodes."""
+    leader: Leader = Field(default=Leader(), json_schema_extra=LATER)
+    """Motion of a leader."""
+    stopping: Stopping = Field(default=Stopping(), json_schema_extra=LATER)
+    """When a stopping partner stops."""
+    tugging: Tugging = Field(default=Tugging(), json_schema_extra=LATER)
+    """Pulls of a tugging partner; evaluation alone."""
+    lagging: Lagging = Field(default=Lagging(), json_schema_extra=LATER)
+    """Reaction of a lagging partner; evaluation alone."""
     pace: Distribution = Distribution(low=0.7, high=1.2, nominal=1.0)
-    """Speed of the partner as a part of the commanded one: below 1 it holds back, above 1 it pulls."""
+    """Speed of a partner on the path as a part of the commanded one: below 1 it holds back, above 1 it pulls."""
     noise: Distribution = Distribution(low=0.0, high=8.0, nominal=0.0)
     """Standard deviation of the partner's unsteady force, per horizontal axis [N]."""
     noise_resistance: float = Field(default=40.0, gt=0.0)

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.distribution import Distribution
 
 
@@ -14,6 +14,11 @@ class Randomization(Section):
     object_mass_scale: Distribution = Distribution(low=0.07, high=1.5, nominal=1.0)
     """Object mass as a part of the nominal one: from 0.5 kg in the hands and a crate of 5 kg, the lightest loads of the
     trials, to 150 %. Table I has 50 to 150 %."""
+    light_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
+    """Part of the episodes whose object is light: its mass is log-uniform between the lower end of `object_mass_scale`
+    and `light_end`. A range that begins at 0.05 kg and is drawn evenly has 4 % of its masses below 0.5 kg."""
+    light_end: float = Field(default=0.1, gt=0.0, json_schema_extra=LATER)
+    """Heaviest light object as a part of the nominal mass: 0.7 kg in the hands, a crate of 6.5 kg."""
     inertia_scale: Distribution = Distribution(low=0.8, high=1.2, nominal=1.0)
     """Object inertia as a part of that of a uniform body of its mass."""
     object_com_offset: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
@@ -39,8 +44,8 @@ class Randomization(Section):
     motor_strength: Distribution = Distribution(low=0.85, high=1.0, nominal=1.0)
     """Torque limit of each joint as a part of its nominal one; batteries run down and motors warm up."""
     linkage_effort: Distribution = Distribution(low=35.0, high=50.0, nominal=50.0)
-    """Torque that the two joints of a linkage (ankles, waist roll and pitch) have together [N·m]; public sources give
-    35 and 50."""
+    """Torque that the two joints of a linkage (ankles, waist roll and pitch) have together at full motor strength
+    [N·m]; public sources give 35 and 50. The mean strength of the two motors scales it."""
     encoder_bias: Distribution = Distribution(low=-0.015, high=0.015, nominal=0.0)
     """Constant error of each joint position sensor [rad]; the joint controllers take it for true, too."""
     imu_tilt: Distribution = Distribution(low=-0.03, high=0.03, nominal=0.0)
@@ -56,6 +61,9 @@ class Randomization(Section):
     """Delay of the joint targets [control periods], to the nearest physics step."""
     sensor_latency: Distribution = Distribution(low=0.0, high=1.0, nominal=0.0)
     """Delay of joint and inertial measurements [control periods]."""
+    slow_share: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
+    """Part of the episodes in which action and sensor latency are both in the upper third of their ranges. Drawn
+    independently, one in nine has both, and robots that stand either of them fall with both."""
     object_latency: Distribution = Distribution(low=0.0, high=2.0, nominal=0.0)
     """Delay of the measured pose and rates of the object [control periods]."""
     longest_latency: int = Field(default=4, ge=1, le=100)

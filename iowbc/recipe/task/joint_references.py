@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Named, Section
+from iowbc.recipe.section import LATER, Named, Section
 
 Vector = tuple[float, float, float]
 
@@ -108,6 +108,9 @@ class References(Section):
     chest at the height of the object's upper edge, so that the torso does not come to lie on it."""
     loads: Loads = Loads()
     """What the arms expect to carry in each scene."""
+    largest_pitch: float | None = Field(default=None, gt=0.0, le=1.6, json_schema_extra=LATER)
+    """Torso pitch at which commands are clamped, before the feasible map ends [rad]. The map holds what has a support
+    posture in equilibrium; a policy may hold less. Empty clamps to the map alone."""
     arms: ArmReference = ArmReference()
     """Arm references."""
     gait: GaitPrior = GaitPrior()

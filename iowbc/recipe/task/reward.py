@@ -102,6 +102,29 @@ class GaitConstraint(Section):
     """Lateral distance of the feet below which `foot_distance` counts [m]."""
 
 
+class Yielding(Section):
+    """Compliance to what pushes the hands horizontally: partner, impulses, a blocked crate.
+
+    The paper tracks v_coll whatever the force, the default. With a damping b, velocity terms and curriculum ask for
+    v_coll + F/b, F being the horizontal force of the object on the hands beyond what the transport needs.
+    """
+
+    held: float | None = Field(default=None, gt=0.0)
+    """Damping b of a held object [N·s/m]; empty is infinite, as in the paper. At 60 a partner that stands still while
+    0.5 m/s are commanded is followed at 40 N."""
+    pushed: float | None = Field(default=None, gt=0.0)
+    """Damping b of a pushed crate [N·s/m]; empty is infinite. At 280 a robot leans on a blocked crate with 75 N a hand
+    while 0.5 m/s are commanded: over half of what the friction of its feet allows, and under 90 N."""
+    margin: float = Field(default=10.0, ge=0.0)
+    """Force that is never answered [N]: what an 8 kg box needs to follow the steps of a gait."""
+    largest_speed: float = Field(default=0.6, gt=0.0)
+    """Largest change of the velocity that is asked for [m/s]; the top speed of commands."""
+    force: float = 0.0
+    """Weight of the force beyond the margin and b·|v_coll|, at which the robot should have yielded altogether [N]."""
+    largest_force: float = Field(default=100.0, gt=0.0)
+    """Force beyond which `force` costs no more [N]: a blow says no more."""
+
+
 class OwnTerm(OwnFunction):
     """A term that is a function in a file of one's own. It takes a `Step` (iowbc/task/rewards/table.py) of n
     environments and returns a value for each, (n,)."""
@@ -128,6 +151,8 @@ class Reward(Section):
     """Whole-body smoothness."""
     gait: GaitConstraint = GaitConstraint()
     """Gait constraint."""
+    yielding: Yielding = Field(default=Yielding(), json_schema_extra=LATER)
+    """Compliance of hands and velocity."""
     alive: float = 0.5
     """Reward a second for not having fallen."""
     termination: float = -3.0

@@ -32,6 +32,10 @@ class Step:
     """Support joints that do not turn about the lateral axis, among the support joints."""
     command: Array
     """C in force during the step, (n, 11)."""
+    target_velocity: Array
+    """Planar velocity asked for: the command's, changed by the force to which the robot yields, (n, 2) [m/s]."""
+    unyielded_force: Array
+    """Horizontal force on the hands at which the robot should have yielded altogether, and beyond, (n,) [N]."""
     height_rate: Array
     """Rate of change of the commanded height, (n,) [m/s]."""
     support_reference: Array
@@ -69,9 +73,9 @@ TERMS: dict[str, Term] = {
     "sync.lateral_reference": lambda s: sync.support_reference(
         s.state.joint_position[:, s.support][:, s.lateral], s.support_reference[:, s.lateral]
     ),
-    "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
+    "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
     "sync.yaw_rate": lambda s: sync.yaw_rate(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
-    "sync.progress": lambda s: sync.progress(s.filtered_velocity[:, :YAW_RATE], s.command[:, :YAW_RATE]),
+    "sync.progress": lambda s: sync.progress(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
     "sync.turning": lambda s: sync.turning(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
     "sync.heading": lambda s: sync.heading(s.heading_error),
     "sync.height": lambda s: sync.height(s.motion.height, s.command[:, HEIGHT]),
@@ -99,6 +103,7 @@ TERMS: dict[str, Term] = {
     "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_force),
     "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
+    "yielding.force": lambda s: s.unyielded_force,
     "alive": lambda s: np.ones(len(s.command)),
     "termination": lambda s: s.ended,
 }
