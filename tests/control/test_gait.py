@@ -40,15 +40,15 @@ def test_it_rests_until_it_is_told_to_move() -> None:
 
 def test_the_feet_swing_in_turn_and_both_stand_in_between() -> None:
     phases = np.linspace(0.0, 1.0, 200, endpoint=False)
-    stance = gait.expected_stance(gait.foot_phase(np, phases), np.ones(200, bool), 0.6)
+    stance = gait.expected_stance(gait.foot_phase(phases), np.ones(200, bool), 0.6)
     assert stance.mean(axis=0) == pytest.approx([0.6, 0.6], abs=0.01)
     assert stance.any(axis=1).all()
     assert stance.all(axis=1).mean() == pytest.approx(0.2, abs=0.02)
-    assert gait.expected_stance(gait.foot_phase(np, phases), np.zeros(200, bool), 0.6).all()
+    assert gait.expected_stance(gait.foot_phase(phases), np.zeros(200, bool), 0.6).all()
 
 
 def test_soles_swing_along_a_half_wave() -> None:
-    height = gait.swing_height(np, np.array([[0.3, 0.6], [0.8, 0.7]]), PRIOR)
+    height = gait.swing_height(np.array([[0.3, 0.6], [0.8, 0.7]]), PRIOR)
     assert height == pytest.approx(np.array([[0.0, 0.0], [0.08, 0.08 * np.sin(np.pi / 4)]]), abs=1e-12)
 
 
