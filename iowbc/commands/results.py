@@ -24,7 +24,7 @@ HEADLINES: Mapping[str, tuple[str, ...]] = {
     "teacher": ("best_score", "check/survived", "episode_seconds"),
     "distill": ("kl", "action_agreement", "episode_seconds"),
     "eval": ("trials", "survived", "succeeded"),
-    "export": ("parity", "inference_ms", "acceptance_survived"),
+    "export": ("parity", "step_ms", "acceptance_survived"),
 }
 """Patterns of the metrics that are shown of each stage, the most telling first; `show` has all."""
 METRICS_SHOWN = 3
@@ -33,7 +33,7 @@ TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "
 """The main tables, in their order."""
 DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
-EXPORTED = "policy.onnx"
+EXPORTED = "step.onnx"
 POLICIES = ("export", "distill", "teacher")
 """Stages that leave a policy, the one to prefer first."""
 

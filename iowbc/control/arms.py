@@ -126,4 +126,5 @@ def _solved(columns: Array, damping: Array, wanted: Array) -> Array:
     solved: Array = namespace(wanted).stack(
         [first * a + second * b + third * c, second * a + middle * b + corner * c, third * a + corner * b + last * c], 0
     )
-    return solved / (xx * first + xy * second + zx * third)
+    inverse: Array = solved / (xx * first + xy * second + zx * third)
+    return inverse

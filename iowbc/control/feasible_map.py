@@ -29,8 +29,8 @@ class FeasibleMap(Constants):
         """The command brought into the region, first the pitch, then the height at it; shapes (n,) [m], [rad]."""
         kept = pitch.clip(self.pitch[0], self.pitch[-1])
         width = self.pitch[1:] - self.pitch[:-1]
-        way = (kept[:, None] - self.pitch[:-1]).clip(0.0 * width, width) / width
-        low, high = (bound[0] + (way * (bound[1:] - bound[:-1])).sum(1) for bound in (self.low, self.high))
+        way = (kept[..., None] - self.pitch[:-1]).clip(0.0 * width, width) / width
+        low, high = (bound[0] + (way * (bound[1:] - bound[:-1])).sum(-1) for bound in (self.low, self.high))
         return height.clip(low, high), kept
 
     def up_to(self, pitch: float | None) -> "FeasibleMap":

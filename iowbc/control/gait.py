@@ -15,7 +15,7 @@ phase_mirror = in_place(-1.0, -1.0)
 def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     """Whether the commanded velocity asks for steps; command (n, 11), result (n,)."""
     xp = namespace(command)
-    speed = xp.hypot(command[:, 0], command[:, 1])
+    speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
     moving: Mask = (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
     return moving
 
