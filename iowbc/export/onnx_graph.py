@@ -38,9 +38,24 @@ def write_onnx(program: Program, path: Path, opset: int, about: Mapping[str, str
         part.ClearField("doc_string")
         part.ClearField("metadata_props")
     del model.graph.value_info[:]
+    _shorten_names(model.graph, {*names, *outputs})
     onnx.helper.set_model_props(model, dict(about))
     onnx.checker.check_model(model, full_check=True)
     onnx.save(model, path)
+
+
+def _shorten_names(graph: onnx.GraphProto, kept: set[str]) -> None:
+    """Number the values inside, whose names, paths of modules, are a third of the file."""
+    numbered: dict[str, str] = {}
+
+    def short(name: str) -> str:
+        return name if name in kept or not name else numbered.setdefault(name, f"v{len(numbered)}")
+
+    for tensor in graph.initializer:
+        tensor.name = short(tensor.name)
+    for index, node in enumerate(graph.node):
+        node.name = f"n{index}"
+        node.input[:], node.output[:] = map(short, node.input), map(short, node.output)
 
 
 def run_torch(program: Program, inputs: Values) -> Values:
