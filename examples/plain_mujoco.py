@@ -15,10 +15,9 @@ HEIGHT = 0.72  # of the pelvis, the fourth entry of the command [m]
 
 
 def stand(folder: Path, seconds: float = 5.0) -> float:
-    """Let the controller stand with its arms at rest and no object; returns the pelvis height at the end [m]."""
+    """Let the controller stand with its arms in their grasp and no object; returns the pelvis height at the end [m]."""
     contract = json.loads((folder / "contract.json").read_text())
     kp, kd, effort, rest = (np.array(contract[name]) for name in ("kp", "kd", "effort", "default_position"))
-    support, arms = contract["support"], contract["interaction"]
     spec = mujoco.MjSpec.from_file(str(next((folder / "robot").glob("*.xml"))))
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
     model = spec.compile()
@@ -27,9 +26,11 @@ def stand(folder: Path, seconds: float = 5.0) -> float:
     model.dof_damping[6:] = kd  # the PD loop's damping, where an implicit integrator keeps it stable
     data = mujoco.MjData(model)
     data.qpos[2], data.qpos[7:] = 0.79, rest
-    session = onnxruntime.InferenceSession(folder / "policy.onnx", providers=["CPUExecutionProvider"])
+    settle, step = (onnxruntime.InferenceSession(folder / f"{name}.onnx") for name in ("settle", "step"))
     given = {port["name"]: np.zeros((1, *port["shape"]), np.float32) for port in contract["inputs"]}
-    given["command"][0, 3], given["arm_reference"][0], given["restart"][0] = HEIGHT, rest[arms], 1.0
+    left = np.array(contract["references"]["grasps"]["free"])
+    given["command"][0, 3], given["grasp"][0] = HEIGHT, [left, left * [1, -1, 1]]
+    (given["state"],) = settle.run(["state"], {name: given[name] for name in contract["settle"]})
     if "object_quaternion" in given:
         given["object_quaternion"][0, 0] = 1.0
     for _ in range(round(seconds * contract["control_frequency"])):
@@ -38,13 +39,9 @@ def stand(folder: Path, seconds: float = 5.0) -> float:
         given["projected_gravity"][0], given["base_angular_velocity"][0] = -rotation[6:], data.qvel[3:6]
         given["heading"][0] = np.arctan2(rotation[3], rotation[0])
         given["joint_position"][0], given["joint_velocity"][0] = data.qpos[7:], data.qvel[6:]
-        found = dict(zip([port["name"] for port in contract["outputs"]], session.run(None, given), strict=True))
-        given["last_action"], given["history"] = found["action"], found["history_next"]
-        given["restart"][0], target = 0.0, rest.copy()
-        target[support] = found["support_target"][0]
+        (target,), given["state"] = step.run(["target", "state_next"], given)
         for _ in range(round(contract["physics_frequency"] / contract["control_frequency"])):
             torque = kp * (target - data.qpos[7:])
-            torque[arms] += data.qfrc_bias[6:][arms]  # their own weight, which Controller has in its targets
             data.qfrc_applied[6:] = np.clip(torque, -effort, effort)
             mujoco.mj_step(model, data)
     return float(data.qpos[2])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "Artifact",
     "Controller",

@@ -1,6 +1,9 @@
-"""The kinds of array that functions take and give, and indices as slices."""
+"""The kinds of array that functions take and give, indices as slices, and one source for NumPy and torch."""
 
-from typing import Any
+import copy
+import sys
+from collections.abc import Callable
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,3 +24,32 @@ def as_slice(indices: Indices) -> slice | Indices:
     if not len(indices) or len(steps) != 1 or steps[0] < 1:
         return indices
     return slice(int(indices[0]), int(indices[-1]) + 1, int(steps[0]))
+
+
+def namespace(array: Any) -> Any:
+    """The functions for an array: NumPy's, or torch's for a tensor, which an equation meets as it is exported.
+
+    Both know `concatenate`, `stack`, `where`, `swapaxes` and the elementwise functions by these names.
+    """
+    return np if isinstance(array, np.ndarray | np.generic) else sys.modules["torch"]
+
+
+class Constants:
+    """An object that holds constants only: its arrays may be of another kind."""
+
+    def converted(self, convert: Callable[[Array], Any]) -> Self:
+        """The same with other floating-point arrays, such as tensors, in it and in the constants that it holds."""
+        other = copy.copy(self)
+        for name, value in vars(self).items():
+            object.__setattr__(other, name, _converted(value, convert))
+        return other
+
+
+def _converted(value: Any, convert: Callable[[Array], Any]) -> Any:
+    if isinstance(value, Constants):
+        return value.converted(convert)
+    if isinstance(value, tuple):
+        return tuple(_converted(each, convert) for each in value)
+    if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.floating):
+        return convert(value)
+    return value

@@ -12,6 +12,7 @@ import torch
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.observation import ObservationLayout, observation_layout
+from iowbc.control.references import ReferenceLayer
 from iowbc.export.folder import write_folder
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import StudentNetwork
@@ -58,16 +59,8 @@ def graph_of(
     student: StudentNetwork, history: int, recipe: Recipe, robot: Robot, layout: ObservationLayout, rg: Path | None
 ) -> ControllerGraph:
     """The graph of a student that sees so many moments."""
-    return ControllerGraph(
-        student,
-        None if rg is None else ReferenceNetwork.load(rg),
-        robot,
-        layout,
-        recipe.task.references.gait,
-        history=history,
-        action_scale=robot.action_scale,
-        action_bound=recipe.task.action.bound,
-    )
+    references = ReferenceLayer(robot, recipe.task.references, rg)
+    return ControllerGraph(student, robot, recipe.task, layout, history, references)
 
 
 @pytest.fixture(scope="session")

@@ -16,6 +16,7 @@ MEASURE = Measure(
     control_frequency=50.0,
     gait=GaitPrior(frequency=1.25),
     commands=Commands(nominal_height=0.75),
+    least_weight=5.0,
     foot_load=50.0,
     push_part=0.5,
     efforts=JOINTS,

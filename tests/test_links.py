@@ -8,7 +8,7 @@ import pytest
 from pages import DOCS
 
 ROOT = DOCS.parent
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
+PAGES = [*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING")), *sorted(DOCS.rglob("*.md"))]
 ELSEWHERE = ("http://", "https://", "mailto:")
 
 
@@ -59,3 +59,13 @@ def test_a_dead_link_is_found(tmp_path: Path) -> None:
         "[f](none.md) [g](other.md#no-heading) ![h](none.png) [i](#there)\n"
     )
     assert dead(page) == ["none.md", "other.md#no-heading", "none.png", "#there"]
+
+
+def test_every_file_that_the_architecture_names_is_there() -> None:
+    named = set(re.findall(r"`((?:iowbc|tests)/[\w/.]+)`", (DOCS / "architecture.md").read_text(encoding="utf-8")))
+    assert len(named) > 30
+    assert sorted(name for name in named if not (ROOT / name).exists()) == []
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_bytes()) <= 12_000

@@ -17,7 +17,7 @@ from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
 from iowbc.commands.ending import leave
 from iowbc.commands.streams import let_go, prepare_streams
-from iowbc.commands.unforeseen import told
+from iowbc.commands.unexpected import described
 from iowbc.processes import name_glfw
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -100,9 +100,9 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception as error:
         from iowbc.errors import IowbcError
 
-        foreseen = isinstance(error, IowbcError)
+        expected = isinstance(error, IowbcError)
         code = error.exit_code if isinstance(error, IowbcError) else 1
         with contextlib.suppress(OSError):
-            print(error if foreseen else told(error, arguments or sys.argv[1:]), file=sys.stderr)
+            print(error if expected else described(error, arguments or sys.argv[1:]), file=sys.stderr)
     let_go()
     sys.exit(code)

@@ -20,13 +20,15 @@ def compare(
     recipes: Annotated[
         list[str],
         typer.Argument(
-            help="Recipes that have run, two or more, or a recipe of recipes.",
+            help="Finished recipes, two or more, or a study.",
             metavar="RECIPE...",
             autocompletion=completion.ran,
         ),
     ],
-    output: Annotated[Path | None, typer.Option(help="Folder to write to; runs/compare.")] = None,
-    film: Annotated[bool, typer.Option("--film", help="Also film one trial with all of them side by side.")] = False,
+    output: Annotated[Path | None, typer.Option(help="Output folder (default: runs/compare).")] = None,
+    film: Annotated[
+        bool, typer.Option("--film", help="Also record a film of one trial, all recipes side by side.")
+    ] = False,
     as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
@@ -40,9 +42,9 @@ def compare(
 def report(
     recipes: Annotated[
         list[str],
-        typer.Argument(help="Recipes that have run, one or more.", metavar="RECIPE...", autocompletion=completion.ran),
+        typer.Argument(help="Finished recipes, one or more.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
-    output: Annotated[Path | None, typer.Option(help="HTML file to write; runs/report/RECIPE.html.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
     runs: RunsFolder = None,
 ) -> None:
     """Write one HTML page about runs: tables, interactive curves, films, differences; it opens without a network."""
@@ -54,7 +56,7 @@ def report(
 
 
 def ui(
-    port: Annotated[int, typer.Option(help="Port on this machine.", min=1, max=65535)] = 5000, runs: RunsFolder = None
+    port: Annotated[int, typer.Option(help="Local port.", min=1, max=65535)] = 5000, runs: RunsFolder = None
 ) -> None:
     """Open MLflow's web interface on the runs, for this machine alone."""
     from iowbc.commands.ui import serve

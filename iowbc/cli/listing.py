@@ -36,14 +36,14 @@ def show(what: Named, as_json: AsJson = False, runs: RunsFolder = None) -> None:
 
 
 def gc(
-    unused: Annotated[bool, typer.Option("--unused", help="Artifacts that no recipe ever used.")] = False,
+    unused: Annotated[bool, typer.Option("--unused", help="Remove artifacts that no recipe uses.")] = False,
     recipe: Annotated[
-        list[str] | None, typer.Option(help="This recipe's record, and artifacts that only it used.")
+        list[str] | None, typer.Option(help="Remove this recipe's record and the artifacts used by it alone.")
     ] = None,
-    work: Annotated[bool, typer.Option("--work", help="Checkpoints of stages that did not finish.")] = False,
-    damaged: Annotated[bool, typer.Option("--damaged", help="Artifacts that were set aside as damaged.")] = False,
-    older_than: Annotated[float, typer.Option(help="Only what is older than this.", min=0.0, metavar="DAYS")] = 0.0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list what would be removed.")] = False,
+    work: Annotated[bool, typer.Option("--work", help="Remove checkpoints of unfinished stages.")] = False,
+    damaged: Annotated[bool, typer.Option("--damaged", help="Remove artifacts set aside as damaged.")] = False,
+    older_than: Annotated[float, typer.Option(help="Minimum age of what is removed.", min=0.0, metavar="DAYS")] = 0.0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List what would be removed, remove nothing.")] = False,
     runs: RunsFolder = None,
 ) -> None:
     """Remove artifacts and checkpoints; refuses without a scope."""

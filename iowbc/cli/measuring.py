@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 def bench_simulation(
     recipe: BenchRecipe = None,
     scene: SceneName = "lift",
-    environments: Annotated[int, typer.Option(help="Environments a worker.", min=1)] = 48,
+    environments: Annotated[int, typer.Option(help="Environments per worker.", min=1)] = 48,
     workers: BenchWorkers = None,
-    others: Annotated[bool, typer.Option(help="Also measure the usual vector environments.")] = True,
+    others: Annotated[bool, typer.Option(help="Also measure the usual vector environments (default: on).")] = True,
     runs: RunsFolder = None,
 ) -> None:
     """Measure how fast the vector environment steps, against a bare loop of MuJoCo; the figures go to MLflow."""
@@ -28,9 +28,10 @@ def bench_simulation(
 def bench_training(
     recipe: BenchRecipe = None,
     scene: SceneName = "lift",
-    turns: Annotated[int, typer.Option(help="Updates to measure.", min=1)] = 6,
+    turns: Annotated[int, typer.Option(help="Number of updates.", min=1)] = 6,
     others: Annotated[
-        int | None, typer.Option(help="Processes of stable-baselines3; one a core, 0 leaves it out.", min=0)
+        int | None,
+        typer.Option(help="Processes of plain stable-baselines3 (default: one per core; 0 skips it).", min=0),
     ] = None,
     runs: RunsFolder = None,
 ) -> None:
@@ -49,7 +50,7 @@ def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, ru
 
 def bench_scale(
     recipe: BenchRecipe = None,
-    turns: Annotated[int, typer.Option(help="Turns of one node and two.", min=1)] = 3,
+    turns: Annotated[int, typer.Option(help="Number of repetitions.", min=1)] = 3,
     runs: RunsFolder = None,
 ) -> None:
     """Measure labels and trials on one node of Ray and on two, and what its engine costs; the figures go to MLflow."""
@@ -67,10 +68,10 @@ def bench_control(
     what: Annotated[
         str,
         typer.Argument(
-            help="Folder of an export, or the recipe that made it.", metavar="WHAT", autocompletion=completion.ran
+            help="Export folder, or the recipe that made it.", metavar="WHAT", autocompletion=completion.ran
         ),
     ],
-    steps: Annotated[int, typer.Option(help="Control steps to measure.", min=1)] = 5000,
+    steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
 ) -> None:
     """Measure how long a control step of an exported controller takes on one thread, without torch or a simulator."""
     from iowbc.commands.bench_control import control

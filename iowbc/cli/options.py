@@ -19,33 +19,37 @@ PIPE_WIDTH = 160
 """Characters in a line of a table where the output is not a terminal."""
 RecipeFile = Annotated[
     str,
-    typer.Argument(help="Recipe, a YAML file or the name of one.", metavar="RECIPE", autocompletion=completion.recipes),
+    typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes),
 ]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="Change a value of the recipe; repeat for more.",
+        help="Override a recipe value (repeatable).",
         metavar="A.B.C=VALUE",
         autocompletion=completion.paths,
     ),
 ]
 RunsFolder = Annotated[
     Path | None,
-    typer.Option("--runs", help="Folder of artifacts and tracking; IOWBC_RUNS, else ./runs.", envvar="IOWBC_RUNS"),
+    typer.Option(
+        "--runs", help="Folder of artifacts and tracking (default: $IOWBC_RUNS or ./runs).", envvar="IOWBC_RUNS"
+    ),
 ]
 SweepFile = Annotated[
-    Path | None, typer.Option("--from", help="File with a grid, draws or both: what a sweep varies.", metavar="YAML")
+    Path | None, typer.Option("--from", help="YAML file with the grid, the draws, or both, of a sweep.", metavar="YAML")
 ]
 Until = Annotated[
     str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
 ]
 Force = Annotated[
     list[str] | None,
-    typer.Option(help="Make this stage anew; repeat for more.", metavar="STAGE", autocompletion=completion.stages),
+    typer.Option(
+        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=completion.stages
+    ),
 ]
 Engine = Annotated[
-    Literal["local", "ray"] | None, typer.Option(help="Where stages run: in processes here, or on a Ray cluster.")
+    Literal["local", "ray"] | None, typer.Option(help="Execution engine: local processes or a Ray cluster.")
 ]
 Address = Annotated[
     str | None,
@@ -53,22 +57,20 @@ Address = Annotated[
         help="Ray cluster: local, local:NODES (both here), auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"
     ),
 ]
-Workers = Annotated[int | None, typer.Option(help="Worker processes; all available cores.", min=1)]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Only say what would run, as `plan` does.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what goes wrong.")]
+Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Show what would run, as `plan` does.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
-BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe, a YAML file; the defaults.", metavar="RECIPE")]
-BenchWorkers = Annotated[
-    list[int] | None, typer.Option("--workers", help="Worker processes; repeat to measure several.", min=1)
-]
+BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
+BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worker processes (repeatable).", min=1)]
 OnCodeChange = Annotated[
-    Literal["report", "rerun"], typer.Option(help="What to do about a cached stage whose code has changed since.")
+    Literal["report", "rerun"], typer.Option(help="Policy for cached stages whose code has changed.")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Named = Annotated[
     str,
     typer.Argument(
-        help="Recipe (name or file), RECIPE/STAGE, or first characters of a key.",
+        help="Recipe (name or file), RECIPE/STAGE, or the first characters of a key.",
         metavar="WHAT",
         autocompletion=completion.artifacts,
     ),

@@ -13,22 +13,26 @@ def play(
     what: Annotated[
         str,
         typer.Argument(
-            help="Recipe, RECIPE/STAGE, key, or the folder of an export.",
+            help="Recipe, RECIPE/STAGE, key, or export folder.",
             metavar="WHAT",
             autocompletion=completion.artifacts,
         ),
     ],
-    stage: Annotated[str | None, typer.Option(help="export, distill or teacher; the last one there is.")] = None,
+    stage: Annotated[
+        str | None, typer.Option(help="Stage whose policy is played (default: the last one available).")
+    ] = None,
     scene: SceneName = "lift",
-    mass: Annotated[float, typer.Option(help="Mass of the object [kg]; 0 for none.", min=0.0)] = 4.0,
+    mass: Annotated[float, typer.Option(help="Object mass [kg]; 0 removes the object.", min=0.0)] = 4.0,
     partner_share: Annotated[
-        float, typer.Option(help="Part of the weight that a partner bears.", min=0.0, max=1.0)
+        float, typer.Option(help="Share of the weight that the partner bears.", min=0.0, max=1.0)
     ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
-    disturbances: Annotated[bool, typer.Option("--disturbances", help="With impulses and pushes.")] = False,
-    video: Annotated[Path | None, typer.Option(help="Make a film instead of opening a window.", metavar="MP4")] = None,
-    web: Annotated[bool, typer.Option("--web", help="Drive it in the browser; needs no display.")] = False,
-    port: Annotated[int | None, typer.Option(help="Port of --web; 8080.", min=1, max=65535)] = None,
+    disturbances: Annotated[bool, typer.Option("--disturbances", help="Enable random disturbances.")] = False,
+    video: Annotated[
+        Path | None, typer.Option(help="Record a film instead of opening a window.", metavar="MP4")
+    ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Interactive viewer in the browser (no display needed).")] = False,
+    port: Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)] = None,
     runs: RunsFolder = None,
 ) -> None:
     """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
@@ -52,12 +56,12 @@ def export(
     what: Annotated[
         str,
         typer.Argument(
-            help="Recipe, RECIPE/export, key, or the folder of an export.",
+            help="Recipe, RECIPE/export, key, or export folder.",
             metavar="WHAT",
             autocompletion=completion.artifacts,
         ),
     ],
-    web: Annotated[Path, typer.Option("--web", help="Folder of the web page to write.", metavar="DIR")],
+    web: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],
     runs: RunsFolder = None,
 ) -> None:
     """Write an exported controller as a web page, in which the robot moves on the visitor's machine (needs npm)."""

@@ -9,8 +9,8 @@ from iowbc.cli.options import RunsFolder, console, runs_folder
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="Folder to make or to fill.", metavar="DIR")],
-    robot: Annotated[str, typer.Option(help="Robot whose description is copied.")] = "g1",
+    folder: Annotated[Path, typer.Argument(help="Folder to create or to fill.", metavar="DIR")],
+    robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
 ) -> None:
     """Copy the recipes and a robot's description into a folder to begin from."""
     from iowbc.commands.init import begin
@@ -18,7 +18,7 @@ def init(
     begin(folder, robot, console())
 
 
-def schema(output: Annotated[Path | None, typer.Option(help="File to write to, instead of printing.")] = None) -> None:
+def schema(output: Annotated[Path | None, typer.Option(help="Output file (default: print).")] = None) -> None:
     """Write the JSON Schema of recipes, for editors."""
     from iowbc.commands.schema import write_schema
 

@@ -40,9 +40,7 @@ def run(
     dry_run: DryRun = False,
     on_code_change: OnCodeChange = "report",
     quiet: Quiet = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Print a plain line for every step of progress.")
-    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print one line per progress step.")] = False,
     runs: RunsFolder = None,
 ) -> None:
     """Run a recipe: make every stage that is not cached, and resume what was interrupted."""
@@ -66,7 +64,7 @@ def sweep(
         list[str] | None,
         typer.Option(
             "--set",
-            help="Vary a value (a,b or 0..4), or change it for all; repeat for a grid.",
+            help="Values to vary (a,b or 0..4) or to override (repeatable: a grid).",
             metavar="A.B.C=VALUES",
             autocompletion=completion.paths,
         ),
@@ -74,17 +72,17 @@ def sweep(
     file: SweepFile = None,
     jobs: Annotated[
         int | None,
-        typer.Option(help="Points at the same time, which share the cores; one, or all cores of Ray.", min=1),
+        typer.Option(help="Parallel points, which share the cores (default: 1, or all cores of Ray).", min=1),
     ] = None,
-    points: Annotated[int, typer.Option(help="Largest number of points.", min=1)] = 1_000,
+    points: Annotated[int, typer.Option(help="Maximum number of points.", min=1)] = 1_000,
     until: Until = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes of each point.", min=1)] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes per point.", min=1)] = None,
     engine: Engine = None,
     address: Address = None,
     dry_run: DryRun = False,
     on_code_change: OnCodeChange = "report",
     quiet: Quiet = False,
-    as_json: Annotated[bool, typer.Option("--json", help="With --dry-run: print JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON (with --dry-run).")] = False,
     runs: RunsFolder = None,
 ) -> None:
     """Run a recipe with every combination of some values; stages that points share are made once."""
@@ -107,7 +105,7 @@ def plan(
     until: Until = None,
     force: Force = None,
     on_code_change: OnCodeChange = "report",
-    as_sweep: Annotated[bool, typer.Option("--sweep", help="Of a sweep, where --set may name several values.")] = False,
+    as_sweep: Annotated[bool, typer.Option("--sweep", help="Plan a sweep: `--set` accepts several values.")] = False,
     file: SweepFile = None,
     as_json: AsJson = False,
     runs: RunsFolder = None,
@@ -131,7 +129,7 @@ def publish(
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="File to leave out, e.g. state.safetensors, which only a longer training needs; repeat for more.",
+            help="File to leave out (repeatable); state.safetensors is needed only to extend a training.",
             metavar="FILE",
         ),
     ] = None,

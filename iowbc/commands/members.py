@@ -29,7 +29,7 @@ def record_sweep(found: Sweep, folder: Path) -> None:
 
 
 def points_of(store: Store, words: Sequence[str]) -> list[str]:
-    """Names of recipes, with the finished ones of a sweep, of a recipe of recipes, or of a comparison in place of its
+    """Names of recipes, with the finished ones of a sweep, of a study, or of a comparison in place of its
     name."""
     recipes = finished_recipes(store)
     found: list[str] = []
@@ -44,7 +44,7 @@ def points_of(store: Store, words: Sequence[str]) -> list[str]:
 
 
 def members_of(word: str) -> tuple[str, ...]:
-    """Names of the recipes that a recipe of recipes names; of anything else none. Raises `RecipeError`."""
+    """Names of the recipes that a study names; of anything else none. Raises `RecipeError`."""
     study = load_study(word) if os.path.isfile(recipe_file(word)) else None
     return () if study is None else tuple(variant.recipe.name for variant in study.variants)
 

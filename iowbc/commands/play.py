@@ -82,7 +82,6 @@ def named_source(
         tell(console, training.text)
         return _training_source(store, training, training.recipe)
     loaded = load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
-    asked = _evaluation(store, word) if loaded is None else loaded.recipe.eval
     try:
         artifact = playable(store, word, stage, {} if loaded is None else planned(store, loaded, registry))
     except UsageError:
@@ -92,6 +91,7 @@ def named_source(
         raise UsageError(f"{training.text}; {text}") from None
     if training is not None:
         tell(console, f"{training.text}; this is a finished one")
+    asked = _evaluation(store, word) if loaded is None else loaded.recipe.eval
     require_whole(store.runs, [artifact])
     if artifact.published:
         tell(console, f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository")

@@ -29,7 +29,7 @@ TABLES = (
 """The main tables, in their order."""
 DRAWN = ("lifting", "pushing", "heavy", "compliance", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
-EXPORTED = "policy.onnx"
+EXPORTED = "step.onnx"
 
 
 def policy_stages() -> list[str]:

@@ -1,15 +1,14 @@
-"""Kinematics of both arms, many rows at once in NumPy: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
+"""Kinematics of both arms, many rows at once: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
 
 import numpy as np
 
-from iowbc.arrays import Array
-from iowbc.control.chain import Chain, turn
+from iowbc.arrays import Array, Constants, namespace
+from iowbc.control.chain import Chain, Frame, jacobian, rotated, rotated_back, turned
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Body
 
 X, Y = 0, 1
-IDENTITY = np.eye(3)
 
 
 def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
@@ -21,7 +20,20 @@ def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
     return [robot.tree.chain(body, torso) for body in robot.wrist_bodies], robot.tree.chain(torso, robot.base)
 
 
-class ArmKinematics:
+def by_arm(values: Array) -> Array:
+    """Rows of both arms' joints, (n, arm joints), as (joints of one, 2, n); `by_row` is the inverse."""
+    xp = namespace(values)
+    sides: Array = xp.swapaxes(values.reshape(-1, 2, values.shape[-1] // 2), 0, 2)
+    return sides
+
+
+def by_row(values: Array) -> Array:
+    """Values (joints of one, 2, n) as rows (n, arm joints)."""
+    rows: Array = namespace(values).swapaxes(values, 0, 2).reshape(-1, 2 * values.shape[0])
+    return rows
+
+
+class ArmKinematics(Constants):
     """Both arms from the torso frame to the wrist sites; joints as in the interaction branch, left, then right."""
 
     def __init__(self, robot: Robot, settings: ArmReference | None = None) -> None:
@@ -31,21 +43,26 @@ class ArmKinematics:
         if order != list(range(len(names))):
             raise ValueError(f"{robot.folder}: the arm joints must be the left chain followed by the right one")
         self.rest = robot.default_position[robot.interaction]
-        self.lower, self.upper = robot.lower[robot.interaction], robot.upper[robot.interaction]
-        own = robot.velocity_limit[robot.interaction]
         self.settings = settings = settings or ArmReference()
-        self.speed = own if settings.joint_speed is None else np.minimum(own, settings.joint_speed)
+        own = robot.velocity_limit[robot.interaction]
+        speed = own if settings.joint_speed is None else np.minimum(own, settings.joint_speed)
+        self._rest, self._speed = by_arm(self.rest[None]), by_arm(speed[None])
+        self.lower, self.upper = robot.lower[robot.interaction], robot.upper[robot.interaction]
+        self._lower, self._upper = by_arm(self.lower[None]), by_arm(self.upper[None])
         self._chain, self._waist = Chain(chains), Chain([waist])
         self._grip = robot.grip_offset.T[:, :, None]
 
     def forward(self, arm_position: Array) -> tuple[Array, Array]:
         """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one)."""
-        count, joints = len(arm_position), self._chain.length
-        vectors = np.empty((3, joints + 1, 2, count))
-        vectors[:, joints] = self._grip
-        self._chain.carry(arm_position.reshape(count, 2, joints).transpose(2, 1, 0), vectors, joints)
-        rows = np.ascontiguousarray(vectors.transpose(3, 2, 0, 1))
-        return rows[..., joints], rows[..., :joints]
+        wrist, columns = self._wrists(by_arm(arm_position))
+        xp = namespace(wrist)
+        return xp.moveaxis(wrist, (0, 1, 2), (2, 1, 0)), xp.moveaxis(columns, (0, 1, 2, 3), (2, 3, 1, 0))
+
+    def _wrists(self, position: Array) -> tuple[Array, Array]:
+        """Wrists (3, 2, n) [m] and their Jacobian (3, joints, 2, n), of positions (joints, 2, n) [rad]."""
+        frames = self._chain.frames(position)
+        wrist = frames[-1].origin + rotated(frames[-1].rotation, self._grip)
+        return wrist, jacobian(frames, wrist)
 
     def solve_step(self, arm_position: Array, target: Array, dt: float) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
@@ -54,22 +71,17 @@ class ArmKinematics:
         next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to its
         longest; kept to the joint ranges and the joint speed.
         """
-        count, settings = len(arm_position), self.settings
-        wrist, jacobian = self.forward(arm_position)
-        transposed = jacobian.swapaxes(-1, -2)
-        error = target - wrist
-        distance = np.sqrt(np.vecdot(error, error))
-        near = np.minimum(distance, settings.longest_step)
-        error *= (settings.longest_step / np.maximum(distance, settings.longest_step))[..., None]
-        damping = settings.damping**2 + settings.reach * near
-        gram = jacobian @ transposed + damping[..., None, None] * IDENTITY
-        posture = (settings.posture_gain * dt * (self.rest - arm_position)).reshape(count, 2, -1)
-        wanted = error - np.einsum("nsij,nsj->nsi", jacobian, posture)
-        step = posture + np.einsum("nsji,nsj->nsi", jacobian, np.linalg.solve(gram, wanted[..., None])[..., 0])
-        bound = self.speed * dt
-        moved = arm_position + step.reshape(count, -1).clip(-bound, bound)
-        kept: Array = moved.clip(self.lower, self.upper)
-        return kept
+        xp, settings, position = namespace(arm_position), self.settings, by_arm(arm_position)
+        wrist, columns = self._wrists(position)
+        error = xp.swapaxes(target, 0, 2) - wrist
+        distance = xp.sqrt((error * error).sum(0))
+        error = error * (settings.longest_step / distance.clip(settings.longest_step, None))
+        damping = settings.damping**2 + settings.reach * distance.clip(None, settings.longest_step)
+        posture = settings.posture_gain * dt * (self._rest - position)
+        wanted = error - (columns * posture).sum(1)
+        step = posture + (columns * _solved(columns, damping, wanted)[:, None]).sum(0)
+        moved = position + step.clip(-self._speed * dt, self._speed * dt)
+        return by_row(moved.clip(self._lower, self._upper))
 
     def solve(self, arm_position: Array, target: Array, *, steps: int = 60, dt: float = 0.1) -> Array:
         """Repeats `solve_step`: postures whose wrists are at, or as near as they get to, `target` (n, 2, 3)."""
@@ -79,10 +91,8 @@ class ArmKinematics:
 
     def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
         """Points (n, k, 3) [m] of the heading frame at the base, as the torso frame sees them; the rest as below."""
-        moved = points.transpose(2, 1, 0)[:, :, None].copy()
-        turn(moved, Y, -pelvis_pitch[None])
-        self._waist.fetch(waist.T[:, None], moved)
-        seen: Array = moved[:, :, 0].transpose(2, 1, 0)
+        torso, xp = self._torso(waist, pelvis_pitch, None), namespace(points)
+        seen: Array = xp.swapaxes(rotated_back(torso.rotation, xp.swapaxes(points, 0, 2) - torso.origin), 0, 2)
         return seen
 
     def torso_in_heading(
@@ -92,12 +102,29 @@ class ArmKinematics:
 
         `waist` (n, waist joints): positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
         """
-        vectors = np.zeros((3, 4, 1, len(waist)))
-        for axis in range(3):
-            vectors[axis, axis] = 1.0
-        self._waist.carry(waist.T[:, None], vectors)
+        torso = self._torso(waist, pelvis_pitch, pelvis_roll)
+        return np.stack([column[:, 0].T for column in torso.rotation], axis=2), torso.origin[:, 0].T
+
+    def _torso(self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None) -> Frame:
+        """The last hinge of the waist in the heading frame at the base."""
+        pelvis = self._waist.turned(Y, pelvis_pitch[None])
         if pelvis_roll is not None:
-            turn(vectors, X, pelvis_roll[None])
-        turn(vectors, Y, pelvis_pitch[None])
-        rows = np.ascontiguousarray(vectors[:, :, 0].transpose(2, 0, 1))
-        return rows[..., :3], rows[..., 3]
+            pelvis = turned(pelvis, X, pelvis_roll[None])
+        return self._waist.frames(waist.T[:, None], pelvis)[-1]
+
+
+def _solved(columns: Array, damping: Array, wanted: Array) -> Array:
+    """(JJᵀ + damping)⁻¹ wanted by Cramer's rule, (3, 2, n), of a Jacobian (3, joints, 2, n), damping (2, n)."""
+    x, y, z = columns
+    (xx, yy, zz), (yz, zx, xy) = (
+        [(a * a).sum(0) + damping for a in (x, y, z)],
+        [(a * b).sum(0) for a, b in ((y, z), (z, x), (x, y))],
+    )
+    first, second, third = yy * zz - yz * yz, yz * zx - xy * zz, xy * yz - yy * zx
+    a, b, c = wanted
+    middle, corner, last = zz * xx - zx * zx, xy * zx - yz * xx, xx * yy - xy * xy
+    solved: Array = namespace(wanted).stack(
+        [first * a + second * b + third * c, second * a + middle * b + corner * c, third * a + corner * b + last * c], 0
+    )
+    inverse: Array = solved / (xx * first + xy * second + zx * third)
+    return inverse

@@ -1,20 +1,18 @@
-"""Chains of hinges, many rows at once: vectors fixed to the last body are carried inward, hinge by hinge, to the base.
+"""Chains of hinges, many rows at once: where each hinge is, from the base outward.
 
-Rows are last in memory, so that NumPy's loops are long, and a turn about a coordinate axis mixes two components. Ours,
-because pinocchio and MuJoCo take one posture at a time and are not on the robot's computer.
+Components come first and rows last, so that NumPy's loops are long. Ours, because pinocchio and MuJoCo take one posture
+at a time and are not on the robot's computer, and because the same lines are traced into the exported graph.
 
 An example: a forearm of 0.3 m that turns about y at the end of an upper arm of 0.2 m that turns about z. With both
 hinges at a quarter turn its end lies 0.3 m below the elbow, which lies 0.2 m to the left of the shoulder:
 
     upper = Body("upper", None, position=(0, 0, 0), quaternion=(1, 0, 0, 0), hinge=Hinge(axis=(0, 0, 1), ...), ...)
     lower = Body("lower", "upper", position=(0.2, 0, 0), quaternion=(1, 0, 0, 0), hinge=Hinge(axis=(0, 1, 0), ...), ...)
-    chain = Chain([[upper, lower]])                      # one chain
-    angle = np.full((2, 1, 1), np.pi / 2)                # hinges, chains, rows
-    vectors = np.zeros((3, 3, 1, 1))                     # xyz; two columns of the Jacobian and the point; chains; rows
-    vectors[:, 2, 0, 0] = (0.3, 0, 0)                    # the point in the forearm's frame
-    chain.carry(angle, vectors, columns=2)
-    vectors[:, 2, 0, 0]                                  # (0, 0.2, -0.3): the point in the base's frame
-    vectors[:, 0, 0, 0], vectors[:, 1, 0, 0]             # (-0.2, 0, 0), (0, -0.3, 0): its motion with each hinge
+    frames = Chain([[upper, lower]]).frames(np.full((2, 1, 1), np.pi / 2))     # angles of hinges, chains, rows
+    elbow = frames[-1]
+    end = elbow.origin + rotated(elbow.rotation, np.array([0.3, 0, 0])[:, None, None])
+    end[:, 0, 0]                                                               # (0, 0.2, -0.3)
+    jacobian(frames, end)[:, :, 0, 0]                                          # columns (-0.2, 0, 0), (0, -0.3, 0)
 """
 
 from collections.abc import Sequence
@@ -23,49 +21,79 @@ from typing import Self
 
 import numpy as np
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Constants, namespace
 from iowbc.robot import rotations
 from iowbc.robot.mjcf import Body
 
-PLANES = (slice(1, 3), slice(2, None, -2), slice(0, 2))
-"""Components that a turn about x, y and z mixes, in the order in which the first turns towards the second."""
-SWAPPED = (slice(2, 0, -1), slice(0, 3, 2), slice(1, None, -1))
-"""The same in the other order."""
-
-
-def turn(vectors: Array, axis: int, angle: Array) -> None:
-    """Turns vectors (3, k, ...) in place about a coordinate axis by angles (...) [rad]."""
-    cosine, sines = cosine_and_sines(angle[None])
-    mix(vectors, PLANES[axis], cosine[0], sines[0])
-
-
-def cosine_and_sines(angle: Array) -> tuple[Array, Array]:
-    """What `mix` takes, for angles (m, ...) [rad]: cosines (m, ...), and -sines and sines, (m, 2, 1, ...)."""
-    sines = np.empty((len(angle), 2, 1, *angle.shape[1:]))
-    np.sin(angle, out=sines[:, 1, 0])
-    np.negative(sines[:, 1, 0], out=sines[:, 0, 0])
-    return np.cos(angle), sines
-
-
-def mix(vectors: Array, plane: slice, cosine: Array, sines: Array) -> None:
-    """As `turn`, in one of the `PLANES`, from cosines (...) and the pair of -sine and sine, (2, 1, ...)."""
-    pair = vectors[plane]
-    crossed = pair[::-1] * sines
-    pair *= cosine
-    pair += crossed
+Rotation = tuple[Array, Array, Array]
+"""A rotation matrix by its columns, each (3, chains, n)."""
+Entries = tuple[Array | None, ...]
+"""A constant vector: components (chains, 1), None for zero."""
+IDENTITY: Rotation = (np.eye(3)[0, :, None, None], np.eye(3)[1, :, None, None], np.eye(3)[2, :, None, None])
+PLANES = ((1, 2), (2, 0), (0, 1))
+"""Columns that a turn about x, y and z mixes, in the order in which the first turns towards the second."""
 
 
 @dataclass(frozen=True)
-class Weights:
-    """Masses of the bodies of equally long chains."""
+class Frame:
+    """A hinge of each chain, in the frame that the chains hang on."""
 
-    moment: Array
-    """First moment of mass of each body in its frame, (hinges, 3, chains, 1) [kg·m]."""
-    carried: Array
-    """Mass from each body outward, (hinges, chains, 1 or n) [kg]."""
+    origin: Array
+    """(3, chains, n) [m]."""
+    axis: Array
+    """Unit vector, (3, chains, n)."""
+    rotation: Rotation
+    """Of the body that the hinge moves."""
 
 
-class Chain:
+def rotated(rotation: Rotation, vector: Array) -> Array:
+    """R v, (3, chains, n), of vectors (3, chains, n)."""
+    turned: Array = rotation[0] * vector[0] + rotation[1] * vector[1] + rotation[2] * vector[2]
+    return turned
+
+
+def rotated_back(rotation: Rotation, vector: Array) -> Array:
+    """Rᵀ v, shapes as in `rotated`."""
+    turned: Array = namespace(vector).stack([(column * vector).sum(0) for column in rotation], 0)
+    return turned
+
+
+def crossed(a: Array, b: Array) -> Array:
+    """a × b of vectors (3, ...)."""
+    product: Array = namespace(b).stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], 0
+    )
+    return product
+
+
+def turned(rotation: Rotation, axis: int, angle: Array) -> Rotation:
+    """The rotation followed outward by one about a coordinate axis by angles (chains, n) [rad]."""
+    xp, columns, (first, second) = namespace(angle), list(rotation), PLANES[axis]
+    cosine, sine = xp.cos(angle), xp.sin(angle)
+    columns[first] = cosine * rotation[first] + sine * rotation[second]
+    columns[second] = cosine * rotation[second] - sine * rotation[first]
+    return columns[0], columns[1], columns[2]
+
+
+def combined(rotation: Rotation, entries: Entries) -> Array:
+    """R v of a constant vector, (3, chains, n)."""
+    parts = [column * entry for column, entry in zip(rotation, entries, strict=True) if entry is not None]
+    return sum(parts[1:], parts[0]) if parts else 0.0 * rotation[0]
+
+
+def entries(vectors: Array) -> Entries:
+    """Vectors (3, chains) as entries."""
+    return tuple(part[:, None].copy() if part.any() else None for part in vectors)
+
+
+def jacobian(frames: Sequence[Frame], point: Array) -> Array:
+    """Motion of points (3, chains, n) [m] with each hinge, a_j × (p - o_j), (3, hinges, chains, n)."""
+    xp = namespace(point)
+    axes, origins = (xp.stack([getattr(frame, name) for frame in frames], 1) for name in ("axis", "origin"))
+    return crossed(axes, point[:, None] - origins)
+
+
+class Chain(Constants):
     """Equally long chains side by side, such as two arms."""
 
     def __init__(self, chains: Sequence[Sequence[Body]]) -> None:
@@ -73,65 +101,45 @@ class Chain:
         has one."""
         links = [_links(chain) for chain in chains]
         self.length = len(links[0])
-        self._hinges = [_Hinge.of([link[j] for link in links]) for j in range(self.length)]
-        """From the base outward."""
-        self._sign = np.stack([hinge.sign for hinge in self._hinges])
+        self._hinges = tuple(_Hinge.of([link[j] for link in links]) for j in range(self.length))
+        self._base = IDENTITY
 
-    def carry(self, angle: Array, vectors: Array, columns: int = 0, weights: Weights | None = None) -> None:
-        """Takes vectors from the last bodies' frames to the bases', in place.
+    def turned(self, axis: int, angle: Array) -> Rotation:
+        """The rotation of the base about a coordinate axis by angles (chains, n) [rad]."""
+        return turned(self._base, axis, angle)
 
-        `angle` (hinges, chains, n) [rad]; `vectors` (3, k, chains, n), of which the last is a point and the others are
-        directions. The first `columns` of them, one a hinge, are filled with the point's Jacobian instead.
-
-        With `weights` the last is not a point but a first moment of mass: that of what hangs on the last bodies, to
-        which each body on the way adds its own. A point is the moment of a unit mass.
-        """
-        cosine, sines = cosine_and_sines(np.multiply(angle, self._sign, order="C"))
-        vectors[:, :columns] = 0.0
-        carried, last = vectors[:, columns:], vectors[:, -1]
-        for j in reversed(range(self.length)):
-            hinge = self._hinges[j]
-            if weights is not None:
-                last += weights.moment[j]
+    def frames(self, angle: Array, base: Rotation | None = None) -> list[Frame]:
+        """The hinges from the base outward, for angles (hinges, chains, n) [rad]; `base` turns the whole chain."""
+        rows, found = 0.0 * angle[0], list[Frame]()
+        first, second, third = base or self._base
+        rotation: Rotation = (first + rows, second + rows, third + rows)
+        for hinge, value in zip(self._hinges, angle, strict=True):
+            place = combined(rotation, hinge.offset)
+            origin = found[-1].origin + place if found else place
             if hinge.before is not None:
-                _apply(hinge.before, carried)
-            mix(carried, hinge.plane, cosine[j], sines[j])
-            if columns:
-                np.multiply(last[hinge.swapped], hinge.quarter, out=vectors[hinge.plane, j])
-                carried = vectors[:, j:]
+                rotation = _composed(rotation, hinge.before)
+            axis = rotation[hinge.axis] if hinge.sign is None else rotation[hinge.axis] * hinge.sign
+            rotation = turned(rotation, hinge.axis, value if hinge.sign is None else value * hinge.sign)
             if hinge.after is not None:
-                _apply(hinge.after, carried)
-            last += hinge.offset if weights is None else weights.carried[j] * hinge.offset
-
-    def fetch(self, angle: Array, points: Array) -> None:
-        """Takes points (3, k, chains, n) from the bases' frames to the last bodies', in place; inverse of `carry`."""
-        cosine, sines = cosine_and_sines(np.multiply(angle, -self._sign, order="C"))
-        for j, hinge in enumerate(self._hinges):
-            points -= hinge.offset[:, None]
-            if hinge.after is not None:
-                _apply(hinge.after.swapaxes(0, 1), points)
-            mix(points, hinge.plane, cosine[j], sines[j])
-            if hinge.before is not None:
-                _apply(hinge.before.swapaxes(0, 1), points)
+                rotation = _composed(rotation, hinge.after)
+            found.append(Frame(origin, axis, rotation))
+        return found
 
 
 @dataclass(frozen=True)
-class _Hinge:
-    """A hinge of each of the chains, with what it takes from the frame of the body that it moves to that before."""
+class _Hinge(Constants):
+    """A hinge of each of the chains, with what it adds to the frame before."""
 
-    plane: slice
-    """Components that a turn about its coordinate axis mixes."""
-    swapped: slice
-    """The same in the other order."""
-    sign: Array
-    """Of its turns about that axis, (chains, 1)."""
-    quarter: Array
-    """The pair of -sign and sign, (2, chains, 1)."""
-    before: Array | None
-    """Rotation before the turn, (3, 3, chains), and after it."""
-    after: Array | None
-    offset: Array
-    """Its place in the frame before, (3, chains, 1) [m]."""
+    axis: int
+    """The coordinate axis that it turns about, after `before`."""
+    sign: Array | None
+    """Of its turns about that axis, (chains, 1); None where all are positive."""
+    before: tuple[Entries, ...] | None
+    """Columns of the constant rotation before the turn; None for none."""
+    after: tuple[Entries, ...] | None
+    """The same after it."""
+    offset: Entries
+    """Its place in the frame before [m]."""
 
     @classmethod
     def of(cls, links: Sequence["_Link"]) -> Self:
@@ -143,24 +151,25 @@ class _Hinge:
             sign[:, 0] = axes[:, axis]
             aside[:] = np.eye(3)
         return cls(
-            plane=PLANES[axis],
-            swapped=SWAPPED[axis],
-            sign=sign,
-            quarter=np.stack([-sign, sign]),
-            before=_unless_identity(np.swapaxes(aside, 1, 2)),
-            after=_unless_identity(fixed @ aside),
-            offset=np.stack([link.position for link in links], axis=-1)[..., None],
+            axis=axis,
+            sign=None if (sign == 1.0).all() else sign,
+            before=_unless_identity(fixed @ aside),
+            after=_unless_identity(np.swapaxes(aside, 1, 2)),
+            offset=entries(np.stack([link.position for link in links], axis=-1)),
         )
 
 
-def _apply(rotation: Array, vectors: Array) -> None:
-    """Multiplies vectors (3, k, chains, n) in place by matrices (3, 3, chains)."""
-    vectors[:] = np.einsum("rcs,cksn->rksn", rotation, vectors)
+def _composed(rotation: Rotation, columns: tuple[Entries, ...]) -> Rotation:
+    """The rotation followed outward by a constant one."""
+    first, second, third = (combined(rotation, column) for column in columns)
+    return first, second, third
 
 
-def _unless_identity(rotation: Array) -> Array | None:
-    """Matrices (chains, 3, 3) with the chains last, or nothing where they do nothing."""
-    return None if np.allclose(rotation, np.eye(3)) else np.moveaxis(rotation, 0, -1).copy()
+def _unless_identity(rotation: Array) -> tuple[Entries, ...] | None:
+    """Matrices (chains, 3, 3) as columns, or nothing where they do nothing."""
+    if np.allclose(rotation, np.eye(3)):
+        return None
+    return tuple(entries(rotation[:, :, column].T) for column in range(3))
 
 
 def _turning_to(direction: Array, axis: int) -> Array:

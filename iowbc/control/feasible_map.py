@@ -7,7 +7,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Constants
 
 FEASIBLE = "feasible.npz"
 """File beside a fitted generator: where its postures hold, to which the controller clamps its commands."""
@@ -16,7 +16,7 @@ Run = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class FeasibleMap:
+class FeasibleMap(Constants):
     """For each torso pitch the heights between which every command has a support posture."""
 
     pitch: Array
@@ -28,7 +28,9 @@ class FeasibleMap:
     def clamp(self, height: Array, pitch: Array) -> tuple[Array, Array]:
         """The command brought into the region, first the pitch, then the height at it; shapes (n,) [m], [rad]."""
         kept = pitch.clip(self.pitch[0], self.pitch[-1])
-        low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
+        width = self.pitch[1:] - self.pitch[:-1]
+        way = (kept[..., None] - self.pitch[:-1]).clip(0.0 * width, width) / width
+        low, high = (bound[0] + (way * (bound[1:] - bound[:-1])).sum(-1) for bound in (self.low, self.high))
         return height.clip(low, high), kept
 
     def up_to(self, pitch: float | None) -> "FeasibleMap":

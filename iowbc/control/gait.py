@@ -1,30 +1,28 @@
 """The gait clock φ_t: when it runs, and which foot should be on the ground."""
 
-from typing import Any
-
 import numpy as np
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Mask, namespace
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.mirror import in_place
 
+TINY = 1e-6
+"""Part of a stride within which half a stride counts as complete: float32 rounds a phase by 1e-7."""
 phase_mirror = in_place(-1.0, -1.0)
 """Half a stride later: (sin, cos) of the phase change sign, and the zero of standing stays."""
 
 
 def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     """Whether the commanded velocity asks for steps; command (n, 11), result (n,)."""
-    speed = np.hypot(command[:, 0], command[:, 1])
-    moving: Mask = (speed > gait.moving_speed) | (np.abs(command[:, 2]) > gait.moving_yaw_rate)
+    xp = namespace(command)
+    speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
+    moving: Mask = (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
     return moving
 
 
-def foot_phase(xp: Any, phase: Array) -> Array:
-    """Phase of the left and the right foot, half a stride apart; (n,) to (n, 2), each in [0, 1).
-
-    In NumPy or in torch, whichever `xp` is.
-    """
-    other = phase + 0.5
+def foot_phase(phase: Array) -> Array:
+    """Phase of the left and the right foot, half a stride apart; (n,) to (n, 2), each in [0, 1)."""
+    xp, other = namespace(phase), phase + 0.5
     both: Array = xp.concatenate([phase[:, None], (other - xp.floor(other))[:, None]], -1)
     return both
 
@@ -35,13 +33,12 @@ def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: flo
     It starts when the command asks for motion. When the command stops, it runs on to the next moment at which both feet
     are down, phase 0 or 0.5, and rests there.
     """
-    step = gait.frequency * dt
-    halves = np.floor(phase * 2.0 + 1e-9)
-    advanced = phase + step
-    arrived = np.floor(advanced * 2.0 + 1e-9) > halves
+    xp, advanced = namespace(phase), phase + gait.frequency * dt
+    halves = xp.floor(phase * 2.0 + TINY)
+    arrived = xp.floor(advanced * 2.0 + TINY) > halves
     rests = ~moving & (~stepping | arrived)
-    kept = np.where(stepping & arrived, (halves + 1.0) * 0.5, phase)
-    new = np.mod(np.where(rests, kept, advanced), 1.0)
+    kept = xp.where(stepping & arrived, (halves + 1.0) * 0.5, phase)
+    new = xp.where(rests, kept, advanced) % 1.0
     return new, ~rests
 
 
@@ -51,9 +48,9 @@ def swing_progress(foot_phase: Array, stance: float) -> Array:
     return progress
 
 
-def swing_height(xp: Any, foot_phase: Array, gait: GaitPrior) -> Array:
-    """Height of the soles above the ground by the recipe's profile, (n, 2) [m]; in NumPy or in torch."""
-    sine = xp.sin(np.pi * swing_progress(foot_phase, gait.stance))
+def swing_height(foot_phase: Array, gait: GaitPrior) -> Array:
+    """Height of the soles above the ground by the recipe's profile, (n, 2) [m]."""
+    sine = namespace(foot_phase).sin(np.pi * swing_progress(foot_phase, gait.stance))
     height: Array = gait.swing_clearance * (sine if gait.profile == "sine" else sine * sine)
     return height
 
@@ -66,8 +63,6 @@ def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
 
 def phase_signal(phase: Array, stepping: Mask) -> Array:
     """(sin 2πφ, cos 2πφ), shape (n, 2); zero while the clock rests, so that standing is its own value."""
-    signal = np.empty((len(phase), 2))
-    signal[:, 0] = np.sin(2.0 * np.pi * phase)
-    signal[:, 1] = np.cos(2.0 * np.pi * phase)
-    signal *= stepping[:, None]
+    xp, angle = namespace(phase), 2.0 * np.pi * phase
+    signal: Array = xp.stack([xp.sin(angle), xp.cos(angle)], 1) * stepping[:, None]
     return signal

@@ -1,4 +1,4 @@
-"""The frozen reference generator φ_RG: (θ_I_ref, σ_base) → θ_S_ref in NumPy (paper section III-B)."""
+"""The frozen reference generator φ_RG: (θ_I_ref, σ_base) → θ_S_ref (paper section III-B)."""
 
 import json
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load_file, save_file
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Constants, namespace
 from iowbc.robot.description import Robot
 
 WEIGHTS, ARCHITECTURE = "rg.safetensors", "rg.json"
@@ -15,7 +15,7 @@ FORMAT = 1
 
 
 @dataclass(frozen=True)
-class ReferenceNetwork:
+class ReferenceNetwork(Constants):
     """A multilayer perceptron with standardised inputs and outputs, its output kept to the joint limits."""
 
     inputs: tuple[str, ...]
@@ -35,7 +35,9 @@ class ReferenceNetwork:
 
     def __call__(self, arm_reference: Array, base_command: Array) -> Array:
         """Support reference (n, 15) [rad] for arms (n, 14) [rad] and base commands (n, 2): height [m], pitch [rad]."""
-        x: Array = np.concatenate([arm_reference, base_command], axis=1, dtype=np.float32)
+        xp = namespace(arm_reference)
+        x = xp.concatenate([arm_reference, base_command], 1)
+        x = x.astype(np.float32) if xp is np else x
         if x.shape[1] != len(self.inputs):
             raise ValueError(
                 f"the reference generator takes {len(self.inputs)} inputs ({', '.join(self.inputs)}), got {x.shape[1]}"
@@ -43,7 +45,7 @@ class ReferenceNetwork:
         x = (x - self.input_mean) / self.input_std
         for weight, bias in self.layers[:-1]:
             x = _rowwise(x, weight) + bias
-            x = np.maximum(x, np.expm1(np.minimum(x, 0.0)))
+            x = np.maximum(x, np.expm1(np.minimum(x, 0.0))) if xp is np else xp.nn.functional.elu(x)
         weight, bias = self.layers[-1]
         output: Array = (_rowwise(x, weight) + bias) * self.output_std + self.output_mean
         return output.clip(self.lower, self.upper)

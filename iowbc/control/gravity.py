@@ -2,28 +2,25 @@
 
 import numpy as np
 
-from iowbc.arrays import Array
-from iowbc.control.arms import arm_chains
-from iowbc.control.chain import Chain, Weights
+from iowbc.arrays import Array, Constants, namespace
+from iowbc.control.arms import arm_chains, by_arm, by_row
+from iowbc.control.chain import Chain, combined, crossed, entries, rotated, rotated_back
 from iowbc.robot.description import GRAVITY, Robot
 
-AXES = np.eye(3)[:, :, None, None]
-"""The unit vectors side by side, as `Chain.carry` takes them."""
 
-
-class ArmGravity:
+class ArmGravity(Constants):
     """Static torques of both arms, many robots at once. Holds constants only."""
 
     def __init__(self, robot: Robot) -> None:
         chains, waist = arm_chains(robot)
         self._arms, self._waist = Chain(chains), Chain([waist])
         hinges = self._arms.length
-        self._moment, self._mass = np.zeros((hinges, 3, 2, 1)), np.zeros((hinges, 2, 1))
+        moment, mass = np.zeros((hinges, 3, 2)), np.zeros((hinges, 2, 1))
         for side, chain in enumerate(chains):
             for place, body in enumerate(body for body in chain if body.hinge is not None):
-                mass, moment = robot.tree.burden(body.name)
-                self._moment[place, :, side, 0] = moment
-                self._mass[: place + 1, side] += mass
+                mass[place, side], moment[place, :, side] = robot.tree.burden(body.name)
+        self._mass, self._moment = mass, tuple(map(entries, moment))
+        self._outward = np.cumsum(mass[::-1], axis=0)[::-1].copy()
         self._grip = robot.grip_offset.T[:, :, None]
 
     def torque(self, arms: Array, waist: Array, gravity: Array, load: Array | None = None) -> Array:
@@ -36,18 +33,16 @@ class ArmGravity:
         The torque of hinge i is -(a_i × Σ_k m_k (c_k - o_i))·g over the links k from i outward, with its axis a_i and
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
         """
-        count, hinges = len(arms), self._arms.length
-        moments = np.empty((3, hinges + 1, 2, count))
-        carried = self._mass
-        moments[:, hinges] = 0.0
+        xp, frames = namespace(arms), self._arms.frames(by_arm(arms))
+        torso = self._waist.frames(waist.T[:, None])[-1].rotation
+        down = GRAVITY * rotated_back(torso, gravity.T[:, None])
+        moments, mass = [0.0 * frames[-1].origin], self._outward
         if load is not None:
-            moments[:, hinges] = self._grip * load.T
-            carried = carried + load.T
-        weights = Weights(self._moment, carried)
-        self._arms.carry(arms.reshape(count, 2, hinges).transpose(2, 1, 0), moments, hinges, weights)
-        axes = np.zeros((3, 4, 1, count))
-        axes[:, :3] = AXES
-        self._waist.carry(waist.T[:, None], axes)
-        down = np.einsum("xkn,nx->kn", axes[:, :3, 0], GRAVITY * gravity)
-        torque: Array = -np.einsum("xjsn,xn->nsj", moments[:, :hinges], down)
-        return torque.reshape(count, -1)
+            mass = mass + load.T
+            moments = [load.T * (frames[-1].origin + rotated(frames[-1].rotation, self._grip))]
+        for hinge in reversed(range(len(frames))):
+            own = self._mass[hinge] * frames[hinge].origin + combined(frames[hinge].rotation, self._moment[hinge])
+            moments.append(moments[-1] + own)
+        axes, origins = (xp.stack([getattr(frame, name) for frame in frames], 1) for name in ("axis", "origin"))
+        lever = xp.stack(moments[:0:-1], 1) - mass * origins
+        return by_row(-(crossed(axes, lever) * down[:, None]).sum(0))

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Constants
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Hinge
@@ -14,7 +14,7 @@ AXES = ("y", "x", "z", "y", "y", "x")
 
 
 @dataclass(frozen=True)
-class Legs:
+class Legs(Constants):
     """Geometry of both legs, left and right, with all joints at zero: x forward, z up, [m]; arrays of shape (2,)."""
 
     side: Array

@@ -1,13 +1,13 @@
 """The reference layer: a command becomes arm references by differential IK (eq. 2, 3) and support references by the RG.
 
-Pure arrays over n environments; the deployed controller uses it too.
+Pure arrays over n environments; the exported graph is traced from the same lines.
 """
 
 from pathlib import Path
 
 import numpy as np
 
-from iowbc.arrays import Array, Mask, as_slice
+from iowbc.arrays import Array, Constants, Mask, as_slice, namespace
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.gravity import ArmGravity
@@ -22,7 +22,7 @@ def both_wrists(left: tuple[float, float, float]) -> Array:
     return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
 
 
-class ReferenceLayer:
+class ReferenceLayer(Constants):
     """Arm and support references of n environments. Holds constants only; the references are the caller's."""
 
     def __init__(self, robot: Robot, references: References, rg: Path | None) -> None:
@@ -36,7 +36,7 @@ class ReferenceLayer:
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
             self.feasible = FeasibleMap.load(rg / FEASIBLE).up_to(references.largest_pitch)
-        self._start, self._lean = references.arms, references.lean
+        self._start, self._ahead = references.arms, references.lean * np.eye(3)[0]
         self._gravity = ArmGravity(robot) if references.arms.gravity else None
         self._compliance = 1.0 / robot.kp[robot.interaction]
         self.default_arms = robot.default_position[robot.interaction]
@@ -49,8 +49,9 @@ class ReferenceLayer:
         """The command with height and torso pitch brought into the feasible map; (n, 11)."""
         if self.feasible is None:
             return command
-        clamped = command.copy()
-        clamped[:, HEIGHT], clamped[:, PITCH] = self.feasible.clamp(command[:, HEIGHT], command[:, PITCH])
+        height, pitch = self.feasible.clamp(command[:, HEIGHT], command[:, PITCH])
+        parts = [command[:, :HEIGHT], height[:, None], pitch[:, None], command[:, OFFSET]]
+        clamped: Array = namespace(command).concatenate(parts, 1)
         return clamped
 
     def startable(self, command: Array) -> Array:
@@ -67,7 +68,7 @@ class ReferenceLayer:
         command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, arm joints),
         support (n, support joints).
         """
-        arms = np.tile(self.default_arms, (len(command), 1))
+        arms = self.default_arms + 0.0 * command[:, :1]
         target = self.wrist_target(self.support(arms, command), command, grasp)
         for _ in range(self._start.settling):
             arms = self.arms.solve_step(arms, target, self._start.settling_time)
@@ -84,23 +85,23 @@ class ReferenceLayer:
     def support(self, arms: Array, command: Array) -> Array:
         """θ_S_ref = φ_RG(θ_I_ref, σ_base), (n, support joints) [rad], without the gait prior."""
         if self.network is None:
-            return np.tile(self.default_support, (len(command), 1))
+            return self.default_support + 0.0 * command[:, :1]
         return self.network(arms, command[:, HEIGHT : PITCH + 1])
 
     def with_stride(self, support: Array, command: Array, phase: Array, stepping: Mask) -> Array:
         """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]."""
         if self._stride is None:
             return support
-        return self._stride(np, support, self.start_pitch(support, command), command, phase, stepping.astype(float))
+        return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""
-        pitch: Array = command[:, PITCH] - support[:, self._waist_pitch].sum(axis=1)
+        pitch: Array = command[:, PITCH] - support[:, self._waist_pitch].sum(1)
         return pitch
 
     def start_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch at which the feet of a posture are flat, (n,) [rad]: zero for the default posture."""
-        return np.zeros(len(command)) if self.network is None else self.pelvis_pitch(support, command)
+        return 0.0 * command[:, PITCH] if self.network is None else self.pelvis_pitch(support, command)
 
     def wrist_target(self, support: Array, command: Array, grasp: Array) -> Array:
         """x_wrist = x_task_base + Δp (eq. 2), turned from the heading frame into the torso frame; (n, 2, 3) [m].
@@ -112,8 +113,8 @@ class ReferenceLayer:
 
     def wrists(self, command: Array, grasp: Array) -> Array:
         """x_wrist in the heading frame, ahead of the base grasp where the torso leans forward, (n, 2, 3) [m]."""
-        wrists: Array = grasp + command[:, OFFSET].reshape(-1, 2, 3)
-        wrists[:, :, 0] += self._lean * np.maximum(np.sin(command[:, PITCH]), 0.0)[:, None]
+        lean = namespace(command).sin(command[:, PITCH]).clip(0.0, None)
+        wrists: Array = grasp + command[:, OFFSET].reshape(-1, 2, 3) + lean[:, None, None] * self._ahead
         return wrists
 
     def arm_target(self, arms: Array, support: Array, command: Array, load: Array) -> Array:
@@ -121,9 +122,8 @@ class ReferenceLayer:
         the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references."""
         if self._gravity is None:
             return arms
-        pitch = self.pelvis_pitch(support, command)
-        down = np.zeros((len(pitch), 3))
-        down[:, 0], down[:, 2] = np.sin(pitch), -np.cos(pitch)
+        xp, pitch = namespace(command), self.pelvis_pitch(support, command)
+        down = xp.stack([xp.sin(pitch), 0.0 * pitch, -xp.cos(pitch)], 1)
         torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None])
         target: Array = arms + torque * self._compliance
         return target

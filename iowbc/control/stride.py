@@ -5,17 +5,14 @@ in swing it returns, lifted by the swing clearance; the pelvis sways over the st
 become joint angles by the leg's own geometry: hip pitch and knee exactly, as two links in the sagittal plane, hip roll
 and yaw and ankle roll to first order; the ankles keep the soles parallel to where the posture has them, and every joint
 stays in its range.
-
-The same lines compute in NumPy and, while the graph is exported, in torch: `xp` is the one or the other.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Constants, namespace
 from iowbc.control.command import YAW_RATE
 from iowbc.control.gait import foot_phase, swing_height, swing_progress
 from iowbc.control.legs import Legs, leg_geometry, leg_joints
@@ -26,7 +23,7 @@ HIP_PITCH, HIP_ROLL, HIP_YAW, KNEE, ANKLE_PITCH, ANKLE_ROLL = range(6)
 
 
 @dataclass(frozen=True)
-class Stride:
+class Stride(Constants):
     """The gait prior of a robot. Holds constants only."""
 
     settings: GaitPrior
@@ -56,28 +53,21 @@ class Stride:
             upper=robot.upper[robot.support],
         )
 
-    def converted(self, convert: Callable[[Array], Any]) -> Self:
-        """The same with other arrays, such as tensors."""
-        legs = Legs(**{field.name: convert(getattr(self.legs, field.name)) for field in fields(Legs)})
-        return replace(self, legs=legs, lower=convert(self.lower), upper=convert(self.upper))
-
-    def __call__(
-        self, xp: Any, posture: Array, pelvis_pitch: Array, command: Array, phase: Array, stepping: Array
-    ) -> Array:
+    def __call__(self, posture: Array, pelvis_pitch: Array, command: Array, phase: Array, stepping: Array) -> Array:
         """θ_S_ref with the stride, (n, support joints) [rad].
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
         `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero.
         """
-        legs, pitch = self.legs, pelvis_pitch[:, None]
+        xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]
         thigh = pitch + hip
-        x, z = _turned(_direction(xp, thigh), *_ankle(xp, legs, knee))
-        ahead, left, up, turn = self._soles(xp, pitch, x, command, phase, stepping)
-        bent, angle = self._bent(xp, x + ahead, z + up)
+        x, z = _turned(_direction(thigh), *_ankle(legs, knee))
+        ahead, left, up, turn = self._soles(pitch, x, command, phase, stepping)
+        bent, angle = self._bent(x + ahead, z + up)
         running = stepping[:, None]
         change, bend = (angle - thigh) * running, (bent - knee) * running
-        hip_roll, hip_yaw, ankle_roll = _sideways(xp, legs, thigh + change, knee + bend, left, turn)
+        hip_roll, hip_yaw, ankle_roll = _sideways(legs, thigh + change, knee + bend, left, turn)
         moved = [change, hip_roll, hip_yaw, bend, -change - bend, ankle_roll]
         others = 0.0 * posture[:, : len(self.order) - 2 * len(moved)]
         changes = xp.concatenate([*moved, others], -1)[:, list(self.order)]
@@ -85,60 +75,60 @@ class Stride:
         return walked
 
     def _soles(
-        self, xp: Any, pitch: Array, ankle_x: Array, command: Array, phase: Array, stepping: Array
+        self, pitch: Array, ankle_x: Array, command: Array, phase: Array, stepping: Array
     ) -> tuple[Array, Array, Array, Array]:
         """How far soles are from where the posture has them, (n, 2) each: ahead, to the left, up [m], turned [rad]."""
-        gait, legs = self.settings, self.legs
-        foot = foot_phase(xp, phase)
+        xp, gait, legs = namespace(phase), self.settings, self.legs
+        foot = foot_phase(phase)
         swing = swing_progress(foot, gait.stance)
         time = gait.stance / gait.frequency * gait.stride
-        part = travel(xp, foot, swing, gait.stance) * time * stepping[:, None]
+        part = travel(foot, swing, gait.stance) * time * stepping[:, None]
         rate = command[:, YAW_RATE : YAW_RATE + 1]
         place_x = xp.cos(pitch) * legs.hip_x + xp.sin(pitch) * legs.hip_z + ankle_x + legs.sole_x
         sway = gait.sway * (xp.sin(2.0 * np.pi * phase) * stepping)[:, None]
         return (
             part * (command[:, 0:1] - rate * legs.side),
             part * (command[:, 1:2] + rate * place_x) - sway,
-            swing_height(xp, foot, gait) * stepping[:, None],
+            swing_height(foot, gait) * stepping[:, None],
             part * rate,
         )
 
-    def _bent(self, xp: Any, x: Array, z: Array) -> tuple[Array, Array]:
+    def _bent(self, x: Array, z: Array) -> tuple[Array, Array]:
         """Knee and thigh's angle that put the ankle ahead of and above the hip pitch axis, (n, 2) [m] to [rad].
 
         d² = l₁² + l₂² + 2 l₁l₂ cos(knee + κ) for links that make the angle κ with the knee at zero.
         """
         legs = self.legs
         cosine = (x * x + z * z - legs.thigh_squared - legs.shank_squared) / legs.twice_product
-        knee = xp.arccos(cosine.clip(-1.0, float(np.cos(self.settings.straightest_knee)))) - legs.crooked
-        return knee, _forward(xp, x, z) - _forward(xp, *_ankle(xp, legs, knee))
+        knee = namespace(x).arccos(cosine.clip(-1.0, float(np.cos(self.settings.straightest_knee)))) - legs.crooked
+        return knee, _forward(x, z) - _forward(*_ankle(legs, knee))
 
 
-def travel(xp: Any, foot: Array, swing: Array, stance: float) -> Array:
+def travel(foot: Array, swing: Array, stance: float) -> Array:
     """Place of feet along their stride, 1/2 ahead to -1/2 behind, of their phases and progress in swing (n, 2).
 
     At an even pace in stance; in swing a cubic that leaves and meets the ground at the ground's own speed.
     """
     slope = (1.0 - stance) / stance
     forth = swing * swing * (3.0 - 2.0 * swing) - slope * swing * (1.0 - swing) * (1.0 - 2.0 * swing)
-    place: Array = xp.where(foot < stance, 0.5 - foot / stance, forth - 0.5)
+    place: Array = namespace(foot).where(foot < stance, 0.5 - foot / stance, forth - 0.5)
     return place
 
 
-def _ankle(xp: Any, legs: Legs, knee: Array) -> tuple[Array, Array]:
+def _ankle(legs: Legs, knee: Array) -> tuple[Array, Array]:
     """The ankle ahead of and above the hip pitch axis, in the thigh's frame, (n, 2) [m]."""
-    x, z = _turned(_direction(xp, knee), legs.shank_x, legs.shank_z)
+    x, z = _turned(_direction(knee), legs.shank_x, legs.shank_z)
     return legs.thigh_x + x, legs.thigh_z + z
 
 
-def _sideways(xp: Any, legs: Legs, thigh: Array, knee: Array, left: Array, turn: Array) -> tuple[Array, Array, Array]:
+def _sideways(legs: Legs, thigh: Array, knee: Array, left: Array, turn: Array) -> tuple[Array, Array, Array]:
     """Hip roll, hip yaw and ankle roll that move soles to the left [m] and turn them [rad] without tilting them.
 
     With levers of the three axes (the sole's motion to the left per radian) and their directions a:
     Σ lever·δ = left, Σ a_z·δ = turn, Σ a_x·δ = 0.
     """
-    direction = _direction(xp, thigh)
-    ankle_x, ankle_z = _ankle(xp, legs, knee)
+    direction = _direction(thigh)
+    ankle_x, ankle_z = _ankle(legs, knee)
     sole_x, sole_z = legs.sole_x, legs.sole_z + legs.ankle_roll_z
     roll_x, roll_z = direction[0], -direction[1]
     yaw_x, yaw_z = _turned(direction, legs.tilt_x, legs.tilt_z)
@@ -152,8 +142,9 @@ def _sideways(xp: Any, legs: Legs, thigh: Array, knee: Array, left: Array, turn:
     return hip_roll, hip_yaw, -(roll_x * hip_roll + yaw_x * hip_yaw)
 
 
-def _direction(xp: Any, angle: Array) -> tuple[Array, Array]:
+def _direction(angle: Array) -> tuple[Array, Array]:
     """Cosine and sine."""
+    xp = namespace(angle)
     return xp.cos(angle), xp.sin(angle)
 
 
@@ -163,7 +154,7 @@ def _turned(direction: tuple[Array, Array], x: Array, z: Array) -> tuple[Array, 
     return cosine * x + sine * z, cosine * z - sine * x
 
 
-def _forward(xp: Any, x: Array, z: Array) -> Array:
+def _forward(x: Array, z: Array) -> Array:
     """Pitch that turns straight down into a vector of the sagittal plane, [rad]."""
-    pitch: Array = xp.arctan2(-x, -z)
+    pitch: Array = namespace(x).arctan2(-x, -z)
     return pitch

@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from iowbc.control.command import COMMAND
 from iowbc.control.feasible_map import FEASIBLE
 from iowbc.control.generator import ARCHITECTURE, WEIGHTS
-from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, GRAPH, ROBOT
+from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.sensing import Sensing
@@ -24,7 +24,7 @@ from iowbc.robot.description import DESCRIPTION
 
 LARGEST_CONTRACT = 1_000_000
 """Bytes of the largest contract that is read."""
-FORMAT: Literal[3] = 3
+FORMAT: Literal[4] = 4
 """Format of the contracts that are written and read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
 
@@ -71,7 +71,7 @@ class Latency(Section):
 class Contract(Section):
     """What `contract.json` says."""
 
-    format: Literal[3] = FORMAT
+    format: Literal[4] = FORMAT
     """Raised when a reader of the old format would misread the new one."""
     recipe: str
     """Name of the recipe that was exported."""
@@ -82,11 +82,17 @@ class Contract(Section):
     opset: int
     """ONNX operator set."""
     control_frequency: float = Field(gt=0)
-    """Rate at which the graph is to be called [Hz]."""
+    """Rate at which step.onnx is to be called [Hz]."""
     physics_frequency: float = Field(gt=0)
     """Rate of the joints' PD loop in training [Hz]."""
     inputs: tuple[PortEntry, ...]
+    """Of step.onnx."""
     outputs: tuple[PortEntry, ...]
+    """Of step.onnx."""
+    settle: tuple[str, ...]
+    """Inputs of settle.onnx, by their names in `inputs`; its output is `state`."""
+    state: tuple[PortEntry, ...]
+    """Parts of `state`, in order, each flattened; a program passes it on and need not look into it."""
     joints: tuple[str, ...]
     """All joints in the order of every 29-vector."""
     support: tuple[int, ...]
@@ -163,23 +169,14 @@ class Contract(Section):
     @model_validator(mode="after")
     def _what_the_loop_passes_on(self) -> Self:
         """The control loop gives these inputs, and uses these outputs, whatever else the graph has."""
-        support, arms, size = len(self.support), len(self.interaction), sum(part.size for part in self.observation)
-        past = (self.history, size)
-        needed = {
-            "inputs": {
-                "command": (len(COMMAND),),
-                "heading_reference": (1,),
-                "arm_reference": (arms,),
-                "gait": (2,),
-                "last_action": (support,),
-                "restart": (1,),
-                "history": past,
-            },
+        support, size = len(self.support), sum(math.prod(part.shape) for part in self.state)
+        needed: dict[str, dict[str, tuple[int, ...]]] = {
+            "inputs": {"command": (len(COMMAND),), "grasp": (2, 3), "load": (1,), "state": (size,)},
             "outputs": {
-                "support_target": (support,),
+                "target": (len(self.joints),),
                 "action": (support,),
                 "support_reference": (support,),
-                "history_next": past,
+                "state_next": (size,),
             },
         }
         for side, shapes in needed.items():
@@ -187,7 +184,32 @@ class Contract(Section):
             for name, shape in shapes.items():
                 if found.get(name) != shape:
                     raise ValueError(f"{side}: {name} should have the shape {shape}, found {found.get(name)}")
+        if absent := set(self.settle) - {port.name for port in self.inputs}:
+            raise ValueError(f"settle: {', '.join(sorted(absent))} are no inputs")
+        if "action" not in {part.name for part in self.state}:
+            raise ValueError("state: has no part `action`")
         return self
+
+
+def metadata(contract: Contract) -> dict[str, str]:
+    """What both ONNX files say of themselves: the contract without the digests of files, and its most asked entries
+    under the names that other exporters use."""
+
+    def listed(values: tuple[float, ...]) -> str:
+        return ",".join(f"{value:g}" for value in values)
+
+    return {
+        "recipe": contract.recipe,
+        **contract.sources,
+        "joint_names": ",".join(contract.joints),
+        "joint_stiffness": listed(contract.kp),
+        "joint_damping": listed(contract.kd),
+        "default_joint_pos": listed(contract.default_position),
+        "action_scale": listed(contract.action_scale),
+        "command_names": ",".join(contract.command),
+        "observation_names": ",".join(part.name for part in contract.observation),
+        "contract": contract.model_dump_json(exclude={"files"}),
+    }
 
 
 def sentences(section: type[Section], path: str = "") -> dict[str, str]:
@@ -268,7 +290,7 @@ def read_contract(folder: Path | str) -> Contract:
         raise ContractBroken(
             f"{folder / CONTRACT}: not a contract of format {FORMAT}: {error}; export again"
         ) from error
-    require_sealed(contract, folder, GRAPH, f"{ROBOT}/{DESCRIPTION}")
+    require_sealed(contract, folder, STEP, SETTLE, f"{ROBOT}/{DESCRIPTION}")
     missing = [name for name in contract.files if not (folder / name).is_file()]
     if missing:
         raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that `export` made")

@@ -11,15 +11,17 @@ EXPORT = "export"
 SHORTEST_PREFIX = 4
 """Characters of a key that are enough to name an artifact, where they are unique."""
 CONTRACT = "contract.json"
-GRAPH = "policy.onnx"
+STEP = "step.onnx"
+"""One control step: measurements, wanted command, scene and state to joint targets and the next state."""
+SETTLE = "settle.onnx"
+"""The first state."""
 GOLDEN = "golden.npz"
 RECIPE = "recipe.json"
 """The recipe's world: with it the policy can be played in the simulation that accepted it."""
 ROBOT = "robot"
 """Folder with the robot's description inside the exported folder."""
 GENERATOR = "rg"
-"""Folder with the reference generator: its feasible map clamps commands; its network, which is in the graph, too, gives
-the posture for which the arms' references are computed."""
+"""Folder with the reference generator, for a simulation of the policy; the controller has all of it in its graphs."""
 
 
 def exported_folder(word: Path | str) -> Path:

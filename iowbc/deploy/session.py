@@ -20,7 +20,7 @@ def open_session(path: Path) -> onnxruntime.InferenceSession:
 
 
 def run(session: onnxruntime.InferenceSession, inputs: Values) -> Values:
-    """Outputs by name."""
+    """Outputs by name; of the inputs those that the graph has."""
     names = [port.name for port in session.get_outputs()]
-    found: list[Any] = session.run(names, inputs)
+    found: list[Any] = session.run(names, {port.name: inputs[port.name] for port in session.get_inputs()})
     return dict(zip(names, found, strict=True))

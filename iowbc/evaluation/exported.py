@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from iowbc.control.references import ReferenceLayer
 from iowbc.control.sensors import Measured
 from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
@@ -20,7 +21,8 @@ def exported_world(folder: Path) -> Specification:
 
     Raises ContractBroken where the folder is not what its contract says.
     """
-    said = Controller.load(folder).contract
+    controller = Controller.load(folder)
+    said = controller.contract
     contract.require_sealed(said, folder, exported_folder.RECIPE)
     path = folder / exported_folder.RECIPE
     try:
@@ -28,6 +30,8 @@ def exported_world(folder: Path) -> Specification:
     except ValidationError as error:
         raise ContractBroken(f"{path}: not a recipe of this version: {error}; export again") from error
     generator = contract.generator_folder(said, folder)
+    with contract.readable(folder / exported_folder.GENERATOR):
+        ReferenceLayer(controller.robot, recipe.task.references, generator)
     with contract.readable(folder):
         return Specification(recipe.deployed, folder / exported_folder.ROBOT, generator)
 
@@ -44,7 +48,6 @@ class ExportedPolicy:
         self.controller, self.environment = controller, environment
         self.golden_steps = golden_steps
         self.inputs: list[dict[str, NDArray[np.float32]]] = []
-        self.outputs: list[dict[str, NDArray[np.float32]]] = []
         self.largest_difference = 0.0
 
     def reset(self, which: NDArray[np.bool_]) -> None:
@@ -56,11 +59,11 @@ class ExportedPolicy:
         del observation, privileged
         batch = self.environment.batch
         measured = Measured.of(batch.measured)
-        targets = self.controller.step(measured, batch.command, limit_rates=False)
+        targets = self.controller.step(measured, batch.command)
         expected = batch.targets(targets.action)
         passed = np.abs(expected - targets.position)[~targets.held]
         self.largest_difference = max(self.largest_difference, float(passed.max(initial=0.0)))
         if len(self.inputs) < self.golden_steps:
-            self.inputs.append({name: value[:1].copy() for name, value in self.controller.inputs.items()})
-            self.outputs.append({name: value[:1].copy() for name, value in self.controller.outputs.items()})
+            given = self.controller.inputs
+            self.inputs.append({name: value[:1].copy() for name, value in given.items() if name != "state"})
         return targets.action

@@ -35,7 +35,10 @@ def golden_episode(recipe: Recipe) -> Episode:
 
 
 def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:
-    """What the graph is given at each step; fewer than asked for where the robot falls. Raises Interrupted."""
+    """What each control step is given, without the state; fewer than asked for where the robot falls.
+
+    Raises Interrupted.
+    """
     environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(golden_episode(world.recipe),))
     try:
         policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=world.recipe.export.golden_steps)

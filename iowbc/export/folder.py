@@ -7,7 +7,7 @@ from pathlib import Path
 
 from iowbc.control.command import COMMAND
 from iowbc.deploy import contract, exported_folder
-from iowbc.export.graph import ControllerGraph, Port
+from iowbc.export.graph import ControllerGraph
 from iowbc.export.onnx_graph import write_onnx
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.generator import ReferenceGenerator
@@ -21,12 +21,11 @@ PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "to
 def write_folder(
     out: Path, graph: ControllerGraph, recipe: Recipe, rg: Path | None, sources: Mapping[str, str]
 ) -> contract.Contract:
-    """Write `policy.onnx`, `contract.json`, `recipe.json`, the robot's folder, and with `rg` the generator's folder.
+    """Write both graphs, `contract.json`, `recipe.json`, the robot's folder, and with `rg` the generator's folder.
 
     sources: artifact keys of what went into the graph, by stage.
     """
     robot, drawn = graph.robot, recipe.simulation.randomization
-    write_onnx(graph, out / exported_folder.GRAPH, recipe.export.opset, {"recipe": recipe.name, **sources})
     (out / exported_folder.ROBOT).mkdir()
     for source in (robot.folder / DESCRIPTION, robot.mjcf):
         shutil.copy(source, out / exported_folder.ROBOT / source.name)
@@ -41,8 +40,10 @@ def write_folder(
         opset=recipe.export.opset,
         control_frequency=recipe.task.control_frequency,
         physics_frequency=1.0 / recipe.simulation.physics.timestep,
-        inputs=tuple(map(_entry, graph.input_ports())),
-        outputs=tuple(map(_entry, graph.output_ports())),
+        inputs=graph.step.inputs,
+        outputs=graph.step.outputs,
+        settle=tuple(port.name for port in graph.settle.inputs),
+        state=graph.state,
         joints=robot.joints,
         support=tuple(robot.support.tolist()),
         interaction=tuple(robot.interaction.tolist()),
@@ -53,8 +54,8 @@ def write_folder(
         lower=tuple(robot.lower.tolist()),
         upper=tuple(robot.upper.tolist()),
         default_position=tuple(robot.default_position.tolist()),
-        action_scale=tuple(graph.scale.double().tolist()),
-        action_bound=graph.bound,
+        action_scale=tuple(graph.equations.scale.tolist()),
+        action_bound=graph.equations.bound,
         history=graph.history,
         observation=tuple(contract.PartEntry.model_validate(part) for part in graph.layout.describe()),
         command=COMMAND,
@@ -70,6 +71,8 @@ def write_folder(
         versions={name: version(name) for name in PACKAGES},
         sources=dict(sources),
     )
+    for name, program in ((exported_folder.SETTLE, graph.settle), (exported_folder.STEP, graph.step)):
+        write_onnx(program, out / name, recipe.export.opset, contract.metadata(statement))
     return contract.seal(statement, out)
 
 
@@ -86,7 +89,3 @@ def world_of(recipe: Recipe) -> Recipe:
         eval=Evaluation(sequence=played[0].sequence) if played else Evaluation(),
         export=recipe.export,
     )
-
-
-def _entry(port: Port) -> contract.PortEntry:
-    return contract.PortEntry(name=port.name, shape=port.shape, unit=port.unit, frame=port.frame, meaning=port.meaning)

@@ -1,11 +1,9 @@
-"""Golden vectors: inputs and outputs of the graph over a short rollout, and the checks made with them."""
+"""Golden vectors: inputs and outputs of the control step over a short rollout, and the checks made with them."""
 
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from iowbc.deploy.session import Values
@@ -18,6 +16,21 @@ OUTPUT = "output/"
 def stacked(steps: Sequence[Mapping[str, NDArray[np.float32]]]) -> Values:
     """Steps of one robot, each of leading axis 1, as one batch with the steps along the leading axis."""
     return {name: np.concatenate([step[name] for step in steps]) for name in steps[0]}
+
+
+def played(settle: Callable[[Values], Values], step: Callable[[Values], Values], inputs: Values) -> Values:
+    """Outputs of the control step over a rollout of one robot, steps along the leading axis, without the state.
+
+    settle and step: the programs of inputs by name; `inputs` of every step, without the state, which is passed on.
+    """
+    state: Values = {}
+    found = []
+    for row in range(len(inputs["command"])):
+        given = {name: value[row : row + 1] for name, value in inputs.items()}
+        outputs = step(given | (state or settle(given)))
+        state = {"state": outputs.pop("state_next")}
+        found.append(outputs)
+    return stacked(found)
 
 
 def write_golden(inputs: Values, outputs: Values, path: Path) -> None:
@@ -41,15 +54,3 @@ def largest_difference(expected: Values, actual: Values) -> dict[str, float]:
     return {
         name: float(np.nan_to_num(np.abs(value - actual[name]), nan=np.inf).max()) for name, value in expected.items()
     }
-
-
-def inference_seconds(session: onnxruntime.InferenceSession, inputs: Values, repeats: int) -> NDArray[np.float64]:
-    """Time of each of `repeats` inferences of one robot, shape (repeats,) [s]."""
-    rows = len(next(iter(inputs.values())))
-    times = np.empty(repeats)
-    for index in range(repeats):
-        step = {name: value[index % rows : index % rows + 1] for name, value in inputs.items()}
-        start = time.perf_counter()
-        session.run(None, step)
-        times[index] = time.perf_counter() - start
-    return times

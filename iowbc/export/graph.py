@@ -1,188 +1,120 @@
-"""The controller as one torch module: reference generator, gait prior, observation, history, student, action scaling.
+"""The control step and its first state as torch modules, traced from the equations of `iowbc.control`."""
 
-It does in one graph what `iowbc.task` does in NumPy, from measured values to joint targets of the support branch.
-"""
-
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iowbc.control.command import COMMAND, HEIGHT, PITCH
-from iowbc.control.generator import ReferenceNetwork
-from iowbc.control.observation import OBJECT, PROPRIOCEPTION, ObservationLayout, Sensed
+from iowbc.control.command import COMMAND
+from iowbc.control.observation import OBJECT, PROPRIOCEPTION, ObservationLayout
+from iowbc.control.references import ReferenceLayer
 from iowbc.control.sensors import Measured, quantities
-from iowbc.control.stride import Stride
-from iowbc.learning.activations import ACTIVATIONS
+from iowbc.control.step import STATE, ControlStep
+from iowbc.deploy.contract import PortEntry
 from iowbc.learning.networks import StudentNetwork
-from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
 
-
-@dataclass(frozen=True)
-class Port:
-    """An input or output of the graph, without the leading axis of robots."""
-
-    name: str
-    shape: tuple[int, ...]
-    unit: str
-    frame: str
-    meaning: str
+GRASP = PortEntry(name="grasp", shape=(2, 3), unit="m", frame="heading", meaning="base grasp of both wrists")
 
 
-class ReferenceModule(nn.Module):
-    """φ_RG in torch: (n, inputs) to the support reference (n, 15) [rad], or a constant posture without a generator."""
+class Program(nn.Module):
+    """A graph with named inputs and outputs, whose leading axis is the number of robots."""
 
-    default: Tensor
-    input_mean: Tensor
-    input_std: Tensor
-    output_mean: Tensor
-    output_std: Tensor
-    lower: Tensor
-    upper: Tensor
+    inputs: tuple[PortEntry, ...]
+    outputs: tuple[PortEntry, ...]
 
-    def __init__(self, network: ReferenceNetwork | None, default: np.ndarray, arms: int) -> None:
+    def _named(self, values: Sequence[Tensor]) -> dict[str, Any]:
+        """Inputs by name: tensors where the equations' annotations say arrays."""
+        return dict(zip((port.name for port in self.inputs), values, strict=True))
+
+
+class SettleProgram(Program):
+    """`settle.onnx`: the first state of a robot."""
+
+    def __init__(self, equations: ControlStep, command: PortEntry, heading: PortEntry, state: PortEntry) -> None:
         super().__init__()
-        self.constant = network is None
-        self.register_buffer("default", _tensor(default))
-        if network is None:
-            return
-        for name in ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper"):
-            self.register_buffer(name, _tensor(getattr(network, name)))
-        layers: list[nn.Module] = []
-        for weight, bias in network.layers:
-            linear = nn.Linear(*reversed(weight.shape))
-            linear.weight.data, linear.bias.data = _tensor(weight), _tensor(bias)
-            layers += [linear, ACTIVATIONS[network.activation].module()]
-        self.body = nn.Sequential(*layers[:-1])
+        self.equations = equations
+        self.inputs, self.outputs = (command, heading, GRASP), (state,)
+        self.eval()
 
-    def forward(self, arm_reference: Tensor, base_command: Tensor) -> Tensor:
-        if self.constant:
-            return torch.zeros_like(arm_reference[:, :1]) + self.default
-        rows = torch.cat([arm_reference, base_command], dim=1)
-        normal = (rows - self.input_mean) / self.input_std
-        return torch.clamp(self.body(normal) * self.output_std + self.output_mean, self.lower, self.upper)
+    def forward(self, *values: Tensor) -> tuple[Any, ...]:
+        return (self.equations.packed(self.equations.settle(**self._named(values))),)
 
 
-class GaitModule(nn.Module):
-    """The stride that the gait prior adds to θ_S_ref, and the phase signal of the observation."""
+class StepProgram(Program):
+    """`step.onnx`: one control period."""
 
-    def __init__(self, gait: GaitPrior, robot: Robot) -> None:
+    def __init__(
+        self, equations: ControlStep, student: StudentNetwork, inputs: tuple[PortEntry, ...], joints: int, support: int
+    ) -> None:
         super().__init__()
-        stride = Stride.of(robot, gait)
-        self.stride = None if stride is None else stride.converted(_tensor)
+        self.equations, self.student, self.inputs = equations, student, inputs
+        self.outputs = (
+            PortEntry(
+                name="target", shape=(joints,), unit="rad", frame="joint", meaning="targets of the PD loop, all joints"
+            ),
+            PortEntry(
+                name="action", shape=(support,), unit="action", frame="joint", meaning="residual action, clipped"
+            ),
+            PortEntry(
+                name="support_reference",
+                shape=(support,),
+                unit="rad",
+                frame="joint",
+                meaning="θ_S_ref with the gait prior",
+            ),
+            inputs[-1].model_copy(update={"name": "state_next", "meaning": "the next step's `state`"}),
+        )
+        self.eval().requires_grad_(False)
 
-    def forward(self, posture: Tensor, pelvis_pitch: Tensor, command: Tensor, gait: Tensor) -> tuple[Tensor, Tensor]:
-        """θ_S_ref (n, support joints) [rad] and phase signal (n, 2); gait: φ in [0, 1), and 1 while the clock runs."""
-        phase, stepping = gait[:, 0], gait[:, 1]
-        angle = 2.0 * torch.pi * phase
-        signal = torch.stack([torch.sin(angle), torch.cos(angle)], dim=1) * gait[:, 1:]
-        if self.stride is None:
-            return posture, signal
-        given: tuple[Any, ...] = (posture, pelvis_pitch, command, phase, stepping)
-        with_stride: Any = self.stride(torch, *given)
-        return with_stride, signal
+    def forward(self, *values: Tensor) -> tuple[Any, ...]:
+        given = self._named(values)
+        others = {name: given.pop(name) for name in ("command", "grasp", "load", "state")}
+        state = self.equations.unpacked(others.pop("state"))
+        step = self.equations.step(Measured(**given), **others, state=state)
+        return step.target, step.action, step.support_reference, self.equations.packed(step.state)
 
 
-class ControllerGraph(nn.Module):
-    """One control step of the support branch; inputs and outputs as `input_ports` and `output_ports` list them."""
-
-    scale: Tensor
-    joint_order: Tensor
+class ControllerGraph:
+    """Both programs of a student with its references."""
 
     def __init__(
         self,
         student: StudentNetwork,
-        rg: ReferenceNetwork | None,
         robot: Robot,
+        task: Task,
         layout: ObservationLayout,
-        gait: GaitPrior,
-        *,
         history: int,
-        action_scale: np.ndarray,
-        action_bound: float,
+        references: ReferenceLayer,
     ) -> None:
-        super().__init__()
-        self.layout, self.history, self.bound = layout, history, action_bound
-        self.observes_object = OBJECT[0].name in layout.names
-        self._measured = (*quantities(of_object=False), *(quantities(of_object=True) if self.observes_object else ()))
-        self.robot = robot
-        self.student = student
-        self.reference = ReferenceModule(rg, robot.default_position[robot.support], len(robot.interaction))
-        self.gait = GaitModule(gait, robot)
-        self.register_buffer("scale", _tensor(action_scale))
-        order = np.argsort(np.concatenate([robot.support, robot.interaction]))
-        self.register_buffer("joint_order", torch.from_numpy(order))
-        self.eval().requires_grad_(False)
-
-    def input_ports(self) -> tuple[Port, ...]:
-        """Inputs, in order."""
-        support, arms = len(self.robot.support), len(self.robot.interaction)
-        return (
-            Port("command", (len(COMMAND),), PROPRIOCEPTION[0].unit, "heading", "the skill-level command C, clamped"),
-            *self._measured_ports(False),
-            Port(
-                "heading_reference",
-                (1,),
-                "rad",
-                "world",
-                "`heading` at the start plus the integrated yaw rate commanded",
-            ),
-            Port("arm_reference", (arms,), "rad", "joint", "θ_I_ref from differential IK, interaction order"),
-            Port("gait", (2,), "1, 1", "-", "gait phase in [0, 1), and 1 while the gait clock runs, else 0"),
-            Port("last_action", (support,), "action", "joint", "`action` of the step before, 0 at the start"),
-            Port("restart", (1,), "1", "-", "1 at the first step of an episode: the history is filled with it"),
-            Port("history", (self.history, self.layout.size), "SI", "-", "`history_next` of the step before"),
-            *(self._measured_ports(True) if self.observes_object else ()),
+        equations = ControlStep(robot, task, references, layout, history, student)
+        self.robot, self.student, self.layout, self.history, self.equations = robot, student, layout, history, equations
+        self.state = tuple(
+            PortEntry(name=name, shape=equations.shapes[name], unit=unit, frame=frame, meaning=meaning)
+            for name, (unit, frame, meaning) in STATE.items()
         )
-
-    def _measured_ports(self, of_object: bool) -> tuple[Port, ...]:
-        return tuple(
-            Port(name, (len(what.kind(self.robot)),), what.unit, what.frame, what.meaning)
-            for name, what in quantities(of_object).items()
-        )
-
-    def _pelvis_pitch(self, posture: Tensor, command: Tensor) -> Tensor:
-        """Pitch of the pelvis in a posture of the generator; zero in the default one, whose feet are flat so."""
-        if self.reference.constant:
-            return torch.zeros_like(command[:, PITCH])
-        return command[:, PITCH] - posture[:, self.robot.waist_pitch.tolist()].sum(dim=1)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        """Outputs, in order."""
-        support = len(self.robot.support)
-        return (
-            Port("support_target", (support,), "rad", "joint", "position targets of the PD loop, support order"),
-            Port("action", (support,), "action", "joint", "residual action, clipped; the next step's `last_action`"),
-            Port("support_reference", (support,), "rad", "joint", "θ_S_ref with the gait prior"),
-            Port("history_next", (self.history, self.layout.size), "SI", "-", "the next step's `history`"),
-        )
-
-    def forward(self, *inputs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Values of the output ports for those of the input ports, in their order."""
-        given = dict(zip((port.name for port in self.input_ports()), inputs, strict=True))
-        command, arm_reference, history = given["command"], given["arm_reference"], given["history"]
-        posture = self.reference(arm_reference, command[:, HEIGHT : PITCH + 1])
-        support_reference, signal = self.gait(posture, self._pelvis_pitch(posture, command), command, given["gait"])
-        measured: dict[str, Any] = {name: given[name] for name in self._measured}
-        known: dict[str, Any] = {  # tensors in place of arrays: the observation's parts use operators alone
-            "command": command,
-            "heading_reference": given["heading_reference"],
-            "joint_reference": torch.cat([support_reference, arm_reference], dim=1).index_select(1, self.joint_order),
-            "phase": signal,
-            "last_action": given["last_action"],
-            "support_reference": support_reference,
-            "arm_reference": arm_reference,
+        """Parts of the packed state, in order."""
+        seen = {**quantities(of_object=False)}
+        if OBJECT[0].name in layout.names:
+            seen |= quantities(of_object=True)
+        measured = {
+            name: PortEntry(
+                name=name, shape=(len(what.kind(robot)),), unit=what.unit, frame=what.frame, meaning=what.meaning
+            )
+            for name, what in seen.items()
         }
-        sensed = Sensed(measured=Measured(**measured), **known)
-        frame = torch.cat([part.value(sensed) for part in self.layout.parts], dim=1)[:, None]
-        shifted = torch.cat([history[:, 1:], frame], dim=1)
-        history_next = torch.where(given["restart"][:, :, None] > 0.5, frame.expand(-1, self.history, -1), shifted)
-        action = torch.clamp(self.student(history_next), -self.bound, self.bound)
-        target = support_reference + self.scale * action
-        return target, action, support_reference, history_next
+        about = (PROPRIOCEPTION[0].unit, "heading", "the wanted command C: rate-limited and clamped inside")
+        command = PortEntry(name="command", shape=(len(COMMAND),), unit=about[0], frame=about[1], meaning=about[2])
+        size = sum(equations.sizes.values())
+        state = PortEntry(name="state", shape=(size,), unit="SI", frame="-", meaning="what the loop remembers")
+        load = PortEntry(name="load", shape=(1,), unit="kg", frame="-", meaning="mass expected between the hands")
+        traced = equations.converted(_tensor)
+        self.settle = SettleProgram(traced, command, measured["heading"], state)
+        inputs = (command, *measured.values(), GRASP, load, state)
+        self.step = StepProgram(traced, student, inputs, len(robot.joints), len(robot.support))
 
 
 def _tensor(values: np.ndarray) -> Tensor:

@@ -10,6 +10,7 @@ from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
 from iowbc.evaluation.trials.load import load_metrics
 from iowbc.evaluation.trials.rollout import RECORDED, trace_of
 from iowbc.live.moment import Moment
+from iowbc.recipe.evaluation.success import Success
 
 WINDOW = 3.0
 """Figures are means over so long a time [s]; the weight in the hands leaves out its first second."""
@@ -75,6 +76,6 @@ class Track:
         means = deviations.means()
         return Readings(
             errors={name: means[name] for name in ERRORS},
-            weight_in_hands=load_metrics(trace, self.held_weight)["weight_in_hands"],
+            weight_in_hands=load_metrics(trace, self.held_weight, Success().least_weight)["weight_in_hands"],
             saturated={name: float(share) for name, share in zip(self.joints, shares, strict=True) if share > 0},
         )

@@ -84,7 +84,7 @@ class Judge:
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
         follow(memory, target, error, disturbed, self._task.termination, self._period)
         ending = self._ending(state, memory, moved, place, error)
-        foot_phase, stance = gait.foot_phase(np, memory.phase), self._task.references.gait.stance
+        foot_phase, stance = gait.foot_phase(memory.phase), self._task.references.gait.stance
         step = Step(
             state=state,
             motion=moved,
@@ -101,7 +101,7 @@ class Judge:
             action=action,
             previous_action=memory.action,
             earlier_action=memory.earlier_action,
-            swing_profile=gait.swing_height(np, foot_phase, self._task.references.gait),
+            swing_profile=gait.swing_height(foot_phase, self._task.references.gait),
             stepping=memory.stepping,
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),

@@ -5,16 +5,14 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.deploy import exported_folder
 from iowbc.evaluation.exported import exported_world
 from iowbc.robot.description import load_robot
 from iowbc.web.bundling import bundle, npm_parts
-from iowbc.web.kinematics import kinematics
 from iowbc.web.scenes import first_scene, web_scenes
 
 SCENES = "scenes.json"
-"""What the page adds to the exported files: scenes, kinematics, and which of the files it has."""
+"""What the page adds to the exported files: scenes, and which of the files it has."""
 
 
 def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:
@@ -26,17 +24,12 @@ def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None
     world = exported_world(exported)
     out.mkdir(parents=True, exist_ok=True)
     golden = [exported_folder.GOLDEN] if (exported / exported_folder.GOLDEN).is_file() else []
-    for name in (exported_folder.GRAPH, exported_folder.CONTRACT, *golden):
+    for name in (exported_folder.SETTLE, exported_folder.STEP, exported_folder.CONTRACT, *golden):
         shutil.copyfile(exported / name, out / name)
-    feasible = exported / exported_folder.GENERATOR / FEASIBLE
-    if feasible.is_file():
-        FeasibleMap.load(feasible).up_to(world.recipe.task.references.largest_pitch).save(out / FEASIBLE)
     robot = load_robot(world.robot)
     about = {
         "scenes": web_scenes(world, robot),
         "first": first_scene(world.recipe),
-        "kinematics": kinematics(robot),
-        "feasible": FEASIBLE if feasible.is_file() else None,
         "golden": exported_folder.GOLDEN if golden else None,
     }
     (out / SCENES).write_text(json.dumps(about, separators=(",", ":")), encoding="utf-8")

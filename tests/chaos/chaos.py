@@ -6,7 +6,7 @@ python tests/chaos/chaos.py --recipe tests/chaos/workers.yaml --events 40
 A recipe is run once undisturbed; then again and again, disturbed, in a folder of its own, each run going on from what
 the one before has left. Lost is: an artifact that was whole before an event and is not after it, unless the event hit
 it; and a result of a run that came to its end and differs from the undisturbed one. Also counted are tracebacks and
-errors that nobody foresaw, and processes that outlive their run (MLflow's sender aside). The seed decides kinds,
+unexpected errors, and processes that outlive their run (MLflow's sender aside). The seed decides kinds,
 moments and places. Without `--recipe` the small stages of the test suite run, which count instead of learn and have no
 workers; of a recipe's events every second one kills a worker process and lets the run go on.
 
@@ -158,7 +158,7 @@ class Chaos:
         finally:
             process.kill()
             process.wait()
-        tracebacks = self._unforeseen()
+        tracebacks = self._unexpected()
         left = self._left()
         if struck.kind == ENDED or process.returncode == 0:
             lost += self._ended(process.returncode)
@@ -166,12 +166,12 @@ class Chaos:
         if code := self.start("status").wait():
             tracebacks.append(f"status ended with {code} after this:\n{self.said()}")
         else:
-            tracebacks += self._unforeseen()
+            tracebacks += self._unexpected()
         self.tally.add(Turn(number, struck.kind, round(moment, 2), tuple(lost), tuple(tracebacks), tuple(left)))
 
-    def _unforeseen(self) -> list[str]:
+    def _unexpected(self) -> list[str]:
         said = self.said()
-        return [said] if "Traceback" in said or "nobody foresaw" in said else []
+        return [said] if "Traceback" in said or "unexpected error" in said else []
 
     def _ended(self, code: int) -> list[str]:
         """What a run that came to its end before anything happened to it has made otherwise than the undisturbed."""
@@ -362,7 +362,7 @@ def play(recipe: Path | None, events: int, seed: int, folder: Path, record: Path
         last = tally.turns[-1]
         print(f"{last.moment:.1f} s, {last.kind}; {tally.line}", *last.findings, sep="\n", flush=True)
     lost = chaos._ended(chaos.run().wait())
-    tally.add(Turn(len(tally.turns), ENDED, chaos.undisturbed.seconds, tuple(lost), tuple(chaos._unforeseen())))
+    tally.add(Turn(len(tally.turns), ENDED, chaos.undisturbed.seconds, tuple(lost), tuple(chaos._unexpected())))
     return tally
 
 

@@ -169,10 +169,10 @@ class Series:
             names = [name for name in {**theirs, **ours} if ours.get(name) != theirs.get(name)]
             lost += [f"{name}: {ours.get(name)} instead of {theirs.get(name)}" for name in names]
         said = self._said()
-        unforeseen = "Traceback" in said or "nobody foresaw" in said
+        unexpected = "Traceback" in said or "unexpected error" in said
         kind = ENDED if code == 0 else f"none, the run gave up with {code}"
         return Turn(
-            len(self.tally.turns), kind, round(seconds, 1), tuple(lost), (said,) if unforeseen else (), tuple(left())
+            len(self.tally.turns), kind, round(seconds, 1), tuple(lost), (said,) if unexpected else (), tuple(left())
         )
 
     def _results(self, runs: str) -> dict[tuple[str, str], str]:

@@ -20,7 +20,7 @@ class Turn:
     lost: tuple[str, ...] = ()
     """What is not there any more, or is another than it should be."""
     tracebacks: tuple[str, ...] = ()
-    """What was printed with a traceback, or of something that nobody foresaw."""
+    """What was printed with a traceback, or as an unexpected error."""
     left: tuple[str, ...] = ()
     """Processes that outlived the run."""
 

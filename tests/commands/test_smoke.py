@@ -40,7 +40,7 @@ def test_the_smoke_recipe_runs_in_an_empty_folder_and_is_cached_afterwards(smoke
     for stage in PIPELINE:
         assert open_artifact(f"smoke/{stage}", smoke / "runs").metrics
     exported = open_artifact("smoke/export", smoke / "runs").folder
-    assert {"policy.onnx", "contract.json", "golden.npz"} <= {path.name for path in exported.iterdir()}
+    assert {"step.onnx", "settle.onnx", "contract.json", "golden.npz"} <= {path.name for path in exported.iterdir()}
     words = [sys.executable, "-m", "iowbc", "run", "smoke", *UNTRACKED]
     again = subprocess.run(words, cwd=smoke, capture_output=True, text=True, check=True)
     assert again.stdout.count(": cached") == len(PIPELINE)

@@ -1,4 +1,4 @@
-"""A recipe of recipes runs each, shares what they share, and compares them."""
+"""A study runs each, shares what they share, and compares them."""
 
 import subprocess
 from collections.abc import Callable

@@ -6,15 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.control.chain import Chain, turn
+from iowbc.control.chain import Chain, jacobian, rotated, rotated_back
 from iowbc.robot import rotations
 
 LENGTH, ROWS = 4, 5
-
-
-@pytest.fixture
-def random() -> np.random.Generator:
-    return np.random.default_rng(0)
 
 
 def body(axis: Any, random: np.random.Generator) -> Any:
@@ -51,43 +46,50 @@ def by_matrices(chain: list[Any], angle: Any) -> tuple[Any, Any, list[Any], list
     ],
     ids=["coordinate axes", "reversed axes", "axes of any direction"],
 )
-def test_points_directions_and_jacobian_are_those_of_the_matrices(axes: list[Any], random: np.random.Generator) -> None:
+def test_points_axes_and_jacobian_are_those_of_the_matrices(axes: list[Any], random: np.random.Generator) -> None:
     pairs = [(unit(random), unit(random)) if pair == "skew" else pair for pair in axes]
     chains = [[body(pair[side], random) for pair in pairs] for side in range(2)]
-    angle, grip, direction = random.normal(size=(LENGTH, 2, ROWS)), random.normal(size=3), unit(random)
-    with_jacobian = np.empty((3, LENGTH + 1, 2, ROWS))
-    with_jacobian[:, -1] = grip[:, None, None]
-    Chain(chains).carry(angle, with_jacobian, LENGTH)
-    carried = np.empty((3, 2, 2, ROWS))
-    carried[:, 0], carried[:, 1] = direction[:, None, None], grip[:, None, None]
-    Chain(chains).carry(angle, carried)
+    angle, grip = random.normal(size=(LENGTH, 2, ROWS)), random.normal(size=3)
+    frames = Chain(chains).frames(angle)
+    end = frames[-1].origin + rotated(frames[-1].rotation, grip[:, None, None])
+    columns = jacobian(frames, end)
     for side, chain in enumerate(chains):
         for row in range(ROWS):
             rotation, position, origins, hinges = by_matrices(chain, angle[:, side, row])
             point = position + rotation @ grip
-            jacobian = [np.cross(axis, point - origin) for axis, origin in zip(hinges, origins, strict=True)]
-            np.testing.assert_allclose(with_jacobian[:, :-1, side, row].T, jacobian, atol=1e-12)
-            assert with_jacobian[:, -1, side, row] == pytest.approx(point)
-            assert carried[:, 0, side, row] == pytest.approx(rotation @ direction)
-            assert carried[:, 1, side, row] == pytest.approx(point)
+            expected = [np.cross(axis, point - origin) for axis, origin in zip(hinges, origins, strict=True)]
+            np.testing.assert_allclose(columns[:, :, side, row].T, expected, atol=1e-12)
+            np.testing.assert_allclose([frame.axis[:, side, row] for frame in frames], hinges, atol=1e-12)
+            assert end[:, side, row] == pytest.approx(point)
+
+
+def test_rotating_back_undoes_a_rotation(random: np.random.Generator) -> None:
+    chain = Chain([[body([0, 0, 1], random), body(unit(random), random)]])
+    rotation = chain.frames(random.normal(size=(2, 1, ROWS)))[-1].rotation
+    vector = random.normal(size=(3, 1, ROWS))
+    assert rotated_back(rotation, rotated(rotation, vector)) == pytest.approx(vector)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_turn_is_a_rotation_about_its_axis(axis: int, random: np.random.Generator) -> None:
-    vectors, angle = random.normal(size=(3, 2, 1, ROWS)), random.normal(size=(1, ROWS))
-    expected = np.einsum("nij,jksn->iksn", rotations.axis_matrix(np.eye(3)[axis], angle[0]), vectors)
-    turn(vectors, axis, angle)
-    assert vectors == pytest.approx(expected)
+def test_a_base_may_be_turned(axis: int, random: np.random.Generator) -> None:
+    chain, angle, base = (
+        Chain([[body([0, 0, 1], random)]]),
+        random.normal(size=(1, 1, ROWS)),
+        random.normal(size=(1, ROWS)),
+    )
+    level, tilted = chain.frames(angle)[0], chain.frames(angle, chain.turned(axis, base))[0]
+    matrices = rotations.axis_matrix(np.eye(3)[axis], base[0])
+    assert pytest.approx(np.einsum("nij,jn->ni", matrices, level.origin[:, 0])) == tilted.origin[:, 0].T
 
 
 def test_a_body_without_a_hinge_is_fixed_to_the_one_before(random: np.random.Generator) -> None:
     chain = [body([0, 0, 1], random), body([1, 0, 0], random), body([0, 1, 0], random)]
     chain[1].hinge = None
     angle, point = random.normal(size=(2, 1, 1)), random.normal(size=3)
-    carried = point.reshape(3, 1, 1, 1).copy()
-    Chain([chain]).carry(angle, carried)
+    last = Chain([chain]).frames(angle)[-1]
     chain[1].hinge = SimpleNamespace(axis=np.array([1, 0, 0]))
     rotation, position, _, _ = by_matrices(chain, [angle[0, 0, 0], 0.0, angle[1, 0, 0]])
+    carried = last.origin + rotated(last.rotation, point[:, None, None])
     assert carried.ravel() == pytest.approx(position + rotation @ point)
 
 
@@ -102,9 +104,8 @@ def test_the_example_of_the_docstring(random: np.random.Generator) -> None:
     upper, lower = body([0, 0, 1], random), body([0, 1, 0], random)
     upper.quaternion = lower.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     upper.position, lower.position = np.zeros(3), np.array([0.2, 0.0, 0.0])
-    vectors = np.zeros((3, 3, 1, 1))
-    vectors[:, 2, 0, 0] = (0.3, 0.0, 0.0)
-    Chain([[upper, lower]]).carry(np.full((2, 1, 1), np.pi / 2), vectors, columns=2)
-    assert vectors[:, 2, 0, 0] == pytest.approx([0.0, 0.2, -0.3])
-    assert vectors[:, 0, 0, 0] == pytest.approx([-0.2, 0.0, 0.0])
-    assert vectors[:, 1, 0, 0] == pytest.approx([0.0, -0.3, 0.0])
+    frames = Chain([[upper, lower]]).frames(np.full((2, 1, 1), np.pi / 2))
+    end = frames[-1].origin + rotated(frames[-1].rotation, np.array([0.3, 0.0, 0.0])[:, None, None])
+    assert end[:, 0, 0] == pytest.approx([0.0, 0.2, -0.3])
+    assert jacobian(frames, end)[:, 0, 0, 0] == pytest.approx([-0.2, 0.0, 0.0])
+    assert jacobian(frames, end)[:, 1, 0, 0] == pytest.approx([0.0, -0.3, 0.0])

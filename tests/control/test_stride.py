@@ -64,7 +64,7 @@ def walk(robot: Robot, stride: Stride, posture: Any, pitch: float, velocity: Any
     command = np.zeros((len(PHASES), 11))
     command[:, :3] = velocity
     rows, ones = np.tile(posture, (len(PHASES), 1)), np.ones(len(PHASES))
-    joints = stride(np, rows, pitch * ones, command, PHASES, ones)
+    joints = stride(rows, pitch * ones, command, PHASES, ones)
     soles = [[sole(robot, row, side, pitch) for side in range(2)] for row in joints]
     return joints, np.array([[s[0] for s in row] for row in soles]), np.array([[s[1] for s in row] for row in soles])
 
@@ -108,7 +108,7 @@ def test_feet_leave_and_meet_the_ground_at_its_own_speed() -> None:
     for edge in (PRIOR.stance, 1.0):
         around = np.array([[edge - step], [edge], [edge + step]]) % 1.0
         swing = ((around - PRIOR.stance) / (1.0 - PRIOR.stance)).clip(0.0, 1.0)
-        place = travel(np, around, swing, PRIOR.stance)[:, 0]
+        place = travel(around, swing, PRIOR.stance)[:, 0]
         assert np.diff(place) / step == pytest.approx([-1.0 / PRIOR.stance] * 2, rel=1e-3)
 
 
@@ -123,7 +123,7 @@ def test_the_pelvis_sways_over_the_standing_foot(robot: Robot, stride: Stride) -
 def test_at_rest_the_posture_is_left_alone(robot: Robot, stride: Stride) -> None:
     posture = np.tile(crouch(robot, 0.7, 0.0, 0.1), (5, 1))
     command = np.tile([0.5, 0.2, 0.4, *[0.0] * 8], (5, 1))
-    kept = stride(np, posture, np.full(5, 0.1), command, np.linspace(0.0, 0.9, 5), np.zeros(5))
+    kept = stride(posture, np.full(5, 0.1), command, np.linspace(0.0, 0.9, 5), np.zeros(5))
     np.testing.assert_array_equal(kept, posture)
 
 
@@ -136,8 +136,8 @@ def test_the_mirrored_command_half_a_stride_later_gives_the_mirrored_stride(robo
     pitch, ones = random.uniform(-0.2, 0.4, rows), np.ones(rows)
     mirror = support_mirror(robot)
     turned = observation_layout(robot, False).mirrors[0](command)
-    ours = mirror(even(np, posture, pitch, command, phase, ones))
-    mirrored = even(np, mirror(posture), pitch, turned, (phase + 0.5) % 1.0, ones)
+    ours = mirror(even(posture, pitch, command, phase, ones))
+    mirrored = even(mirror(posture), pitch, turned, (phase + 0.5) % 1.0, ones)
     np.testing.assert_allclose(mirrored, ours, atol=1e-9)
 
 

@@ -19,7 +19,7 @@ import pytest
 from iowbc.deploy import controller as controller_module
 from iowbc.deploy.contract import Contract, read_contract, seal
 from iowbc.deploy.controller import Controller, Measured
-from iowbc.deploy.exported_folder import CONTRACT, GRAPH
+from iowbc.deploy.exported_folder import CONTRACT, STEP
 from iowbc.errors import ContractBroken
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
@@ -101,15 +101,13 @@ def test_a_sudden_command_is_approached_at_the_rates_of_training(exported: Path,
     controller = Controller.load(exported)
     controller.step(measured(robot), NOMINAL)
     controller.step(measured(robot), NOMINAL + np.eye(11)[0])
-    assert controller.inputs["command"][0, 0] == pytest.approx(recipe.task.commands.rates.velocity / 50)
-    controller.step(measured(robot), NOMINAL + np.eye(11)[0], limit_rates=False)
-    assert controller.inputs["command"][0, 0] == 1.0
+    assert controller.state["command"][0, 0] == pytest.approx(recipe.task.commands.rates.velocity / 50)
 
 
 def test_commands_are_clamped_to_the_feasible_map(exported: Path, robot: Robot) -> None:
     controller = Controller.load(exported)
     controller.step(measured(robot), NOMINAL + np.eye(11)[3])
-    assert controller.inputs["command"][0, 3] == pytest.approx(0.78)
+    assert controller.state["command"][0, 3] == pytest.approx(0.78)
 
 
 @pytest.mark.parametrize("command", [np.zeros(10), np.zeros((3, 11))])
@@ -130,7 +128,7 @@ def test_a_reset_takes_a_boolean_for_each_robot_and_nothing_else(which: Any, exp
     controller.step(measured(robot, 3), NOMINAL)
     with pytest.raises(ValueError, match="expected a boolean for each of 3 robots"):
         controller.reset(which)
-    assert not controller._loop.starts.any()
+    assert controller.state["begun"].all()
 
 
 @pytest.mark.parametrize("robots", [0, -1])
@@ -145,7 +143,9 @@ def files(exported: Path) -> list[str]:
 
 def test_a_changed_file_is_noticed_whichever_it_is(exported: Path, tmp_path: Path) -> None:
     sealed = [name for name in files(exported) if name != CONTRACT]
-    assert {GRAPH, "robot/robot.yaml", "robot/g1.xml", "rg/feasible.npz", "rg/rg.safetensors"} <= set(sealed)
+    assert {STEP, "settle.onnx", "robot/robot.yaml", "robot/g1.xml", "rg/feasible.npz", "rg/rg.safetensors"} <= set(
+        sealed
+    )
     folder = shutil.copytree(exported, tmp_path / "changed")
     for name in sealed:
         whole = (folder / name).read_bytes()
@@ -175,11 +175,11 @@ def changed(exported: Path, place: Path, **entries: Any) -> Path:
 
 
 def test_a_contract_of_another_format_is_refused(exported: Path, tmp_path: Path) -> None:
-    with pytest.raises(ContractBroken, match=r"(?s)not a contract of format 3.*; export again"):
-        read_contract(changed(exported, tmp_path / "earlier", format=2))
+    with pytest.raises(ContractBroken, match=r"(?s)not a contract of format 4.*; export again"):
+        read_contract(changed(exported, tmp_path / "earlier", format=3))
 
 
-@pytest.mark.parametrize("entries", [{"format": 4}, {"format": 4, "joints": 3}, {"torque_limits": [1.0]}])
+@pytest.mark.parametrize("entries", [{"format": 5}, {"format": 5, "joints": 3}, {"torque_limits": [1.0]}])
 def test_a_contract_of_a_newer_version_is_called_that(exported: Path, tmp_path: Path, entries: dict[str, Any]) -> None:
     with pytest.raises(ContractBroken, match=r"made by a newer version of iowbc than \d.*install that here"):
         read_contract(changed(exported, tmp_path / "later", **entries))
@@ -192,7 +192,7 @@ def test_a_contract_of_a_newer_version_is_called_that(exported: Path, tmp_path: 
         ("kd", [float("nan")] * 29, "kd"),
         ("action_scale", [0.2], "action_scale: 1 numbers for 15 support joints"),
         ("support", [0, 1], "do not cover 29 joints"),
-        ("files", {}, "says nothing of policy.onnx"),
+        ("files", {}, "says nothing of step.onnx"),
     ],
 )
 def test_numbers_that_do_not_fit_the_joints_are_refused(
@@ -222,7 +222,10 @@ def test_the_contract_says_what_every_number_is(exported: Path) -> None:
     assert contract.control_frequency == 50
     assert contract.physics_frequency == pytest.approx(200)
     assert {"torch", "onnxruntime", "iowbc"} <= set(contract.versions)
-    assert sum(part.size for part in contract.observation) == contract.outputs[-1].shape[1]
+    assert contract.state[-1].shape == (contract.history, sum(part.size for part in contract.observation))
+    told = onnx.load(exported / STEP).metadata_props
+    inside = Contract.model_validate_json(next(entry.value for entry in told if entry.key == "contract"))
+    assert inside == contract.model_copy(update={"files": {}})
 
 
 def test_the_controller_runs_without_torch_and_mujoco(exported: Path) -> None:
@@ -259,7 +262,7 @@ def test_targets_that_are_no_numbers_are_not_passed_on(
 
     def broken(session: Any, inputs: Any) -> Any:
         outputs = graph(session, inputs)
-        for name in ("support_target", "action", "history_next"):
+        for name in ("target", "action", "state_next"):
             outputs[name][1] = np.nan
         return outputs
 
@@ -271,22 +274,6 @@ def test_targets_that_are_no_numbers_are_not_passed_on(
     again = controller.step(measured(robot, 2), NOMINAL)
     assert not again.held.any()
     assert np.isfinite(again.position).all()
-
-
-def test_a_step_runs_the_graph_once_the_first_one_too(
-    exported: Path, robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    controller, graph, runs = Controller.load(exported), controller_module.run, []
-
-    def counted(session: Any, inputs: Any) -> Any:
-        runs.append(inputs)
-        return graph(session, inputs)
-
-    monkeypatch.setattr(controller_module, "run", counted)
-    controller.step(measured(robot), NOMINAL)
-    assert len(runs) == 1
-    controller.step(measured(robot), NOMINAL)
-    assert len(runs) == 2
 
 
 def test_a_robot_that_starts_leaves_the_others_on_their_way(exported: Path, robot: Robot) -> None:
@@ -305,19 +292,19 @@ def test_a_robot_that_starts_leaves_the_others_on_their_way(exported: Path, robo
 
 def test_weights_that_are_no_numbers_are_refused(exported: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(exported, tmp_path / "weights")
-    model = onnx.load(folder / GRAPH)
+    model = onnx.load(folder / STEP)
     weights = next(tensor for tensor in model.graph.initializer if tensor.data_type == onnx.TensorProto.FLOAT)
     for tensor in model.graph.initializer:
         if tensor.data_type == onnx.TensorProto.FLOAT and len(tensor.raw_data) > len(weights.raw_data):
             weights = tensor
     weights.raw_data = np.full(len(weights.raw_data) // 4, np.nan, np.float32).tobytes()
-    onnx.save(model, folder / GRAPH)
+    onnx.save(model, folder / STEP)
     seal(Contract.model_validate_json((folder / CONTRACT).read_text()), folder)
     with pytest.raises(ContractBroken, match="not finite: the weights are no numbers"):
         Controller.load(folder)
 
 
-@pytest.mark.parametrize("name", ["../policy.onnx", "/etc/passwd"])
+@pytest.mark.parametrize("name", ["../step.onnx", "/etc/passwd"])
 def test_a_contract_that_names_files_outside_of_its_folder_is_refused(
     name: str, exported: Path, tmp_path: Path
 ) -> None:
@@ -329,7 +316,7 @@ def test_a_contract_that_names_files_outside_of_its_folder_is_refused(
     "program",
     [
         "import iowbc\niowbc.Controller.load({folder!r})",
-        "import runpy\nrunpy.run_path({example!r})['onnxruntime'].InferenceSession({folder!r} + '/policy.onnx')",
+        "import runpy\nrunpy.run_path({example!r})['onnxruntime'].InferenceSession({folder!r} + '/step.onnx')",
     ],
     ids=["iowbc", "an example"],
 )

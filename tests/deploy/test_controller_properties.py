@@ -48,10 +48,9 @@ def controller(exported: Path) -> Controller:
 @given(
     said=st.fixed_dictionaries({name: numbers(size) for name, size in SHAPES.items()}),
     command=numbers(11).map(lambda row: row[0]),
-    limited=st.booleans(),
 )
 def test_targets_can_be_followed_and_the_past_is_kept_of_a_robot_whose_values_cannot_be_true(
-    controller: Controller, robot: Robot, said: dict[str, np.ndarray], command: np.ndarray, limited: bool
+    controller: Controller, robot: Robot, said: dict[str, np.ndarray], command: np.ndarray
 ) -> None:
     assert {field.name for field in fields(Measured)} >= said.keys()
     controller.reset()
@@ -61,14 +60,14 @@ def test_targets_can_be_followed_and_the_past_is_kept_of_a_robot_whose_values_ca
     )
     first = controller.step(quiet, NOMINAL)
     assert first.reasons == ("",)
-    before = controller._loop
-    targets = controller.step(Measured(**said), command, limit_rates=limited)
+    before = controller.state
+    targets = controller.step(Measured(**said), command)
     assert targets.held.tolist() == [targets.reasons != ("",)]
     values = np.concatenate([command, *(value[0] for value in said.values())])
     if not (np.abs(values) < 1e6).all():
         assert "is not between" in targets.reasons[0]
     if "is not between" in targets.reasons[0]:
-        assert all(np.array_equal(vars(before)[name], value) for name, value in vars(controller._loop).items())
+        assert all(np.array_equal(before[name], value) for name, value in controller.state.items())
         assert np.array_equal(targets.position, first.position)
     assert np.isfinite(targets.position).all()
     reach = robot.velocity_limit / controller.frequency

@@ -64,7 +64,7 @@ def test_what_the_partner_bears_is_not_asked_of_the_hands() -> None:
     signals = trace(200)
     grip, partner = signals.grip_force.copy(), signals.partner_force.copy()
     grip[:, [2, 5]], partner[:, 2] = -20.0, 40.0  # 40 N by the hands, 40 N by the partner, of 80 N
-    metrics = load_metrics(replace(signals, grip_force=grip, partner_force=partner), 80.0)
+    metrics = load_metrics(replace(signals, grip_force=grip, partner_force=partner), 80.0, 5.0)
     assert metrics["hand_weight_share"] == pytest.approx(0.5)
     assert metrics["partner_weight_share"] == pytest.approx(0.5)
     assert metrics["weight_in_hands"] == pytest.approx(1.0)
@@ -74,8 +74,12 @@ def test_weight_on_the_thighs_is_not_in_the_hands() -> None:
     signals = trace(200)
     grip = signals.grip_force.copy()
     grip[:, [2, 5]] = -10.0
-    assert load_metrics(replace(signals, grip_force=grip), 40.0)["weight_in_hands"] == pytest.approx(0.5)
+    assert load_metrics(replace(signals, grip_force=grip), 40.0, 5.0)["weight_in_hands"] == pytest.approx(0.5)
+
+
+def test_where_a_weight_rests_that_a_touch_exceeds_is_not_asked() -> None:
+    assert np.isnan(load_metrics(trace(200), 0.5, 5.0)["weight_in_hands"])
 
 
 def test_without_an_object_in_the_hands_there_is_no_share() -> None:
-    assert np.isnan(list(load_metrics(trace(200), 0.0).values())).all()
+    assert np.isnan(list(load_metrics(trace(200), 0.0, 5.0).values())).all()

@@ -195,19 +195,21 @@ def test_latex_of_a_table_without_groups_has_one_line_a_variant() -> None:
 def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_path: Path) -> None:
     parts = [trials_of(name, "lifting", {0.0: 5, 4.0: 2, 8.0: 0}) for name in variants]
     parts += [trials_of(name, "pushing", {0.0: 5, 30.0: 5}) for name in variants]
+    parts += [trials_of(name, "squeezing", {0.05: 5, 2.0: 5}) for name in variants]
     parts += [trials_of(name, "heavy", {18.0: 1}, "tyre") for name in variants]
     parts += [trials_of(name, "stagnation", {65.0: 5}, "blocked crate") for name in variants]
     parts += [trials_of(name, "pushes", {4.0: 4}, "left", impulse=10.0) for name in variants]
     summary = write_report(pd.concat(parts), tmp_path, 0.8)
-    assert len(summary) == 8 * len(variants)
+    assert len(summary) == 10 * len(variants)
     names = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*")}
     tables = ["lifting", "lifting_moving", "pushing", "pushing_moving", "heavy", "heavy_errors", "stagnation"]
-    tables += ["paper", "capacity", "pushes", "joints", "contact"]
+    tables += ["squeezing", "squeezing_moving", "paper", "capacity", "pushes", "joints", "contact"]
     tables += ["differences", "interquartile"] if len(variants) > 1 else []
     assert names == {
         *(f"tables/{name}.{kind}" for name in tables for kind in ("md", "tex", "csv", "json")),
         "tables/summary.csv",
-        *(f"figures/{name}.png" for name in ("lifting_errors", "pushing_errors", "comparison", "robustness")),
+        *(f"figures/{name}.png" for name in ("comparison", "robustness")),
+        *(f"figures/{name}_errors.png" for name in ("lifting", "pushing", "squeezing")),
     }
 
 

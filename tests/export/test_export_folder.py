@@ -21,18 +21,21 @@ def test_an_export_takes_along_a_list_of_files_and_no_folder(
         shutil.copytree(source, sources[name])
         (sources[name] / "password.txt").write_text("nobody is to read this")
     own = replace(robot, folder=sources["robot"], mjcf=sources["robot"] / robot.mjcf.name)
-    monkeypatch.setattr(module, "write_onnx", lambda graph, path, *rest: path.write_bytes(b"a graph"))
+    monkeypatch.setattr(module, "write_onnx", lambda program, path, *rest: path.write_bytes(b"a graph"))
     (tmp_path / "out").mkdir()
     contract = module.write_folder(tmp_path / "out", untrained(recipe, own, sources["rg"]), recipe, sources["rg"], {})
     generator = {"rg/rg.json", "rg/rg.safetensors", "rg/feasible.npz"}
-    assert set(contract.files) == {"policy.onnx", "recipe.json", "robot/robot.yaml", "robot/g1.xml"} | generator
+    assert (
+        set(contract.files)
+        == {"step.onnx", "settle.onnx", "recipe.json", "robot/robot.yaml", "robot/g1.xml"} | generator
+    )
     assert not list((tmp_path / "out").rglob("password.txt"))
 
 
 def test_a_part_of_s_priv_in_a_users_file_changes_nothing_in_an_export(
     recipe: Recipe, robot: Robot, rg: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "write_onnx", lambda graph, path, *rest: path.write_bytes(b"a graph"))
+    monkeypatch.setattr(module, "write_onnx", lambda program, path, *rest: path.write_bytes(b"a graph"))
     values = recipe.model_dump(mode="json")
     values["task"]["observation"]["own"] = {"mine": own_part(tmp_path)}
     found = []

@@ -5,6 +5,7 @@ import runpy
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from network_watch import watched
 from stage_jobs import make_job
 
 from iowbc.deploy.contract import Contract, read_contract, seal
-from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, GRAPH
+from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, SETTLE, STEP
 from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.acceptance import try_out_network
@@ -87,10 +88,10 @@ def done(robot: Robot, rg: Path, student: Path, tmp_path_factory: pytest.TempPat
 
 def test_the_folder_holds_all_that_a_robot_needs(done: Job, rg: Path) -> None:
     names = {path.name for path in done.out.iterdir()}
-    assert {GRAPH, CONTRACT, GOLDEN, "recipe.json", "robot", "rg", "summary.json"} <= names
+    assert {STEP, SETTLE, CONTRACT, GOLDEN, "recipe.json", "robot", "rg", "summary.json"} <= names
     contract = read_contract(done.out)
     assert contract.sources == {"rg-fit": rg.name, "distill": "d" * 8, "export": done.key}
-    assert {GRAPH, GOLDEN, "recipe.json", "robot/robot.yaml", "rg/feasible.npz"} <= contract.files.keys()
+    assert {STEP, SETTLE, GOLDEN, "recipe.json", "robot/robot.yaml", "rg/feasible.npz"} <= contract.files.keys()
     assert "summary.json" not in contract.files, "a result says nothing of what takes another time each time"
 
 
@@ -106,8 +107,7 @@ def test_parity_size_and_time_are_in_the_summary(done: Job) -> None:
     assert 0 <= metrics["parity"] < 1e-5
     assert metrics["target_difference"] < 1e-5
     assert metrics["graph_kB"] > 10
-    assert 0 < metrics["inference_ms"] < 20
-    assert metrics["inference_ms"] < metrics["step_ms"] <= metrics["step_p99_ms"]
+    assert 0 < metrics["step_ms"] <= metrics["step_p99_ms"]
     assert metrics["acceptance_trials"] == 2
     said = " ".join(done.report.lines)  # type: ignore[attr-defined]
     assert f"in {metrics['acceptance_survived']:.0f} of 2 trials" in said
@@ -145,7 +145,8 @@ def test_a_control_step_is_timed_with_nothing_that_a_robot_need_not_have(done: J
 def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
     inputs, outputs = golden.read_golden(done.out / GOLDEN)
     assert len(inputs["command"]) == 24
-    found = run(open_session(done.out / GRAPH), inputs)
+    sessions = (open_session(done.out / name) for name in (SETTLE, STEP))
+    found = golden.played(*(partial(run, session) for session in sessions), inputs)
     assert max(golden.largest_difference(outputs, found).values()) < 1e-5
 
 
@@ -155,8 +156,6 @@ def test_the_golden_rollout_walks_turns_and_changes_height_and_lean(done: Job) -
     assert abs(command[:, :3]).max(axis=0).min() > 0.05
     assert np.ptp(command[:, 3]) > 0.01
     assert np.ptp(command[:, 4]) > 0.03
-    assert {0.0, 1.0} == set(inputs["gait"][:, 1].tolist())
-    assert len(set(inputs["gait"][:, 0].tolist())) > 3
 
 
 def test_the_contract_says_what_each_of_its_entries_means(done: Job) -> None:

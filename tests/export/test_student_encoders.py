@@ -31,10 +31,10 @@ def test_a_symmetric_student_is_exported_with_its_encoder(
     mirrors = [mirror_as_json(layout.mirror), mirror_as_json(action_mirror(robot))]
     student = StudentNetwork(layout.size, HISTORY, 15, 8, 8, [16, 8], "elu", 10.0, encoder, mirrors)
     graph = graph_of(student, HISTORY, recipe, robot, layout, None)
-    write_onnx(graph, tmp_path / "policy.onnx", 18, {})
+    write_onnx(graph.step, tmp_path / "step.onnx", 18, {})
     inputs = random_inputs(graph, 5)
-    theirs = run(open_session(tmp_path / "policy.onnx"), inputs)
-    assert max(largest_difference(theirs, run_torch(graph, inputs)).values()) < 1e-5
+    theirs = run(open_session(tmp_path / "step.onnx"), inputs)
+    assert max(largest_difference(theirs, run_torch(graph.step, inputs)).values()) < 1e-5
     history = torch.from_numpy(np.random.default_rng(1).normal(size=(5, HISTORY, layout.size)).astype(np.float32))
     with torch.no_grad():
         expected = mirror_tensor(action_mirror(robot), student(history))

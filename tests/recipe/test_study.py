@@ -1,4 +1,4 @@
-"""A recipe of recipes names its variants, and says what is wrong with it where it stands."""
+"""A study names its variants, and says what is wrong with it where it stands."""
 
 from pathlib import Path
 

@@ -8,6 +8,7 @@ import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from queue import Empty, Queue
@@ -47,7 +48,8 @@ def exported(recipe: Recipe, robot: Robot, tmp_path_factory: pytest.TempPathFact
     graph = untrained(recipe, robot, rg)
     statement = write_folder(folder, graph, recipe, rg, {"rg-fit": "a" * 8})
     inputs = golden.stacked(golden_inputs(Specification(recipe, robot.folder, rg), folder, lambda: False))
-    golden.write_golden(inputs, run_torch(graph, inputs), folder / exported_folder.GOLDEN)
+    outputs = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
+    golden.write_golden(inputs, outputs, folder / exported_folder.GOLDEN)
     contract.seal(statement, folder)
     return folder
 

@@ -71,7 +71,8 @@ def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
 def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
     """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
     chosen = summary[summary["suite"] == suite]
-    kind, with_paper = str(chosen["kind"].iloc[0]), asks_for_steps(chosen)
+    kind = str(chosen["kind"].iloc[0])
+    with_paper = kind in NUMBERS and asks_for_steps(chosen)
     figure = Figure(figsize=(9.5, 6.6), layout="constrained")
     for axes, name in zip(figure.subplots(2, 2, sharex=True).flat, ERRORS, strict=True):
         for variant in variants_of(summary):

@@ -81,8 +81,9 @@ def push_table(summary: pd.DataFrame, rate: float) -> Table:
     rows = [(variant, *(_cell(one, "N·s") for one in row)) for variant, row in found.items()]
     columns = heads("Variant", *directions)
     caption = (
-        f"Impulse on the base survived while standing with {float(pushes['mass'].iloc[0]):g} kg, by its direction: the "
-        f"largest up to which every one tried reached {100 * rate:.0f} % survival. In simulation, without a partner."
+        f"Impulse on the base survived with {float(pushes['mass'].iloc[0]):g} kg in the hands, by its direction, while "
+        f"standing or walking: the largest up to which every one tried reached {100 * rate:.0f} % survival and a walk "
+        "after it. In simulation, without a partner."
     )
     return Table("pushes", caption, columns, rows, _numbers(found, directions), grouped=False)
 

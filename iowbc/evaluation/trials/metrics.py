@@ -36,6 +36,8 @@ class Measure:
     """[Hz]."""
     gait: GaitPrior
     commands: Commands
+    least_weight: float
+    """Weight on the robot under which the hands' part of it is not told [N]."""
     foot_load: float
     """Vertical force from which a foot counts as loaded [N]."""
     push_part: float
@@ -94,7 +96,7 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Me
         "distance": walked,
         **foot_metrics(trace, measure.foot_load, walked),
         **ground_metrics(trace, measure.foot_load, met.ground_friction),
-        **load_metrics(trace, met.held_weight),
+        **load_metrics(trace, met.held_weight, measure.least_weight),
         **interaction_metrics(trace, measure.window),
         **push_metrics(trace, directions, measure.window, push),
         **impedance_metrics(trace, met.pull),

@@ -26,6 +26,7 @@ def measure_of(recipe: Recipe, robot: Robot) -> Measure:
         control_frequency=task.control_frequency,
         gait=task.references.gait,
         commands=task.commands,
+        least_weight=recipe.eval.success.least_weight,
         foot_load=recipe.eval.foot_load,
         push_part=recipe.eval.success.push_force,
         efforts=dict(zip(robot.joints, robot.effort.tolist(), strict=True)),

@@ -86,7 +86,7 @@ class Cluster:
     def run(self, stage: Stage, job: Job) -> None:
         """Run a stage on a node, as `stage.run(job)` would here. A lost node costs what it had not told yet.
 
-        Raises what the stage raises; RuntimeError with the node's traceback for what nobody foresaw.
+        Raises what the stage raises; RuntimeError with the node's traceback for an unexpected error.
         """
         token = secrets.token_hex(8)
         (job.work / TOKEN).write_text(token, encoding="utf-8")

@@ -75,7 +75,7 @@ class Runs:
 
     @property
     def compared(self) -> Path:
-        """Tables, figures and films over several runs; those of a recipe of recipes in `<name>/`."""
+        """Tables, figures and films over several runs; those of a study in `<name>/`."""
         return self.root / "compare"
 
     @property

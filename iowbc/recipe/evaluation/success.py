@@ -17,6 +17,9 @@ class Success(Section):
     weight_in_hands: float = Field(default=0.95, ge=0, le=1)
     """Part of a held object's weight, less the partner's share, that must rest in the hands on average; the rest lies
     on thighs or torso."""
+    least_weight: float = Field(default=5.0, ge=0)
+    """Weight on the robot under which nobody asks where it rests [N]: a box of 0.05 kg weighs a tenth of this, and a
+    touch of the torso is several times its weight."""
     object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
     """A pushed object that is ever further than this to the robot's side is lost [m]: the middle of the hands is then
     past the edge of a crate that is 0.6 m wide. A held one may be as far from its place (`object_distance`)."""

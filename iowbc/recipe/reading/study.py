@@ -1,4 +1,4 @@
-"""A recipe of recipes: a file that names variants, which run one after another and are then compared."""
+"""A study: a file that names variants, which run one after another and are then compared."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A sweep: one recipe, or a recipe of recipes, with every combination of some values."""
+"""A sweep: one recipe, or a study, with every combination of some values."""
 
 import hashlib
 import itertools
@@ -24,7 +24,7 @@ LONGEST_NAME = 64
 DIGEST_LENGTH = 6
 """Characters of the digest in the name of a point."""
 RECIPE_AXIS = "recipe"
-"""What the sweep of a recipe of recipes varies besides."""
+"""Further axis of the sweep of a study."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def load_sweep(
 
 
 def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) -> list[Point]:
-    """The point of a recipe, or those of the variants that a recipe of recipes names."""
+    """The point of a recipe, or those of the variants that a study names."""
     overrides = (*fixed, *(f"{path}={written(value)}" for path, value in settings.items()))
     study = load_study(word, overrides)
     if study is None:

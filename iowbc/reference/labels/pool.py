@@ -58,7 +58,7 @@ class _Book:
 
     waiting: list[int]
     crashed: dict[int, list[int]] = field(default_factory=dict)
-    barren: int = 0
+    failed_starts: int = 0
     killed: int = 0
 
 
@@ -84,7 +84,7 @@ def label_all(
     book = _Book([number for number in range(len(chunks)) if number not in done])
     ready = sum(len(chunks[number]) for number in done)
     progress(ready, len(indices))
-    team = [_hire(task, key) for _ in range(min(max(workers, 1), len(book.waiting)))]
+    team = [_start_worker(task, key) for _ in range(min(max(workers, 1), len(book.waiting)))]
     try:
         while len(done) < len(chunks):
             if interrupted():
@@ -94,8 +94,8 @@ def label_all(
             for worker in _with_news(team):
                 number = _receive(worker)
                 if number is None:
-                    _bury(worker, book)
-                    team[team.index(worker)] = _hire(task, key)
+                    _on_death(worker, book)
+                    team[team.index(worker)] = _start_worker(task, key)
                     continue
                 shard = read_shard(paths[number], key, chunks[number])
                 if shard is None:
@@ -113,7 +113,7 @@ def label_all(
     return merge([done[number] for number in range(len(chunks))])
 
 
-def _hire(task: Task, key: str) -> _Worker:
+def _start_worker(task: Task, key: str) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     current = context.Value("q", IDLE, lock=False)
@@ -150,14 +150,14 @@ def _receive(worker: _Worker) -> int | None:
     return int(number)
 
 
-def _bury(worker: _Worker, book: _Book) -> None:
+def _on_death(worker: _Worker, book: _Book) -> None:
     """Notes the sample on which a worker died, and puts its chunk back in the queue."""
     worker.process.join()
     worker.connection.close()
     sample = int(worker.current.value)
     if worker.chunk is None or sample == IDLE:
-        book.barren += 1
-        if book.barren >= STARTS_WITHOUT_WORK:
+        book.failed_starts += 1
+        if book.failed_starts >= STARTS_WITHOUT_WORK:
             raise WorkerFailed(
                 f"labelling workers end before their first sample (exit code {worker.process.exitcode}); "
                 "try `iowbc doctor`, which checks that crocoddyl and pinocchio fit together"

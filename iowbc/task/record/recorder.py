@@ -113,7 +113,7 @@ def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], whi
 
 
 def count_pushes(buffers: Buffers, pushing: Mask, memory: Memory, which: NDArray[np.intp]) -> None:
-    """Adds the pushes that begin, (k,), to the counters, and those that nobody could make; `pushing`: scenes, (n,)."""
+    """Adds the pushes that begin, (k,), to the counters, and the infeasible ones; `pushing`: scenes, (n,)."""
     counters = buffers["counters"]
     counters[which, COLUMN["pushes"]] += pushing[which]
     counters[which, COLUMN["infeasible"]] += memory.infeasible[which]

@@ -23,16 +23,15 @@ export async function load(folder = new URL("./", import.meta.url)) {
   const json = async (name) => (await fetched(at(name))).json();
   const binary = async (name) => (await fetched(at(name))).arrayBuffer();
   ort.env.wasm.wasmPaths = { wasm: at("onnxruntime.wasm").href };
-  const [contract, about, graph, mujoco] = await Promise.all([
+  const [contract, about, settle, step, mujoco] = await Promise.all([
     json("contract.json"),
     json("scenes.json"),
-    binary("policy.onnx"),
+    binary("settle.onnx"),
+    binary("step.onnx"),
     loadMujoco({ locateFile: () => at("mujoco.wasm").href }),
   ]);
-  const session = await ort.InferenceSession.create(graph, { executionProviders: ["wasm"] });
-  const feasible = about.feasible && (await readNpz(await binary(about.feasible)));
-  const bounds = feasible && { pitch: feasible.pitch.data, low: feasible.low.data, high: feasible.high.data };
+  const session = (graph) => ort.InferenceSession.create(graph, { executionProviders: ["wasm"] });
   const golden = about.golden && (await readNpz(await binary(about.golden)));
-  const controller = new Controller(contract, session, about.kinematics, bounds);
+  const controller = new Controller(contract, await session(settle), await session(step));
   return { contract, scenes: about.scenes, first: about.first, mujoco, controller, golden };
 }

@@ -1,7 +1,7 @@
 /** The page's panel: sliders, buttons and what is told beside them. */
 
-import * as command from "./command.js";
-
+const [VELOCITY_X, VELOCITY_Y, YAW_RATE, HEIGHT, PITCH] = [0, 1, 2, 3, 4];
+/** Places of the first entries of the command C. */
 const find = (selector) => document.querySelector(selector);
 
 export class Panel {
@@ -14,11 +14,11 @@ export class Panel {
     const nominal = [...this.command];
     const { velocity_x, velocity_y, yaw_rate, height, pitch } = contract.commands;
     this.sliders = [
-      this.#slider(command.VELOCITY_X, "forward", "m/s", velocity_x),
-      this.#slider(command.VELOCITY_Y, "left", "m/s", velocity_y),
-      this.#slider(command.YAW_RATE, "turn", "rad/s", yaw_rate),
-      this.#slider(command.HEIGHT, "height", "m", height),
-      this.#slider(command.PITCH, "lean", "rad", pitch),
+      this.#slider(VELOCITY_X, "forward", "m/s", velocity_x),
+      this.#slider(VELOCITY_Y, "left", "m/s", velocity_y),
+      this.#slider(YAW_RATE, "turn", "rad/s", yaw_rate),
+      this.#slider(HEIGHT, "height", "m", height),
+      this.#slider(PITCH, "lean", "rad", pitch),
     ];
     this.massSlider = slider("mass", "mass", "kg", 0, 1, 0, (mass) => on.mass(mass));
     find("#sliders").append(...this.sliders.map((each) => each.row), this.massSlider.row);

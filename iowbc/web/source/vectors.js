@@ -1,7 +1,5 @@
 /** Vectors of three, matrices of 3 × 3 row by row, and quaternions wxyz, as plain arrays. */
 
-export const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-
 export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 export const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 export const scale = (a, factor) => [a[0] * factor, a[1] * factor, a[2] * factor];
@@ -13,33 +11,8 @@ export const cross = (a, b) => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
-/** A matrix times a vector. */
-export const apply = (m, v) => [dot(m.slice(0, 3), v), dot(m.slice(3, 6), v), dot(m.slice(6, 9), v)];
-
 /** The transposed matrix times a vector: back into the frame that a rotation came from. */
 export const applyInverse = (m, v) => [0, 1, 2].map((i) => m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2]);
-
-export function multiply(a, b) {
-  const columns = [0, 1, 2].map((j) => apply(a, [b[j], b[3 + j], b[6 + j]]));
-  return [0, 1, 2].flatMap((i) => columns.map((column) => column[i]));
-}
-
-/** The rotation about a unit axis by an angle [rad]. */
-export function turn([x, y, z], angle) {
-  const c = Math.cos(angle), s = Math.sin(angle), d = 1 - c;
-  return [
-    c + d * x * x, d * x * y - s * z, d * x * z + s * y,
-    d * x * y + s * z, c + d * y * y, d * y * z - s * x,
-    d * x * z - s * y, d * y * z + s * x, c + d * z * z,
-  ];
-}
-
-/** x of m x = v, by Cramer's rule. */
-export function solve(m, v) {
-  const [a, b, c] = [0, 1, 2].map((j) => [m[j], m[3 + j], m[6 + j]]);
-  const whole = dot(a, cross(b, c));
-  return [dot(v, cross(b, c)) / whole, dot(a, cross(v, c)) / whole, dot(a, cross(b, v)) / whole];
-}
 
 /** The conjugate of quaternion `a` times quaternion `b`, with a positive scalar part: b as seen from a. */
 export function relative(a, b) {

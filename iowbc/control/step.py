@@ -1,0 +1,174 @@
+"""The control step as one function of arrays: measurements, wanted command, scene and state in, targets and state out.
+
+`settle` makes the first state, `step` everything after it. They are what an export traces into `settle.onnx` and
+`step.onnx`; the simulation computes the same equations with its own memory (`iowbc.task.guidance`).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from iowbc.arrays import Array, Constants, Mask, namespace
+from iowbc.control import gait
+from iowbc.control.action import action_scale
+from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
+from iowbc.control.observation import ObservationLayout, Sensed
+from iowbc.control.references import ReferenceLayer
+from iowbc.control.sensors import Measured
+from iowbc.recipe.task.task import Task
+from iowbc.robot.description import Robot
+
+
+@dataclass(frozen=True)
+class State:
+    """What the control loop remembers of n robots from one step to the next."""
+
+    command: Array
+    """C in force, (n, 11)."""
+    arms: Array
+    """θ_I_ref, (n, arm joints) [rad]."""
+    posture: Array
+    """θ_S_ref without the gait prior, (n, support joints) [rad]."""
+    heading_reference: Array
+    """Measured heading at the start plus the integrated commanded yaw rate, (n, 1) [rad]."""
+    phase: Array
+    """Gait phase in [0, 1), (n, 1)."""
+    stepping: Array
+    """1 while the gait clock runs, else 0, (n, 1)."""
+    begun: Array
+    """0 in a state that `settle` made, 1 afterwards, (n, 1)."""
+    action: Array
+    """The action that the motors follow, (n, support joints)."""
+    history: Array
+    """H_t, oldest first, (n, K, size of s_t)."""
+
+
+STATE: Mapping[str, tuple[str, str, str]] = {
+    "command": ("m/s, m/s, rad/s, m, rad, m x 6", "heading", "command in force: rate-limited, and clamped to the map"),
+    "arms": ("rad", "joint", "θ_I_ref from differential IK, interaction order"),
+    "posture": ("rad", "joint", "θ_S_ref without the gait prior, support order"),
+    "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
+    "phase": ("1", "-", "gait phase in [0, 1)"),
+    "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
+    "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
+    "action": ("action", "joint", "residual action that the motors follow, support order"),
+    "history": ("SI", "-", "the last observations, oldest first"),
+}
+"""Unit, frame and meaning of each part of the state, in its order in the packed one."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a control step finds."""
+
+    target: Array
+    """Position targets of all joints, MJCF order, (n, joints) [rad]."""
+    action: Array
+    """Residual action, clipped, (n, support joints)."""
+    support_reference: Array
+    """θ_S_ref with the gait prior, (n, support joints) [rad]."""
+    state: State
+
+
+class ControlStep(Constants):
+    """The control step of n robots. Holds constants only."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task,
+        references: ReferenceLayer,
+        layout: ObservationLayout,
+        history: int,
+        policy: Callable[[Any], Any],
+    ) -> None:
+        """`policy`: from a history (n, K, size of s_t) to the mean action (n, support joints)."""
+        self.references, self.layout, self.policy = references, layout, policy
+        self.bound, self.scale = task.action.bound, action_scale(robot, task.action)
+        self._gait, self._period = task.references.gait, 1.0 / task.control_frequency
+        self._largest_step = rate_limits(task.commands.rates) * self._period
+        self._order = np.argsort(np.concatenate([robot.support, robot.interaction])).tolist()
+        self._blank, support, arms = np.zeros((1, history, layout.size)), len(robot.support), len(robot.interaction)
+        self.shapes: dict[str, tuple[int, ...]] = {
+            "command": (len(COMMAND),),
+            "arms": (arms,),
+            "posture": (support,),
+            **dict.fromkeys(("heading_reference", "phase", "stepping", "begun"), (1,)),
+            "action": (support,),
+            "history": (history, layout.size),
+        }
+        """Shape of each part of the state, without the leading axis, in the order of the packed state."""
+
+    def settle(self, heading: Array, command: Array, grasp: Array) -> State:
+        """The first state: references settled in the wanted command, clamped; standing, without a past.
+
+        `heading` (n, 1) [rad]; `command` C (n, 11); `grasp` (n, 2, 3): base grasp of both wrists, heading frame [m].
+        """
+        command = self.references.clamp(command)
+        arms, posture = self.references.start(command, grasp)
+        zero = 0.0 * heading
+        return State(command, arms, posture, heading, zero, zero, zero, 0.0 * posture, zero[:, None] + self._blank)
+
+    def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> Step:
+        """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
+
+        The first step after `settle` leaves command, references and gait clock as they are, and fills the history.
+        """
+        xp, begun = namespace(command), state.begun > 0.5
+        limited = self.references.clamp(approach(state.command, command, self._largest_step))
+        command = xp.where(begun, limited, state.command)
+        arms, posture = self.references.advance(state.arms, state.posture, command, grasp, self._period)
+        arms, posture = xp.where(begun, arms, state.arms), xp.where(begun, posture, state.posture)
+        phase, stepping = self._clock(state, command, begun[:, 0])
+        support = self.references.with_stride(posture, command, phase, stepping)
+        sensed = Sensed(
+            measured=measured,
+            command=command,
+            heading_reference=state.heading_reference,
+            joint_reference=self._joints(support, arms),
+            phase=gait.phase_signal(phase, stepping),
+            last_action=state.action,
+            support_reference=support,
+            arm_reference=arms,
+        )
+        seen = xp.concatenate([part.value(sensed) for part in self.layout.parts], 1)[:, None]
+        shifted = xp.concatenate([state.history[:, 1:], seen], 1)
+        history = xp.where(begun[:, :, None], shifted, seen + 0.0 * shifted)
+        action = self.policy(history).clip(-self.bound, self.bound)
+        held = self.references.arm_target(arms, posture, command, load[:, 0])
+        turned = state.heading_reference + command[:, YAW_RATE, None] * self._period
+        clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
+        after = State(command, arms, posture, turned, phase[:, None], clock, one, action, history)
+        return Step(self._joints(support + self.scale * action, held), action, support, after)
+
+    def _clock(self, state: State, command: Array, begun: Mask) -> tuple[Array, Mask]:
+        """The gait clock of this step: phase (n,) and whether it runs (n,)."""
+        xp, phase, stepping = namespace(command), state.phase[:, 0], state.stepping[:, 0] > 0.5
+        moving = gait.wants_to_move(command, self._gait)
+        advanced, runs = gait.advance(phase, stepping, moving, self._gait, self._period)
+        return xp.where(begun, advanced, phase), (begun & runs) | (~begun & stepping)
+
+    def _joints(self, support: Array, arms: Array) -> Array:
+        """Values of both branches in MJCF order, (n, joints)."""
+        joints: Array = namespace(support).concatenate([support, arms], 1)[:, self._order]
+        return joints
+
+    def packed(self, state: State) -> Array:
+        """The state as rows, (n, size)."""
+        parts = [getattr(state, name).reshape(-1, size) for name, size in self.sizes.items()]
+        rows: Array = namespace(parts[0]).concatenate(parts, 1)
+        return rows
+
+    def unpacked(self, rows: Array) -> State:
+        """The state of rows (n, size)."""
+        ends = np.cumsum([0, *self.sizes.values()]).tolist()
+        parts = [rows[:, start:end] for start, end in pairwise(ends)]
+        return State(*(part.reshape(-1, *shape) for part, shape in zip(parts, self.shapes.values(), strict=True)))
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Numbers in each part of the state."""
+        return {name: int(np.prod(self.shapes[name])) for name in (field.name for field in fields(State))}
