@@ -16,9 +16,8 @@ from matplotlib.ticker import MaxNLocator
 from pydantic import JsonValue
 
 from iowbc.recipe.reading.sweep import written
+from iowbc.results.picture import COLOURS
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-"""Okabe and Ito's palette: told apart with any colour vision. More lines than this are coloured by the last axis."""
 ORDERS = 30.0
 """Ratio of the largest to the smallest value from which an axis is logarithmic."""
 VALUES_NAMED = 8

@@ -93,10 +93,12 @@ def heads(*names: str | Column) -> tuple[Column, ...]:
     return tuple(Column(name) if isinstance(name, str) else name for name in names)
 
 
-def measured(value: float, half: float, form: str = ".3f", half_form: str = ".3f", note: str = "") -> Cell:
-    """A mean with half its interval; a dash for none, the mean alone without an interval."""
+def measured(
+    value: float, half: float = np.nan, form: str = ".3f", half_form: str = ".3f", note: str = "", none: str = ABSENT
+) -> Cell:
+    """A mean with half its interval; the mean alone without one, and `none` where there is no mean."""
     if np.isnan(value):
-        return ABSENT
+        return none
     return Measured(f"{value:{form}}", f"{half:{half_form}}", note) if np.isfinite(half) else f"{value:{form}}"
 
 

@@ -10,7 +10,7 @@ from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of
 from iowbc.evaluation.report.captions import in_common, regime
 from iowbc.evaluation.report.error_tables import ANY_MASS, NO_LABELS, NUMBERS, RAW, STANDS_STILL, TOLD
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.results.table import ABSENT, FAILS, Table, heads
+from iowbc.results.table import ABSENT, FAILS, Cell, Table, heads, measured
 
 CELL = "{} / {} = {}"
 """Ours, the paper's, and ours in parts of it."""
@@ -40,11 +40,11 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
                     theirs = [np.nan] * len(ERRORS) if paper is None or paper == "absent" else list(paper)
                     ours = [float(row[name]) for name in ERRORS]
                     survived = f"{row['survived']}/{row['trials']}"
-                    cells = [
+                    cells: list[Cell] = [
                         _cell(own, one, regime(summary, row, name) if np.isfinite(one) else [])
                         for name, own, one in zip(ERRORS, ours, theirs, strict=True)
                     ]
-                    cells.insert(PLACE, _told(float(row[RAW])))
+                    cells.insert(PLACE, measured(float(row[RAW]), none=FAILS))
                     rows.append((f"{NUMBERS[kind]}, {suite}", str(variant), f"{mass:g} kg", survived, *cells))
                     numbers += _numbers(suite, str(variant), mass, ours, theirs)
                     at_most += sum(one <= other for one, other in zip(ours, theirs, strict=True))
@@ -69,13 +69,8 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
 
 
 def _cell(ours: float, theirs: float, beside: Sequence[str]) -> str:
-    ratio = ours / theirs
-    cell = CELL.format(_told(ours), _told(theirs), ABSENT if np.isnan(ratio) else f"{ratio:.2f}")
+    cell = CELL.format(*(measured(one, none=FAILS) for one in (ours, theirs)), measured(ours / theirs, form=".2f"))
     return f"{cell} ({'; '.join(beside)})" if beside else cell
-
-
-def _told(value: float) -> str:
-    return FAILS if np.isnan(value) else f"{value:.3f}"
 
 
 def _numbers(suite: str, variant: str, mass: float, ours: list[float], theirs: list[float]) -> list[dict[str, object]]:

@@ -12,7 +12,7 @@ from iowbc.evaluation.report.captions import partner, trainings
 from iowbc.evaluation.report.error_tables import STANDS_STILL
 from iowbc.evaluation.report.figures import Bars, broken, draw_bars, legend, letter, style_of, tidy
 from iowbc.evaluation.trials.impedance import Apparent, apparent
-from iowbc.results.table import ABSENT, FAILS, Table, heads
+from iowbc.results.table import ABSENT, FAILS, Cell, Table, heads, measured
 
 BLOCKED_BEFORE = {"IO-WBC": (113, 231), "w/o Distill.": (73, 109)}
 """Peak forces of a hand on a blocked crate [N] over the trials of the first published controllers, which were trained
@@ -50,7 +50,8 @@ def compliance_table(summary: pd.DataFrame) -> Table:
 def impedance_table(summary: pd.DataFrame) -> Table:
     """The mechanical impedance to pulls of each direction and frequency, and mass, spring and damper that have it."""
     chosen = summary[summary["kind"] == "impedance"]
-    rows, numbers = [], []
+    rows: list[tuple[Cell, ...]] = []
+    numbers = []
     for direction, within in chosen.groupby("pull_direction", sort=False):
         for frequency, group in within.groupby("pull_frequency"):
             rows += [
@@ -58,12 +59,8 @@ def impedance_table(summary: pd.DataFrame) -> Table:
                 for _, row in group.iterrows()
             ]
         for variant, found in fits(within):
-            cells = (found.stiffness, found.damping, found.mass)
-            said = [
-                ABSENT if np.isnan(value) else f"{value:.{places}f}"
-                for value, places in zip(cells, (0, 0, 1), strict=True)
-            ]
-            rows.append((f"{direction}, all", variant, ABSENT, ABSENT, ABSENT, *said))
+            spring = [measured(value, form=".0f") for value in (found.stiffness, found.damping)]
+            rows.append((f"{direction}, all", variant, *[ABSENT] * 3, *spring, measured(found.mass, form=".1f")))
             numbers.append(
                 {"variant": variant, "pull_direction": direction, "stiffness": found.stiffness}
                 | {"damping": found.damping, "mass_apparent": found.mass}
@@ -167,17 +164,16 @@ def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> N
         axes.legend(fontsize=8, frameon=False)
 
 
-def _interaction(row: pd.Series) -> list[str]:
+def _interaction(row: pd.Series) -> list[Cell]:
     forces = [[float(row[f"{name}_{part}"]) for part in SPREAD] for name in ("handle_force", "hand_force")]
     spreads = [ABSENT if np.isnan(sizes).any() else " / ".join(f"{size:.0f}" for size in sizes) for sizes in forces]
-    work = float(row["partner_work"])
-    errors = [float(row[name]) for name in ("E_v", "E_v_raw", "E_v_partner")]
+    none = ABSENT if row["survived"] else FAILS
     return [
         _survived(row),
         f"{row['succeeded']}/{row['trials']}",
         *spreads,
-        ABSENT if np.isnan(work) else f"{work:+.1f}",
-        *(FAILS if not row["survived"] else ABSENT if np.isnan(value) else f"{value:.3f}" for value in errors),
+        measured(float(row["partner_work"]), form="+.1f"),
+        *(measured(float(row[name]), none=none) for name in ("E_v", "E_v_raw", "E_v_partner")),
     ]
 
 

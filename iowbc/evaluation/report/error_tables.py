@@ -122,10 +122,9 @@ def _outcome(row: pd.Series) -> list[str]:
     ]
 
 
-def _still(rows: pd.DataFrame, part: str = "") -> list[str]:
+def _still(rows: pd.DataFrame, part: str = "") -> list[Cell]:
     names = ["E_v" if name == RAW else name for name in TOLD]
-    values = [float(rows[f"still_{name}{part}"].mean()) for name in names]
-    return [ABSENT if np.isnan(value) else f"{value:.3f}" for value in values]
+    return [measured(float(rows[f"still_{name}{part}"].mean())) for name in names]
 
 
 def asks_for_transport(rows: pd.DataFrame) -> bool:

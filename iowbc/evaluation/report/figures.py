@@ -21,9 +21,8 @@ from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capac
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.error_tables import NUMBERS, STANDS_STILL
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
+from iowbc.results.picture import COLOURS
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-"""Okabe and Ito's palette: told apart with any colour vision; markers repeat the distinction."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LABELS = {
     "E_alpha": "$E_\\alpha$, torso pitch [rad]",

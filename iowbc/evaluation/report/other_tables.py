@@ -10,19 +10,19 @@ from iowbc.evaluation.report.aggregate import GROUP, TORQUE, suites_of, variants
 from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
 from iowbc.evaluation.report.captions import conditions
 from iowbc.evaluation.report.error_tables import NO_LABELS, STANDS_STILL, SWEPT
-from iowbc.results.table import ABSENT, Table, heads
+from iowbc.results.table import ABSENT, Table, heads, measured
 
 TYRE_MASS = 18.0
 PROBING = ("pushes", "impedance", "map")
 """Kinds of trials that look for a limit or a response, not for how a task is done."""
 CONTACT = {
-    "Touchdown [m/s]": ("touchdown_speed", 1.0, 2),
-    "Peak force [N]": ("foot_force_peak", 1.0, 0),
-    "Pressure margin [mm]": ("pressure_margin", 1e3, 0),
-    "Friction": ("friction_use_high", 1.0, 2),
-    "Action [mrad]": ("action_second_difference", 1e3, 0),
+    "Touchdown [m/s]": ("touchdown_speed", 1.0, ".2f"),
+    "Peak force [N]": ("foot_force_peak", 1.0, ".0f"),
+    "Pressure margin [mm]": ("pressure_margin", 1e3, ".0f"),
+    "Friction": ("friction_use_high", 1.0, ".2f"),
+    "Action [mrad]": ("action_second_difference", 1e3, ".0f"),
 }
-"""Columns of the table of contact: name in the summary, factor, decimals."""
+"""Columns of the table of contact: name in the summary, factor, format."""
 CONTACT_COLUMNS = [
     *("touchdown_speed", "touchdown_speed_peak", "foot_force_peak", "pressure_margin", "pressure_margin_low"),
     *("friction_use", "friction_use_high", "action_second_difference"),
@@ -114,7 +114,7 @@ def contact_table(summary: pd.DataFrame) -> Table:
         (
             _load(row),
             str(row["variant"]),
-            *(_told(row[name], scale, places) for name, scale, places in CONTACT.values()),
+            *(measured(scale * row[name], form=form) for name, scale, form in CONTACT.values()),
             f"{100 * row[TORQUE]:.0f} % ({row[f'{TORQUE}_joint']})" if np.isfinite(row[TORQUE]) else ABSENT,
         )
         for _, row in heaviest(summary).iterrows()
@@ -141,10 +141,6 @@ def heaviest(summary: pd.DataFrame) -> pd.DataFrame:
 def _load(row: pd.Series) -> str:
     case = "" if row["case"] == row["suite"] else f", {row['case']}"
     return f"{row['suite']}{case}, {row['mass']:g} kg"
-
-
-def _told(value: float, scale: float, places: int) -> str:
-    return ABSENT if np.isnan(value) else f"{scale * value:.{places}f}"
 
 
 def _efforts(summary: pd.DataFrame) -> list[str]:

@@ -13,7 +13,7 @@ from iowbc.evaluation.report.captions import partner
 from iowbc.evaluation.report.figures import style_of
 from iowbc.evaluation.report.statistics import determination, determination_interval, root_mean_square
 from iowbc.results.picture import write_figure
-from iowbc.results.table import ABSENT, Column, Table, heads, write_table
+from iowbc.results.table import Column, Table, heads, measured, write_table
 
 LINES = ("-", "--", ":")
 """Of what the mass is read from, in order; s_priv, which holds it, has none."""
@@ -55,8 +55,8 @@ def probe_table(inferred: pd.DataFrame) -> Table:
                     f"{one['R2']:.3f}",
                     f"{one['R2_low']:.2f} to {one['R2_high']:.2f}",
                     f"{one['RMSE']:.2f}",
-                    _of(one["R2_second"]),
-                    _of(one["R2_trial"]),
+                    measured(one["R2_second"]),
+                    measured(one["R2_trial"]),
                 )
             )
     head = ("Read from", "Algorithm", "Readings", "R²", "95 % interval", "RMSE [kg]", "R² of 1 s", "R² of a trial")
@@ -158,7 +158,3 @@ def _circumstances(inferred: pd.DataFrame) -> str:
     low, high = inferred["mass"].min(), inferred["mass"].max()
     scene = inferred["scene"].iloc[0]
     return f"In simulation, {scene}, {low:.1f} to {high:.1f} kg in {count} trials, {partner(inferred)}."
-
-
-def _of(value: float) -> str:
-    return ABSENT if np.isnan(value) else f"{value:.3f}"
