@@ -17,10 +17,7 @@ def simulation(
     runs: Runs, file: Path | None, *, scene: str, environments: int, workers: Sequence[int], others: bool
 ) -> None:
     """Measure the vector environment, of the default recipe or of one in a file. Raises `UsageError`."""
-    recipe = _recipe(file)
-    require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
-    require_training("bench")
-    require_writable_runs(runs)
+    recipe = _recipe(runs, file, scene)
     from iowbc.benchmarks import simulation
 
     figures = simulation.main(recipe, scene=scene, environments=environments, workers=tuple(workers), others=others)
@@ -29,10 +26,7 @@ def simulation(
 
 def training(runs: Runs, file: Path | None, *, scene: str, turns: int, others: int | None) -> None:
     """Measure the teacher's training, of the default recipe or of one in a file. Raises `UsageError`."""
-    recipe = _recipe(file)
-    require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
-    require_training("bench")
-    require_writable_runs(runs)
+    recipe = _recipe(runs, file, scene)
     from iowbc.benchmarks import training
 
     record_figures(runs, "bench-train", training.main(recipe, scene=scene, turns=turns, others=others))
@@ -40,9 +34,7 @@ def training(runs: Runs, file: Path | None, *, scene: str, turns: int, others: i
 
 def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
     """Measure the labelling of samples, of the default recipe or of one in a file. Raises `UsageError`."""
-    recipe = _recipe(file)
-    require_training("bench")
-    require_writable_runs(runs)
+    recipe = _recipe(runs, file)
     from iowbc.benchmarks import reference
 
     record_figures(runs, "bench-rg", reference.main(recipe, workers=tuple(workers)))
@@ -50,11 +42,16 @@ def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
 
 def scale(runs: Runs, file: Path | None, measure: Callable[[Recipe | None], Mapping[str, float]]) -> None:
     """Measure Ray on one node and on two, with the default recipe or one in a file. Raises `UsageError`."""
-    recipe = _recipe(file)
-    require_training("bench")
-    require_writable_runs(runs)
+    recipe = _recipe(runs, file)
     record_figures(runs, "bench-scale", measure(recipe))
 
 
-def _recipe(file: Path | None) -> Recipe | None:
-    return load_recipe(file).recipe if file is not None else None
+def _recipe(runs: Runs, file: Path | None, scene: str | None = None) -> Recipe | None:
+    """The recipe in a file, once everything that a benchmark needs is there; None for the default one. Raises
+    `UsageError`, also for a scene that it does not have."""
+    recipe = load_recipe(file).recipe if file is not None else None
+    if scene is not None:
+        require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
+    require_training("bench")
+    require_writable_runs(runs)
+    return recipe

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import fake_stages
 
 from iowbc.files import read_checked
-from iowbc.pipeline.console.display import StageView
+from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
@@ -30,24 +30,18 @@ SLOW = {"teacher": {"steps": 120, "pause": 0.05}}  # to be disturbed, with time 
 RECIPE = "seed: 3\nteacher:\n  steps: 4096\nexecution: {track: false, line_interval: 0.1}\n"
 
 
-class SilentDisplay:
+class SilentDisplay(Display):
     """Remembers what would be shown."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.states: list[str] = []
 
-    def begin(self, views: Sequence[StageView]) -> None: ...
-
     def changed(self, view: StageView) -> None:
         self.states.append(f"{view.name} {view.state}")
 
-    def moved(self, view: StageView) -> None: ...
-
     def say(self, text: str) -> None:
         self.lines.append(text)
-
-    def end(self) -> None: ...
 
 
 @dataclass
