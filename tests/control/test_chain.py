@@ -12,6 +12,11 @@ from iowbc.robot import rotations
 LENGTH, ROWS = 4, 5
 
 
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
 def body(axis: Any, random: np.random.Generator) -> Any:
     quaternion = rotations.normalized(random.normal(size=4))
     return SimpleNamespace(
