@@ -1,4 +1,5 @@
-# make test   sets everything up, then lint, types and tests
+# make check  sets everything up, then lint, types and unit tests, in two to three minutes
+# make test   sets everything up, then lint, types and all tests
 # make run    sets everything up, then the quickstart recipe
 # make measure   makes the figures of the README anew, those of published artifacts from their trials
 # make chaos   disturbs runs 240 times and counts what is lost (docs/reliability.md)
@@ -10,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup test lint types run measure docs chaos chaos-nodes leaks image clean
+.PHONY: setup check test lint types run measure docs chaos chaos-nodes leaks image clean
 
 setup: $(READY)
 
@@ -27,6 +28,9 @@ lint: setup
 
 types: setup
 	$(BIN)/mypy
+
+check: lint types
+	$(BIN)/pytest -m "unit and not slow"
 
 test: lint types
 	$(BIN)/pytest

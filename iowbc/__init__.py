@@ -5,7 +5,6 @@ is imported here, not even `typing`: Ctrl-C is answered as soon as this file has
 """
 
 import os
-import sys
 from importlib import import_module
 
 TYPE_CHECKING = False
@@ -22,11 +21,6 @@ if TYPE_CHECKING:
     from iowbc.task.vector.vector_env import VectorEnv
 
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # onnxruntime reads it when it loads; else it sends reports home
-_session = "wayland" if os.environ.get("XDG_SESSION_TYPE") == "wayland" else "x11"
-for _folder in sys.path:  # glfw, which mujoco loads, else asks a Python of its own for its library's version
-    _library = f"{_folder}/glfw/{os.environ.get('PYGLFW_LIBRARY_VARIANT') or _session}/libglfw.so"
-    if os.path.isfile(_library):
-        os.environ.setdefault("PYGLFW_LIBRARY", _library)
 
 __version__ = "0.1.0"
 __all__ = [

@@ -10,9 +10,17 @@ def leave_while_reading() -> None:
         signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 
+def load_no_graphics() -> None:
+    """From now on mujoco loads without a library to draw with, in this process and in those that it starts: one that is
+    asked for and missing would end commands that draw nothing. What draws reads `IOWBC_GL` (`iowbc.sim.rendering`)."""
+    os.environ.setdefault("IOWBC_GL", os.environ.get("MUJOCO_GL", ""))
+    os.environ["MUJOCO_GL"] = "off"
+
+
 def main() -> None:
     """Run a command and exit; see `iowbc.cli.main`."""
     leave_while_reading()
+    load_no_graphics()
     from iowbc.cli import main as command
 
     command()

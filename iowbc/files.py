@@ -4,9 +4,11 @@ A checked file also proves that it is what was written, and for whom: before its
 key that it belongs to and the SHA-256 of key and content.
 """
 
+import errno
 import hashlib
 import json
 import os
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,10 +16,13 @@ from pathlib import Path
 
 from iowbc.errors import Damaged
 
+OLD = ".old"
+"""How the hidden name of a folder ends that is being replaced."""
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yields a path beside `path` to write a file to, which is then on disk and takes the place of `path`.
+    """Yields a path beside `path` to write a file or folder to, which is then on disk and takes the place of `path`.
 
     Where the block raises, `path` stays as it was.
     """
@@ -28,7 +33,7 @@ def replacing(path: Path) -> Iterator[Path]:
         synchronise(fresh)
         os.replace(fresh, path)
     except BaseException:
-        fresh.unlink(missing_ok=True)
+        shutil.rmtree(fresh) if fresh.is_dir() else fresh.unlink(missing_ok=True)
         raise
 
 
@@ -36,6 +41,43 @@ def write_whole(path: Path, text: str) -> None:
     """Write a text in place of a file, or where there is none."""
     with replacing(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
+
+
+def move_folder(source: Path, target: Path) -> None:
+    """Rename a folder; to another file system by way of a copy, which takes its name once it is on disk."""
+    try:
+        os.rename(source, target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        fresh = target.with_name(f".{target.name}.moving")
+        shutil.rmtree(fresh, ignore_errors=True)
+        shutil.copytree(source, fresh, symlinks=True)
+        for path in (*fresh.rglob("*"), fresh):
+            if not path.is_symlink():
+                synchronise(path)
+        os.rename(fresh, target)
+        shutil.rmtree(source)
+    synchronise(target.parent)
+
+
+def replace_folder(source: Path, target: Path) -> None:
+    """Put a folder in the place of another, which is gone only when the new one stands: what dies between leaves the
+    old one as `.NAME.old`, and the next call brings it back."""
+    old = target.with_name(f".{target.name}{OLD}")
+    restore_folder(old)
+    if target.exists():
+        os.rename(target, old)
+    move_folder(source, target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def restore_folder(old: Path) -> None:
+    """Bring back a folder that was put aside by `replace_folder` and has no successor; else remove it."""
+    target = old.with_name(old.name.removeprefix(".").removesuffix(OLD))
+    if old.is_dir() and not target.exists():
+        os.rename(old, target)
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def read_limited(path: Path, largest: int) -> bytes:

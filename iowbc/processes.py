@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 SINGLE_THREADED = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -34,6 +35,17 @@ def keep_freed_memory() -> None:
     if hasattr(library, "mallopt"):
         for option, size in KEPT.items():
             library.mallopt(option, size)
+
+
+def name_glfw() -> None:
+    """Tells glfw, which mujoco loads, where its library is: else it asks a Python of its own for the library's version,
+    which prints a traceback where the training is ended meanwhile."""
+    found = find_spec("glfw")
+    if found is not None and found.origin is not None:
+        session = "wayland" if os.environ.get("XDG_SESSION_TYPE") == "wayland" else "x11"
+        library = Path(found.origin).with_name(os.environ.get("PYGLFW_LIBRARY_VARIANT") or session) / "libglfw.so"
+        if library.is_file():
+            os.environ.setdefault("PYGLFW_LIBRARY", str(library))
 
 
 def die_with_parent(parent: int, *, bound: bool = True, number: int = signal.SIGKILL) -> None:

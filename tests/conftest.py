@@ -2,14 +2,30 @@
 
 import signal
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 import yaml
 
 from iowbc.robot.description import DESCRIPTION, Robot, load_robot, robot_folder
 
+TIERS = {
+    "unit": {"control", "deploy", "learning", "recipe", "report", "robot", "rollouts", "sim"},
+    "integration": {"evaluation", "export", "live", "reference", "stages", "task"},
+    "system": {"chaos", "commands", "pipeline", "web"},
+}
+"""Folders of each tier; a file may choose another by its `pytestmark`, and one beside the folders is a unit test."""
 STIFF = ("waist_roll", "waist_pitch", "wrist_pitch", "wrist_yaw")
 """Joints that the robot of 29 joints has and the one of 23 has not."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give each test its tier."""
+    for item in items:
+        if not any(item.get_closest_marker(tier) for tier in TIERS):
+            folder = item.path.relative_to(Path(__file__).parent).parts[0]
+            item.add_marker(next((tier for tier, folders in TIERS.items() if folder in folders), "unit"))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import ALL_ERRORS, COSTS, STILL
+from iowbc.evaluation.report.aggregate import ALL_ERRORS, COSTS, FORCES, STILL
 from iowbc.evaluation.trials.metrics import Measure
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
@@ -11,8 +11,15 @@ from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.task.commands.script import CommandScript, CommandSegment
 
 DT = 0.02
-JOINTS = ("hip", "knee")
-MEASURE = Measure(50.0, GaitPrior(frequency=1.25), Commands(nominal_height=0.75), foot_load=50.0, joints=JOINTS)
+JOINTS = {"hip": 80.0, "knee": 100.0}
+MEASURE = Measure(
+    control_frequency=50.0,
+    gait=GaitPrior(frequency=1.25),
+    commands=Commands(nominal_height=0.75),
+    foot_load=50.0,
+    push_part=0.5,
+    efforts=JOINTS,
+)
 GAIT_STEPS = MEASURE.window
 
 
@@ -39,14 +46,22 @@ def trace(steps: int = 400) -> Trace:
         partner_force=vectors,
         link_object_force=zeros,
         grip_force=np.zeros((steps, 6)),
+        external_force=vectors,
+        handle_velocity=vectors,
+        partner_velocity=vectors,
         power=np.full(steps, 100.0),
         base_position=vectors,
         torso_position=vectors,
         object_position=vectors,
         foot_position=np.zeros((steps, 6)),
         foot_slide=np.zeros((steps, 2)),
+        foot_margin=np.full((steps, 2), 0.02),
+        foot_sink=np.zeros((steps, 2)),
+        foot_peak=np.full((steps, 2), 160.0),
         foot_load=np.full((steps, 2), 160.0),
+        foot_shear=np.zeros((steps, 2)),
         foot_contact=np.ones((steps, 2)),
+        action=np.zeros((steps, 2)),
         joint_torque=np.zeros((steps, len(JOINTS))),
         joint_saturation=np.zeros((steps, len(JOINTS))),
     )
@@ -79,7 +94,7 @@ def trials_of(
             "object_beside": 0.1 if suite.startswith("push") else np.nan,
             **dict.fromkeys(ALL_ERRORS, error + 0.1 * trial),
             **dict.fromkeys(STILL, 0.25),
-            **dict.fromkeys(COSTS, 1.0),
+            **dict.fromkeys((*COSTS, *FORCES), 1.0),
             "transport_robot": 0.9,
             "transport_object": 0.8,
             "commanded_distance": 4.0,
@@ -91,6 +106,8 @@ def trials_of(
             "peak_torque/knee": 40.0,
             "saturated/hip": 0.0,
             "saturated/knee": 0.1,
+            "torque_rms/hip": 0.1,
+            "torque_rms/knee": 0.3,
         }
         for mass, count in survivors.items()
         for trial in range(5)

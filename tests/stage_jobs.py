@@ -41,7 +41,7 @@ class Backwards:
 
     def __init__(self) -> None:
         self.calls = 0
-        self.crews: list[int] = []
+        self.pools: list[int] = []
 
     def __call__(
         self, function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
@@ -50,10 +50,10 @@ class Backwards:
             self.calls += 1
             yield place, function(*calls[place], **folders)
 
-    def crew(
+    def actor_pool(
         self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
     ) -> "Remade":
-        self.crews.append(len(calls))
+        self.pools.append(len(calls))
         return Remade([partial(make, *own, **folders) for own in calls])
 
 
@@ -65,16 +65,14 @@ class Remade:
         self.states: list[Any] = [None for _ in made]
         self.found: list[Any] = []
 
-    def ask(
-        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
-    ) -> None:
+    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
         assert patience > 0.0
         self.found = []
-        for index, (make, own) in enumerate(zip(self.made, arguments, strict=True)):
+        for index, (make, own) in enumerate(zip(self.made, messages, strict=True)):
             member = make()
             if self.states[index] is not None:
                 member.restore(self.states[index])
-            self.found.append(member.ask(request, own))
+            self.found.append(member.ask(own))
             if changes:
                 self.states[index] = member.state()
 

@@ -28,21 +28,22 @@ MAY_IMPORT = {
     "pipeline": {"recipe", "errors", "files", "processes", "full_disk"},
     "sim": SHARED,
     "reference": WORLD,
+    "model_based": SHARED | {"reference"},
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts"},
     "task": WORLD | {"rollouts"},
-    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy"},
+    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
-    "report": {"learning", "pipeline", "recipe", "errors"},
+    "report": {"learning", "pipeline", "recipe", "stages", "errors"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD
     | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
-    | {"live", "web"},
-    "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors"},
+    | {"live", "web", "stages"},
+    "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
 ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "sklearn", "mlflow", "matplotlib"}

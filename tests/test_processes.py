@@ -51,5 +51,8 @@ def test_no_more_cores_are_available_than_the_process_may_use() -> None:
 
 def test_mujoco_is_loaded_without_another_process() -> None:
     """Whoever kills a training while glfw's own Python runs would make that one print a traceback."""
-    script = "import iowbc, subprocess; subprocess.Popen = None; import mujoco; print(mujoco.mjtObj.mjOBJ_BODY.value)"
+    script = (
+        "import subprocess; from iowbc.processes import name_glfw; name_glfw(); subprocess.Popen = None; "
+        "import mujoco; print(mujoco.mjtObj.mjOBJ_BODY.value)"
+    )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout == "1\n"

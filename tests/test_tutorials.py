@@ -24,6 +24,8 @@ from iowbc.stages import teacher
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
+pytestmark = pytest.mark.system
+
 ROOT = DOCS.parent
 TINY = (
     *("task.references.use_rg=false", "task.episode_duration=[0.2, 1.0]", "teacher.environments=4"),
@@ -97,6 +99,14 @@ def test_add_an_object(place: Path) -> None:
             assert not env.signals["diverged"].any()
         finally:
             env.close()
+
+
+def test_an_object_for_a_trained_policy_changes_the_trials_alone(place: Path) -> None:
+    write("tutorials/object.md", place)
+    bucket, full = (load_recipe(place / "recipes" / f"{name}.yaml").recipe for name in ("bucket", "full"))
+    assert (bucket.simulation, bucket.task, bucket.teacher) == (full.simulation, full.task, full.teacher)
+    assert bucket.eval.scenes["bucket"].scene.object is not None
+    assert set(bucket.eval.scenes) > set(full.eval.scenes)
 
 
 def test_add_a_robot(place: Path) -> None:

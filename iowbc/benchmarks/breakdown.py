@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.benchmarks.bare_loop import wander
+from iowbc.task.vector.messages import GetLevels
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.workers import InProcess, Workers
 
@@ -99,7 +100,7 @@ def transfer_time(workers: Workers, rounds: int) -> float:
     for _ in range(rounds):
         begin = time.perf_counter()
         workers.buffers["action"][:] = 0.0
-        workers.ask("__len__")
+        workers.ask([GetLevels() for _ in workers.groups])
         workers.answers()
         for name in ("observation", "reward", "done"):
             workers.buffers[name].copy()

@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.control.action import action_mirror
 from iowbc.learning.activations import ACTIVATIONS
+from iowbc.learning.side_by_side import prepare_process
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
@@ -56,6 +57,7 @@ def main(
         mirrors = environments.layout.mirror, action_mirror(load_robot(folder))
         other = _plain(specification, scene, count, samples) if count else None
         try:
+            prepare_process()
             training = TeacherTraining(settings, environments, mirrors, recipe.seed, cores=cores)
             rows, rates, other_rates = [], [], []
             for turn in range(turns + 1):  # the first warms up

@@ -18,6 +18,7 @@ from iowbc.cli.running import plan, publish, run, sweep
 from iowbc.commands.interrupt import leave
 from iowbc.commands.streams import let_go, prepare_streams
 from iowbc.commands.unforeseen import told
+from iowbc.processes import name_glfw
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "run": run,
@@ -85,6 +86,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 a stage failed, 2 the recipe or the usage is wrong, 130 interrupted."""
     signal.signal(signal.SIGINT, leave)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    name_glfw()
     prepare_streams()
     code: str | int | None = 1
     try:

@@ -35,16 +35,17 @@ def play(
     from iowbc.commands.play import PlayRequest, play_word
     from iowbc.commands.play_web import PORT, play_on_web
     from iowbc.errors import UsageError
+    from iowbc.stages.registry import STAGES
 
     request = PlayRequest(
         scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
     )
     if web:
-        play_on_web(store_in(runs), console(), what, stage, request, port or PORT)
+        play_on_web(store_in(runs), console(), what, stage, request, port or PORT, STAGES)
     elif port is not None:
         raise UsageError("--port is that of the page that --web serves; give both")
     else:
-        raise typer.Exit(play_word(store_in(runs), console(), what, stage, request))
+        raise typer.Exit(play_word(store_in(runs), console(), what, stage, request, STAGES))
 
 
 def export(

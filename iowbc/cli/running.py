@@ -76,6 +76,7 @@ def sweep(
         int | None,
         typer.Option(help="Points at the same time, which share the cores; one, or all cores of Ray.", min=1),
     ] = None,
+    points: Annotated[int, typer.Option(help="Largest number of points.", min=1)] = 1_000,
     until: Until = None,
     workers: Annotated[int | None, typer.Option(help="Worker processes of each point.", min=1)] = None,
     engine: Engine = None,
@@ -92,7 +93,7 @@ def sweep(
     from iowbc.stages.registry import STAGES
 
     request = request_of(recipe, overrides, until, None, workers, on_code_change, runs, engine, address)
-    asked = SweepRequest(request, file, jobs)
+    asked = SweepRequest(request, file, jobs, points)
     if dry_run:
         plan_sweep(asked, STAGES, console(), as_json)
     else:
@@ -155,7 +156,7 @@ def request_of(
     address: str | None = None,
 ) -> "Request":
     from iowbc.commands.request import Request
-    from iowbc.pipeline.planner import Options
+    from iowbc.pipeline.step import Options
 
     options = Options(until, frozenset(force or ()), on_code_change, workers, engine, address)
     return Request(recipe, tuple(overrides or ()), runs_folder(runs), options)

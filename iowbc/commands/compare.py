@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from iowbc.commands.as_json import print_json
-from iowbc.commands.compared import FILM, film_of, record
 from iowbc.commands.drawn_table import drawn, read_table
 from iowbc.commands.evaluated import PROBE, TRIALS, evaluated_actor
 from iowbc.commands.filming import Filming
+from iowbc.commands.members import FILM, film_of, members_of, points_of, record_comparison
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path
-from iowbc.commands.swept import members_of, points_of
 from iowbc.commands.training import require_training
 from iowbc.commands.trainings import trainings_table
 from iowbc.errors import UsageError
@@ -23,6 +22,7 @@ from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
+from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +56,7 @@ def compare(
     require_training("compare")
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
-    record([run.word for run in found], output)
+    record_comparison([run.word for run in found], output)
     (output / "metrics.md").write_text(metrics_table(found), encoding="utf-8")
     tried = _having(found, TRIALS)
     missing = [name for name in members if name not in {run.word for run in tried}]
@@ -124,12 +124,12 @@ def _groups(found: Sequence[Named]) -> "list[Group]":
 
 def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[Panel]]":
     """The main learning curves of all recipes by stage; also drawn under `output`, a picture a stage."""
-    from iowbc.report.curves import LEARNING, learning_panels
+    from iowbc.report.curves import learning_panels
     from iowbc.report.learning_figure import POINTS, learning_figure
     from iowbc.report.picture_file import write_figure
 
     groups = _groups(found)
-    curves = {stage: panels for stage in LEARNING if (panels := learning_panels(groups, stage, POINTS)[0])}
+    curves = {stage: panels for stage in STAGES if (panels := learning_panels(groups, stage, POINTS)[0])}
     for stage, panels in curves.items():
         write_figure(learning_figure(panels, stage), output / "figures" / f"learning_{stage}.png")
     return curves

@@ -16,8 +16,8 @@ from iowbc.commands.as_json import print_json
 from iowbc.commands.named import Named, named
 from iowbc.commands.tables import NARROWEST, folded, hanging
 from iowbc.errors import UsageError, shown
+from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
-from iowbc.pipeline.ingredients import changed_code
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -103,9 +105,9 @@ def findings(runs: Runs) -> Iterator[Finding]:
 
 
 def _python() -> Finding:
-    version = sys.version.split()[0]
-    fits = sys.version_info[:2] == (3, 11)
-    return Finding("Python", "good" if fits else "bad", version if fits else f"{version}; Python 3.11 is needed")
+    version, wanted = platform.python_version(), importlib.metadata.metadata("iowbc")["Requires-Python"]
+    fits = SpecifierSet(wanted).contains(version, prereleases=True)
+    return Finding("Python", "good" if fits else "bad", version if fits else f"{version}; Python {wanted} is needed")
 
 
 def _packages() -> Iterator[Finding]:

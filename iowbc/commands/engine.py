@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from iowbc.pipeline.planner import Options
+from iowbc.pipeline.step import Options
 from iowbc.recipe.execution import Execution
 
 if TYPE_CHECKING:

@@ -19,12 +19,13 @@ def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | No
     """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
     import pandas as pd
 
+    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.side_by_side import Actor
     from iowbc.evaluation.trials.protocol import evaluated_world
-    from iowbc.learning.acting import load_policy
 
     if trials is None and not (artifact.folder / TRIALS).is_file():
         raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
     table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
     world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
-    return Actor(world, load_policy(policy_of(store, artifact).folder), table)
+    policy = None if world.recipe.eval.policy == "model" else policy_of(store, artifact).folder
+    return Actor(world, evaluated_policy(world, policy), table)

@@ -11,10 +11,12 @@ from rich.console import Console
 from iowbc.commands.named import known_recipes, last_used
 from iowbc.commands.results import shown_path
 from iowbc.errors import UsageError, nearest
+from iowbc.files import OLD
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import ever_used
 from iowbc.pipeline.store.links import remove_dangling
 from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.publishing import PUBLISHING
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
 from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
@@ -33,7 +35,8 @@ class Scope:
     """What may be removed."""
 
     unused: bool = False
-    """Artifacts that no recipe ever used; with `older_than` also those that none used lately."""
+    """Artifacts that no recipe ever used, and what processes left that died; with `older_than` also those that none
+    used lately."""
     recipes: tuple[str, ...] = ()
     """These recipes' records, and artifacts that they used and no other recipe did."""
     work: bool = False
@@ -86,7 +89,11 @@ def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
         for artifact in free:
             if artifact.manifest.key not in spared and artifact.manifest.seconds < PRECIOUS:
                 yield artifact.folder
-        yield from runs.store.glob(f"*/{REMOVING}*")
+        for path in (*runs.store.glob("*/.*"), *runs.published.glob("*/.*")):
+            key = path.name.split(".")[1]
+            restorable = path.suffix == OLD and not path.with_name(key).exists()
+            if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
+                yield path
     others = {key for name in recipes if name not in scope.recipes for key in ever_used(runs, name)}
     for recipe in scope.recipes:
         keys = ever_used(runs, recipe).keys() - others

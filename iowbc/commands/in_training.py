@@ -11,9 +11,8 @@ from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.runs import read_json, read_yaml
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
+from iowbc.stages.registry import STAGES
 
-TRAINED = ("distill", "teacher")
-"""Stages that train."""
 PLAYED = "teacher"
 """The stage whose checkpoint can be played."""
 CHECKPOINT = Path("scratch", "training.checkpoint")
@@ -38,7 +37,7 @@ def in_training(store: Store, word: str, stage: str | None) -> InTraining | None
     """The newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, if there is one."""
     name, slash, last = word.rpartition("/")
     name, wanted = (name, last) if slash else (word, stage)
-    if wanted not in TRAINED:
+    if wanted not in STAGES or not STAGES[wanted].presentation.trained_by:
         return None
     for folder, record in unfinished(store.runs):
         if (record.get("stage"), record.get("recipe")) == (wanted, Path(name).stem):

@@ -7,13 +7,15 @@ from rich.console import Console
 
 from iowbc.commands.results import shown_path
 from iowbc.errors import UsageError
+from iowbc.files import replacing
 from iowbc.pipeline.writability import require_writable
 from iowbc.recipe.reading.finding import known_files
 from iowbc.robot.description import robot_folder
 
 
 def begin(folder: Path, robot: str, console: Console) -> None:
-    """Copy the recipes and a robot's description to `folder`, and replace nothing there. Raises `UsageError`."""
+    """Copy the recipes and a robot's description to `folder`, and replace nothing there; what an earlier call that was
+    cut short has copied stays. Raises `UsageError`."""
     try:
         source = robot_folder(robot)
     except FileNotFoundError as error:
@@ -21,12 +23,24 @@ def begin(folder: Path, robot: str, console: Console) -> None:
     origins = {folder / "robots" / source.name: source}
     for path in known_files():
         origins.setdefault(folder / "recipes" / path.name, path)
-    there = [str(target) for target in origins if target.exists()]
+    links = [str(path) for path in (folder / "robots", folder / "recipes", *origins) if path.is_symlink()]
+    if links:
+        raise UsageError(f"{', '.join(links)}: a link leads elsewhere; remove it, or name another folder")
+    same = [target for target, origin in origins.items() if target.exists() and _content(target) == _content(origin)]
+    there = [str(target) for target in origins if target.exists() and (target not in same or len(same) == len(origins))]
     if there:
         raise UsageError(f"{', '.join(there)} {'is' if len(there) == 1 else 'are'} there already; name another folder")
     require_writable(folder, "DIR")
     for target, origin in origins.items():
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(origin, target) if origin.is_dir() else shutil.copyfile(origin, target)
+        if target in same:
+            continue
+        with replacing(target) as fresh:
+            shutil.copytree(origin, fresh) if origin.is_dir() else shutil.copyfile(origin, fresh)
         console.print(shown_path(target), markup=False, highlight=False, soft_wrap=True)
     console.print(f"to begin: cd {folder}, then `iowbc run quickstart`", highlight=False, soft_wrap=True)
+
+
+def _content(path: Path) -> dict[str, bytes]:
+    """The content of a file, or of all files below a folder, by relative path."""
+    files = (file for file in (path, *path.rglob("*")) if file.is_file())
+    return {file.relative_to(path).as_posix(): file.read_bytes() for file in files}

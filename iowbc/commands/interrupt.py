@@ -1,6 +1,7 @@
 """Ctrl-C before a run has begun, or in any other command."""
 
 import os
+import signal
 import sys
 from types import FrameType
 
@@ -8,6 +9,13 @@ INTERRUPTED = 130
 """Exit code of what was interrupted."""
 IMPORTS = "importlib._bootstrap"
 """Module whose code is on the stack while a module is being read."""
+
+
+def close_on_termination() -> None:
+    """From now on a termination, or a lost terminal, closes what is open, as Ctrl-C does."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.getsignal(signal.SIGINT))
 
 
 def leave(number: int, frame: FrameType | None) -> None:

@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING, Any
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.store import Store
+from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from iowbc.task.specification import Specification
-
-EVALUATED = ("distill", "teacher")
-"""Stages whose policies an evaluation plays; where it read both, the first."""
 
 
 def generator_of(store: Store, artifact: Artifact) -> Artifact | None:
@@ -21,7 +19,8 @@ def generator_of(store: Store, artifact: Artifact) -> Artifact | None:
 
 def policy_of(store: Store, evaluation: Artifact) -> Artifact:
     """The policy that an evaluation played. Raises `UsageError`."""
-    found = (input_of(store, evaluation, stage) for stage in EVALUATED)
+    trained = (name for name, stage in reversed(STAGES.items()) if stage.presentation.trained_by)
+    found = (input_of(store, evaluation, name) for name in trained)
     policy = next(filter(None, found), None)
     if policy is None:
         raise UsageError(f"{evaluation.folder}: this evaluation read no policy; run its recipe again")

@@ -1,6 +1,7 @@
 """`iowbc plan`: what would run, why, and how long that takes."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -8,11 +9,12 @@ from rich.text import Text
 
 from iowbc.commands.as_json import print_json
 from iowbc.commands.request import Request, in_order, prepared, recipes
-from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned
+from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned, time_of
 from iowbc.commands.tables import hanging
-from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
-from iowbc.pipeline.planner import Step
+from iowbc.pipeline.console.wording import KEY_LENGTH, short
+from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Step
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
@@ -24,7 +26,12 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_j
     """Print what would run, and why; of a recipe of recipes a table of what would run of each."""
     asked = [prepared(one, request, registry)[0] for one in recipes(request)]
     each = [one for planner in asked for one in in_order(planner)]
-    planners = list({(one.loaded.file, one.loaded.overrides): one for one in each}.values())
+    longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
+    for one in each:  # a recipe may be asked for, and be what another one begins from
+        known = longest.setdefault((one.loaded.file, one.loaded.overrides), one)
+        if len(one.stages) > len(known.stages):
+            longest[one.loaded.file, one.loaded.overrides] = one
+    planners = list(longest.values())
     if as_json:
         names = [planner.loaded.recipe.name for planner in planners]
         steps = [[_data(step) for step in planner.plan()] for planner in planners]
@@ -59,15 +66,13 @@ def _print(steps: Sequence[Step], console: Console) -> None:
             console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
-    known = [step.guess for step in missing if step.guess is not None]
-    sure = "about" if all(step.roughly is None for step in missing) else "roughly"
+    rest = sum(step.guess is None for step in missing)
     if not missing:
         console.print("all stages are cached", highlight=False)
-    elif not known:
+    elif rest == len(missing):
         console.print(f"{count}; how long that takes is not known", highlight=False)
     else:
-        rest = len(missing) - len(known)
-        parts = [f"{sure} {duration(sum(known))}"]
+        parts = [time_of(missing)]
         parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
         console.print(f"{count}: {', and '.join(parts)}", highlight=False)
 
@@ -78,9 +83,9 @@ def _planned(step: Step) -> Text:
         published = step.artifact is not None and step.artifact.published
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if published else "cached", "cyan"), (key, "dim"))
-    takes = "" if step.expected is None else f", about {duration(step.expected)}"
+    takes = "" if step.guess is None else f", {time_of([step])}"
     if step.expected is None and step.roughly is not None:
-        takes = f", roughly {duration(step.roughly)} at the rate of {step.rate_of}"
+        takes += f" at the rate of {step.rate_of}"
     return Text.assemble(("run", "bold yellow"), takes)
 
 
@@ -99,5 +104,6 @@ def _data(step: Step) -> dict[str, Any]:
         "reasons": step.reasons,
         "notes": step.notes,
         "expected_seconds": None if step.cached else step.expected,
+        "expected_range": None if step.cached else [(step.expected or 0.0) * end for end in step.spread],
         "roughly_seconds": None if step.cached else step.roughly,
     }

@@ -3,31 +3,47 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import InTraining, in_training
+from iowbc.commands.interrupt import close_on_termination
 from iowbc.commands.named import named
 from iowbc.commands.origins import generator_of, made_from, world_of
-from iowbc.commands.results import POLICIES
+from iowbc.commands.request import Request, prepared
+from iowbc.commands.results import policy_stages
 from iowbc.commands.training import require_training
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Options
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import require_whole
+from iowbc.pipeline.store.last_used import recall, require_whole
 from iowbc.pipeline.store.store import Store
+from iowbc.recipe.evaluation.evaluation import Evaluation
+from iowbc.recipe.reading.finding import SUFFIXES
+from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
 
+Registry = Mapping[str, Stage]
+"""The stages that there are, by name."""
+NO_STAGES: Registry = MappingProxyType({})
+NOTHING: Mapping[str, Artifact] = MappingProxyType({})
 
-def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
+
+def play_word(
+    store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, registry: Registry = NO_STAGES
+) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
-    source = named_source(store, console, word, stage, request.scene)
+    close_on_termination()
+    source = named_source(store, console, word, stage, request.scene, registry)
 
     from iowbc.evaluation.play import play
 
@@ -43,10 +59,21 @@ def play_word(store: Store, console: Console, word: str, stage: str | None, requ
     return 0
 
 
-def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
+def named_source(
+    store: Store,
+    console: Console,
+    word: str,
+    stage: str | None,
+    scene: str | None = None,
+    registry: Registry = NO_STAGES,
+) -> "Source":
     """What a word and `--stage` name, told on the console while it is trained. Raises `UsageError`, also for a `scene`
-    that its recipe has not."""
-    from iowbc.evaluation.play import exported_source
+    that its recipe has not.
+
+    A recipe's file names the artifacts that `iowbc plan` calls cached; it, or the recipe of a name, says by its own
+    `eval` what is played of them.
+    """
+    from iowbc.evaluation.play import asked_by, exported_source
 
     if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
@@ -54,8 +81,10 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
     if training is not None and training.recipe is not None:
         console.print(training.text, markup=False, highlight=False, soft_wrap=True)
         return _training_source(store, training, training.recipe)
+    loaded = load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
+    asked = _evaluation(store, word) if loaded is None else loaded.recipe.eval
     try:
-        artifact = playable(store, word, stage)
+        artifact = playable(store, word, stage, {} if loaded is None else planned(store, loaded, registry))
     except UsageError:
         if training is None:
             raise
@@ -69,8 +98,15 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         console.print(text, markup=False, highlight=False, soft_wrap=True)
     scenes = artifact.recipe.get("simulation", {}).get("scenes", {})
     if scene is not None and scenes:
-        require_known(scene, "scene", scenes)
-    return _whole_source(store, artifact)
+        require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
+    source = _whole_source(store, artifact)
+    return source if asked is None else asked_by(source, asked)
+
+
+def _evaluation(store: Store, word: str) -> Evaluation | None:
+    """What the recipe of a name, or of `RECIPE/STAGE`, asks to be played; None for a key."""
+    recipe = recall(store.runs, word.partition("/")[0]).get("recipe", {})
+    return Evaluation.model_validate(recipe["eval"]) if "eval" in recipe else None
 
 
 def artifact_source(store: Store, artifact: Artifact) -> "Source":
@@ -89,14 +125,21 @@ def _whole_source(store: Store, artifact: Artifact) -> "Source":
     return exported_source(artifact.folder) if artifact.manifest.stage == "export" else _source(artifact, generator)
 
 
-def playable(store: Store, word: str, stage: str | None) -> Artifact:
-    """The policy that a word and `--stage` name. Raises `UsageError`."""
-    found = named(store, word).usable
-    ready = [name for name in POLICIES if name in found]
+def planned(store: Store, loaded: LoadedRecipe, registry: Registry) -> dict[str, Artifact]:
+    """By stage: the stored artifacts that a recipe's file plans to use, of those that leave a policy."""
+    request = Request(str(loaded.file), (), store.runs, Options())
+    steps = prepared(loaded, request, registry)[0].plan() if registry else []
+    return {step.stage.name: step.artifact for step in steps if step.cached and step.artifact is not None}
+
+
+def playable(store: Store, word: str, stage: str | None, planned: Mapping[str, Artifact] = NOTHING) -> Artifact:
+    """The policy that a word and `--stage` name, before all one that its file plans to use. Raises `UsageError`."""
+    found = planned if any(name in planned for name in policy_stages()) else named(store, word).usable
+    ready = [name for name in policy_stages() if name in found]
     if not ready or (stage is not None and stage not in ready):
         raise UsageError(
             f"{word}: no policy {f'of stage {stage} ' if stage else ''}to play; "
-            f"stages that leave one: {', '.join(POLICIES)}; finished: {', '.join(found) or 'none'}"
+            f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
         )
     return found[stage or ready[0]]
 

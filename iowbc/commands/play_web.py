@@ -1,15 +1,15 @@
 """`iowbc play --web`: a policy to be driven by hand in the browser, and the trials of its evaluation."""
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from iowbc.commands.evaluated import evaluated_actor
+from iowbc.commands.interrupt import close_on_termination
 from iowbc.commands.named import named
 from iowbc.commands.origins import policy_of
-from iowbc.commands.play import artifact_source, named_source
+from iowbc.commands.play import NO_STAGES, Registry, artifact_source, named_source
 from iowbc.commands.ports import HOST, require_free
 from iowbc.commands.training import require_training, require_viewer
 from iowbc.errors import UsageError
@@ -25,16 +25,24 @@ PORT = 8080
 """Where nothing else is asked for."""
 
 
-def play_on_web(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, port: int) -> None:
+def play_on_web(
+    store: Store,
+    console: Console,
+    word: str,
+    stage: str | None,
+    request: PlayRequest,
+    port: int,
+    registry: Registry = NO_STAGES,
+) -> None:
     """Serve the viewer until interrupted. Raises `UsageError` where it cannot begin."""
     if request.video is not None:
         raise UsageError("--web and --video exclude each other: open the page, or make a film")
     require_training("play")
     require_viewer()
     require_free(port)
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    close_on_termination()
     evaluation = _evaluation(store, word)
-    source = _source(store, console, word, stage, evaluation)
+    source = _source(store, console, word, stage, evaluation, registry)
 
     from iowbc.live.page import play_on_page
     from iowbc.live.server import serving
@@ -51,11 +59,13 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
         play_on_page(server, session, evaluated, ready)
 
 
-def _source(store: Store, console: Console, word: str, stage: str | None, evaluation: Artifact | None) -> "Source":
+def _source(
+    store: Store, console: Console, word: str, stage: str | None, evaluation: Artifact | None, registry: Registry
+) -> "Source":
     """The policy that is named, or the one that was played in the evaluation that is."""
     if evaluation is not None and [*named(store, word).artifacts] == [evaluation.manifest.stage]:
         return artifact_source(store, policy_of(store, evaluation))
-    return named_source(store, console, word, stage)
+    return named_source(store, console, word, stage, registry=registry)
 
 
 def _evaluation(store: Store, word: str) -> Artifact | None:

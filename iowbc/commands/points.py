@@ -1,8 +1,8 @@
 """Runs several recipes at once, each in a process or a thread of its own with its own log."""
 
+import contextlib
 import multiprocessing
 import os
-import re
 import signal
 import sys
 import time
@@ -12,47 +12,46 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor
 from concurrent.futures import wait as futures_wait
 from dataclasses import dataclass
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkProcess
 from pathlib import Path
 
 from rich.console import Console
 
+from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.pipeline.console.board import Board, last_line
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.processes import die_with_parent
 
-DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
-"""Exit codes of a recipe's run."""
 POLL = 0.1
 """Seconds between two looks at the runs."""
 PATIENCE = 10.0
 """Seconds that an aborted run has to end by itself."""
 LOG_WIDTH = 160
 """Characters in a line of a table in a log."""
-FAILURE = re.compile(r"^\S+ failed: .*")
-"""The line of a log that says what failed."""
-Codes = dict[str, int | None]
-"""Exit code of each run by its name; None of one that never began."""
+Endings = dict[str, RunEnding | None]
+"""How each run has ended, by its name; None for one that never began."""
 
 
 @dataclass(frozen=True)
-class Task:
+class PointRun:
     """A recipe's run among others."""
 
     name: str
     log: Path
     """What it prints."""
-    run: Callable[[Console], int]
-    """Runs it, prints to a console, and returns the exit code."""
+    run: Callable[[Console], RunEnding]
+    """Runs it and prints to a console."""
 
 
-def run_threads(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board, abort: Callable[[], None]) -> Codes:
+def run_threads(
+    tasks: Sequence[PointRun], jobs: int, stop: StopRequest, board: Board, abort: Callable[[], None]
+) -> Endings:
     """Run all as `run_processes` does, in threads of this process: for runs whose stages are carried out elsewhere.
 
     abort: lets all that run end at once.
     """
-    codes: Codes = {task.name: None for task in tasks}
+    endings: Endings = {task.name: None for task in tasks}
     with ThreadPoolExecutor(jobs) as threads:
         futures = {threads.submit(_begin, task, stop, board): task for task in tasks}
         try:
@@ -60,17 +59,17 @@ def run_threads(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Boar
                 over, _ = futures_wait(futures, POLL, FIRST_COMPLETED)
                 for future in over:
                     task = futures.pop(future)
-                    codes[task.name] = future.result()
-                    if codes[task.name] is not None:
-                        board.ended(task.name, *_outcome(task, codes[task.name]))
+                    ending = endings[task.name] = future.result()
+                    if ending is not None:
+                        board.ended(task.name, *_outcome(task, ending))
                 board.refresh()
         except KeyboardInterrupt:
             abort()
             raise
-    return codes
+    return endings
 
 
-def _begin(task: Task, stop: StopRequest, board: Board) -> int | None:
+def _begin(task: PointRun, stop: StopRequest, board: Board) -> RunEnding | None:
     """Run a task in this thread, unless a stop was asked for before."""
     if stop():
         return None
@@ -79,19 +78,19 @@ def _begin(task: Task, stop: StopRequest, board: Board) -> int | None:
     with task.log.open("a", encoding="utf-8") as log:
         try:
             return task.run(Console(file=log, width=LOG_WIDTH))
-        except Exception:
+        except Exception as error:
             log.write(traceback.format_exc())
-            return STAGE_FAILED
+            return RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
 
 
-def run_processes(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Board) -> Codes:
+def run_processes(tasks: Sequence[PointRun], jobs: int, stop: StopRequest, board: Board) -> Endings:
     """Run all, each in a process, at most `jobs` at a time.
 
     One that fails does not stop the others. Once `stop` is asked for, all that run are asked to stop after a
     checkpoint, and none begins. Raises `KeyboardInterrupt` when asked twice, after all have ended.
     """
-    codes: Codes = {task.name: None for task in tasks}
-    waiting, running = deque(tasks), dict[Task, ForkProcess]()
+    endings: Endings = {task.name: None for task in tasks}
+    waiting, running = deque(tasks), dict[PointRun, PointProcess]()
     told = False
     try:
         while (waiting and not stop()) or running:
@@ -102,28 +101,48 @@ def run_processes(tasks: Sequence[Task], jobs: int, stop: StopRequest, board: Bo
                 task = waiting.popleft()
                 running[task] = _started(task)
                 board.began(task.name)
-            wait([process.sentinel for process in running.values()], POLL)
-            for task in [task for task, process in running.items() if process.exitcode is not None]:
-                codes[task.name] = running.pop(task).exitcode
-                board.ended(task.name, *_outcome(task, codes[task.name]))
+            wait([one.process.sentinel for one in running.values()], POLL)
+            for task in [task for task, one in running.items() if one.process.exitcode is not None]:
+                ending = endings[task.name] = running.pop(task).ending(task)
+                board.ended(task.name, *_outcome(task, ending))
             board.refresh()
     except KeyboardInterrupt:
         _signal(running.values())
         raise
     finally:
         _end(running.values())
-    return codes
+    return endings
 
 
-def _started(task: Task) -> ForkProcess:
+@dataclass(frozen=True)
+class PointProcess:
+    """The process of a run, and where it says how it ended."""
+
+    process: ForkProcess
+    said: Connection
+
+    def ending(self, task: PointRun) -> RunEnding:
+        """How the run has ended, also where its process could not say it."""
+        if self.said.poll():
+            with contextlib.suppress(EOFError):
+                ending: RunEnding = self.said.recv()
+                return ending
+        code = self.process.exitcode or STAGE_FAILED
+        return RunEnding(code, f"killed by {signal.Signals(-code).name}" if code < 0 else last_line(task.log))
+
+
+def _started(task: PointRun) -> PointProcess:
     """A run in a process of its own. It is a copy of this one, which has no other threads: it starts at once, knows the
     same stages, and hears a signal from its first moment."""
-    process = multiprocessing.get_context("fork").Process(target=_run, args=(task, os.getpid()), name=task.name)
+    context = multiprocessing.get_context("fork")
+    said, saying = context.Pipe(duplex=False)
+    process = context.Process(target=_run, args=(task, os.getpid(), saying), name=task.name)
     process.start()
-    return process
+    saying.close()
+    return PointProcess(process, said)
 
 
-def _run(task: Task, parent: int) -> None:
+def _run(task: PointRun, parent: int, saying: Connection) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the sweep alone, which passes it on once
     die_with_parent(parent)
     task.log.parent.mkdir(parents=True, exist_ok=True)
@@ -131,40 +150,29 @@ def _run(task: Task, parent: int) -> None:
     for descriptor in (1, 2):
         os.dup2(log, descriptor)
     os.close(log)
-    sys.exit(task.run(Console(file=sys.stdout, width=LOG_WIDTH)))
+    ending = task.run(Console(file=sys.stdout, width=LOG_WIDTH))
+    saying.send(ending)
+    sys.exit(ending.code)
 
 
-def _outcome(task: Task, code: int | None) -> tuple[str, str]:
-    """How a run has ended, and what to say about it."""
-    if code == DONE:
-        return "done", ""
-    if code == INTERRUPTED:
-        return "stopped", ""
-    if code is not None and code < 0:
-        return "failed", f"killed by {signal.Signals(-code).name}; log {task.log}"
-    return "failed", f"{failure(task.log)}; log {task.log}"
+def _outcome(task: PointRun, ending: RunEnding) -> tuple[str, str]:
+    """The state that is shown of a run which has ended, and what to say about it."""
+    if ending.code in (DONE, INTERRUPTED):
+        return ("done" if ending.code == DONE else "stopped"), ""
+    return "failed", f"{ending.failure}; log {task.log}"
 
 
-def failure(log: Path) -> str:
-    """What a log says that failed, else its last line."""
-    try:
-        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return ""
-    return next((line for line in reversed(lines) if FAILURE.match(line)), last_line(log))
-
-
-def _signal(processes: Iterable[ForkProcess]) -> None:
+def _signal(points: Iterable[PointProcess]) -> None:
     """Ask runs to stop; asked again, they abort."""
-    for process in processes:
+    for process in (one.process for one in points):
         if process.exitcode is None and process.pid is not None:
             os.kill(process.pid, signal.SIGTERM)
 
 
-def _end(processes: Iterable[ForkProcess]) -> None:
+def _end(points: Iterable[PointProcess]) -> None:
     """Wait for runs that were aborted, and kill those that do not end."""
     limit = time.monotonic() + PATIENCE
-    for process in processes:
+    for process in (one.process for one in points):
         process.join(max(0.0, limit - time.monotonic()))
         if process.exitcode is None:
             process.kill()

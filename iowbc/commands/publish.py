@@ -29,7 +29,7 @@ def publish_recipe(
     require_writable_runs(request.runs)
     notes = {step.key: step.notes for step in steps}
     made = [step.artifact for step in steps]
-    started = [found for planner in planners for stage in planner.stages for found in planner.start(stage).values()]
+    started = [found for planner in planners for stage in planner.stages for found in planner.borrowed(stage).values()]
     artifacts = {found.manifest.key: found for found in (*made, *started) if found is not None}
     names = {name for artifact in artifacts.values() for name in artifact.manifest.files}
     for name in without:

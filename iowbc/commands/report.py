@@ -7,9 +7,9 @@ from rich.console import Console
 
 from iowbc.commands.compare import joined
 from iowbc.commands.diff import difference_lines
+from iowbc.commands.members import points_of
 from iowbc.commands.named import Named, named
 from iowbc.commands.results import shown_path, split_tables
-from iowbc.commands.swept import points_of
 from iowbc.commands.training import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from iowbc.commands.robot_check import check_against_robot
 from iowbc.errors import Problem, RecipeError
-from iowbc.pipeline.planner import Options, Planner
+from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Options
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
@@ -73,7 +74,7 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
     except FileNotFoundError as error:
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
     check_against_robot(loaded, robot)
-    return Planner(loaded, registry, Store(request.runs), robot, request.options), robot
+    return planner_for(loaded, registry, Store(request.runs), robot, request.options), robot
 
 
 def in_order(planner: Planner) -> list[Planner]:

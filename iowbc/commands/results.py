@@ -17,25 +17,23 @@ from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
+from iowbc.stages.registry import STAGES
 
-HEADLINES: Mapping[str, tuple[str, ...]] = {
-    "rg-dataset": ("samples", "kept", "crosscheck_p90"),
-    "rg-fit": ("joint_rmse", "height_p95", "foot_p95"),
-    "teacher": ("best_score", "check/survived", "episode_seconds"),
-    "distill": ("kl", "action_agreement", "episode_seconds"),
-    "eval": ("trials", "survived", "succeeded"),
-    "export": ("parity", "step_ms", "acceptance_survived"),
-}
-"""Patterns of the metrics that are shown of each stage, the most telling first; `show` has all."""
 METRICS_SHOWN = 3
 """Metrics of a stage that are shown at most."""
-TABLES = ("lifting", "pushing", "paper", "heavy", "capacity", "interquartile", "trainings", "probe")
+TABLES = (
+    *("lifting", "pushing", "paper", "heavy", "compliance", "impedance", "push_map"),
+    *("capacity", "interquartile", "trainings", "probe"),
+)
 """The main tables, in their order."""
-DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
+DRAWN = ("lifting", "pushing", "heavy", "compliance", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
 EXPORTED = "step.onnx"
-POLICIES = ("export", "distill", "teacher")
-"""Stages that leave a policy, the one to prefer first."""
+
+
+def policy_stages() -> list[str]:
+    """Stages that leave a policy, the one to prefer first."""
+    return [name for name, stage in reversed(STAGES.items()) if stage.presentation.leaves_policy]
 
 
 def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console) -> None:
@@ -66,7 +64,7 @@ def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], co
 
 def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]]:
     """The few metrics that tell most of a stage: by its patterns, else the first ones."""
-    patterns = HEADLINES.get(stage, ())
+    patterns = STAGES[stage].presentation.headline if stage in STAGES else ()
     chosen = [name for pattern in patterns for name in metrics if fnmatchcase(name, pattern)]
     return [(name, metrics[name]) for name in (chosen or list(metrics))[:METRICS_SHOWN]]
 
@@ -93,7 +91,7 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
         for stage, artifact in artifacts.items()
         if stage not in own or own[stage].manifest.key != artifact.manifest.key
     }
-    policy = next((stage for stage in POLICIES if stage in artifacts), None)
+    policy = next((stage for stage in policy_stages() if stage in artifacts), None)
     seen = [["iowbc", "play", others.get(policy, recipe)]] if policy else [] if others else [["iowbc", "show", recipe]]
     read = ["iowbc", "show", [*others.values()][-1]] if others else ["iowbc", "report", recipe]
     return [shlex.join([*words, *elsewhere]) for words in (*seen, read)]

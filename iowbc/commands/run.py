@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 
 from iowbc.commands.compare import compare, film_together
+from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.engine import engine
 from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.results import TABLES, described, print_results, shown_path
@@ -15,7 +16,7 @@ from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay, SilentDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.runner import Runner
+from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 Manner = Literal["usual", "quiet", "verbose"]
 """How much a run prints."""
-DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
-"""Exit codes."""
 
 
 def run(request: Request, registry: Mapping[str, Stage], console: Console, manner: Manner = "usual") -> int:
@@ -53,9 +52,9 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
                 for one in order:
                     if (len(ready) > 1 or len(order) > 1) and manner != "quiet":
                         console.print(f"{one.loaded.recipe.name}:", highlight=False)
-                    code = run_recipe(one, robot, request, console, stop, manner, cluster=cluster)
-                    if code != DONE:
-                        return code
+                    ending = run_recipe(one, robot, request, console, stop, manner, cluster=cluster)
+                    if ending.code != DONE:
+                        return ending.code
     except KeyboardInterrupt:
         return INTERRUPTED
     if len(ready) > 1 and request.options.until is None and manner != "quiet":
@@ -100,30 +99,39 @@ def run_recipe(
     within: str | None = None,
     cluster: "Cluster | None" = None,
     errors: Console | None = None,
-) -> int:
-    """Run one recipe; returns the exit code.
+    workers: int | None = None,
+) -> RunEnding:
+    """Run one recipe.
 
     within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
-    where it is said how a run that did not finish goes on; standard error if empty.
+    where it is said how a run that did not finish goes on; standard error if empty. workers: processes of a stage, as
+    asked for if empty.
     """
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
-    status, code, closing, delivered = "KILLED", INTERRUPTED, "", True
+    status, ending, closing, delivered = "KILLED", RunEnding(INTERRUPTED), "", True
     try:
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             load = (lambda: "") if cluster is None else lambda: cluster.load
             display = _display(loaded, console, lambda: stop.text, load, manner)
-            runner = Runner(planner, robot, display, tracker, stop, lambda made: _rest(request, made))
-            if cluster is not None:
-                runner.execute = cluster.run
+            runner = Runner(
+                planner,
+                robot,
+                display,
+                tracker,
+                stop,
+                command=lambda made: _rest(request, made),
+                execute=run_here if cluster is None else cluster.run,
+                workers=workers or planner.workers,
+            )
             runner.run()
-            status, code = "FINISHED", DONE
+            status, ending = "FINISHED", RunEnding(DONE)
             if tracker is not None:
                 tracker.describe(described(runner.artifacts))
         except PipelineFailed as error:
-            status, code = "FAILED", STAGE_FAILED
+            status, ending = "FAILED", RunEnding(STAGE_FAILED, str(error).splitlines()[0])
             closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"
         except Interrupted as error:
             closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
@@ -132,15 +140,15 @@ def run_recipe(
                 wait = within is None and bool(_made(runner)) and not stop()
                 delivered = tracker.close(status, wait) or not wait
     except KeyboardInterrupt:
-        code, closing = INTERRUPTED, _resumption(request, runner)
-    if code == DONE and runner is not None and manner != "quiet":
+        ending, closing = RunEnding(INTERRUPTED), _resumption(request, runner)
+    if ending.code == DONE and runner is not None and manner != "quiet":
         print_results(request.runs, loaded.recipe.name, runner.artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:
         told = errors or Console(stderr=True)
         told.print(closing, markup=False, highlight=False, soft_wrap=True)
-    return code
+    return ending
 
 
 def _resumption(request: Request, runner: Runner | None) -> str:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from iowbc.commands.drawn_table import drawn, read_table
+from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.engine import engine
+from iowbc.commands.members import record_sweep
 from iowbc.commands.named import Named, named
-from iowbc.commands.points import DONE, INTERRUPTED, STAGE_FAILED, Task, failure, run_processes, run_threads
+from iowbc.commands.points import Endings, PointRun, run_processes, run_threads
 from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.results import shown_path
 from iowbc.commands.run import run_recipe
 from iowbc.commands.sweep_plan import Planned, in_all, planned, print_plan
-from iowbc.commands.swept import record
 from iowbc.commands.training import require_training
 from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.console.board import Board, RunView
@@ -28,12 +29,15 @@ from iowbc.pipeline.tracking.family import Family
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
+from iowbc.recipe.sweep import MOST_POINTS
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
 
 LOGS = "logs"
 """Folder of a sweep with what each point prints."""
+MANY = 100
+"""Points whose number is told before they are planned, for that takes a while."""
 STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
 
 
@@ -47,12 +51,15 @@ class SweepRequest:
     """File that says what is varied besides."""
     jobs: int | None
     """Points that run at the same time; empty: one here, as many as there are cores on a cluster."""
+    most: int = MOST_POINTS
+    """Points at most."""
 
     @property
     def command(self) -> str:
         """The command that goes on with this sweep."""
         further = ["--from", str(self.file)] if self.file else []
         further += ["--jobs", str(self.jobs)] if self.jobs else []
+        further += ["--points", str(self.most)] if self.most != MOST_POINTS else []
         return replace(self.recipe, verb="sweep", further=further).command([])
 
 
@@ -71,12 +78,17 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
     if asked.recipe.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
-    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file)
+    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file, asked.most, _tell_count)
     points = []
     for point in found.points:
         request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
         points.append(ReadyPoint(point, *prepared(point.loaded, request, registry), request))
     return found, points
+
+
+def _tell_count(count: int) -> None:
+    if count >= MANY:
+        Console(stderr=True).print(f"plans {count:,} points", highlight=False)
 
 
 def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:
@@ -108,12 +120,12 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     require_training("sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
-    record(found, folder)
+    record_sweep(found, folder)
     before = planned([one.planner for one in points])
     if not quiet:
         console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
     execution = found.points[0].loaded.recipe.execution
-    codes: Mapping[str, int | None] = {}
+    endings: Endings = {}
     family: Family | None = None
     status = "KILLED"
     try:
@@ -123,69 +135,78 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
         ):
             if cluster is not None and not quiet:
                 console.print(cluster.text, highlight=False)
-            jobs = _shared_out(points, asked, cluster)
+            jobs, workers = _shared_out(points, asked, cluster)
             if execution.track and not _all_cached(before):
                 settings = {point.name: point.settings for point in found.points}
                 family = Family(runs, found.name, execution.experiment, settings, execution.tracking_patience)
                 family.send()
             origin = None if family is None else family.origin
-            tasks = [_task(one, stop, folder, origin, cluster) for one in points]
+            tasks = [_task(one, stop, folder, origin, cluster, workers) for one in points]
             views = {task.name: RunView(task.name, task.log) for task in tasks}
             load = (lambda: "") if cluster is None else lambda: cluster.load
             with Board(console, execution.line_interval, quiet, lambda: stop.text, views, load) as board:
                 if cluster is None:
-                    codes = run_processes(tasks, jobs, stop, board)
+                    endings = run_processes(tasks, jobs, stop, board)
                 else:
-                    codes = run_threads(tasks, jobs, stop, board, cluster.abort)
+                    endings = run_threads(tasks, jobs, stop, board, cluster.abort)
     except KeyboardInterrupt:
-        codes = dict.fromkeys(before, INTERRUPTED)
-    code = _code(codes)
+        endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
+    code = _code(endings)
     status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
     try:
         if code != INTERRUPTED:
-            _conclude(found, codes, runs, folder, console, family, quiet)
+            _conclude(found, endings, runs, folder, console, family, quiet)
     finally:
         if family is not None:
             family.close(status)
-    _tell_rest(asked, codes, folder, code)
+    _tell_rest(asked, endings, folder, code)
     return code
 
 
-def _shared_out(points: Sequence[ReadyPoint], asked: SweepRequest, cluster: "Cluster | None") -> int:
-    """Points that run at the same time; each is given its part of the cores, unless it says how many it wants."""
+def _shared_out(points: Sequence[ReadyPoint], asked: SweepRequest, cluster: "Cluster | None") -> tuple[int, int]:
+    """Points that run at the same time, and each one's part of the cores, for those that do not say what they want."""
     cores = available_cores() if cluster is None else cluster.cores
     actors = max(one.planner.loaded.recipe.execution.rollout_actors or 1 for one in points)
     jobs = asked.jobs or (1 if cluster is None else max(1, min(cores // actors, len(points))))
     most = cores if cluster is None else cluster.largest
-    for one in points:
-        wanted = asked.recipe.options.workers or one.planner.loaded.recipe.execution.workers
-        one.planner.options = replace(one.planner.options, workers=wanted or max(1, min(most, cores // jobs)))
-    return jobs
+    return jobs, max(1, min(most, cores // jobs))
 
 
-def _task(one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None, cluster: "Cluster | None") -> Task:
-    def run(console: Console) -> int:
-        errors = console if cluster is not None else None
+def _task(
+    one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None, cluster: "Cluster | None", workers: int
+) -> PointRun:
+    wanted = one.planner.options.workers or one.planner.loaded.recipe.execution.workers
+
+    def run(console: Console) -> RunEnding:
         return run_recipe(
-            one.planner, one.robot, one.request, console, stop, within=origin, cluster=cluster, errors=errors
+            one.planner,
+            one.robot,
+            one.request,
+            console,
+            stop,
+            within=origin,
+            cluster=cluster,
+            errors=console if cluster is not None else None,
+            workers=wanted or workers,
         )
 
-    return Task(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
+    return PointRun(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
 
 
 def _all_cached(before: Planned) -> bool:
     return all(stage.step.cached for own in before.values() for stage in own)
 
 
-def _code(codes: Mapping[str, int | None]) -> int:
-    if any(code in (INTERRUPTED, None) for code in codes.values()):
+def _code(endings: Endings) -> int:
+    codes = {None if ending is None else ending.code for ending in endings.values()}
+    if codes & {INTERRUPTED, None}:
         return INTERRUPTED
-    return DONE if all(code == DONE for code in codes.values()) else STAGE_FAILED
+    return DONE if codes <= {DONE} else STAGE_FAILED
 
 
 def _conclude(
     found: Sweep,
-    codes: Mapping[str, int | None],
+    endings: Endings,
     runs: Runs,
     folder: Path,
     console: Console,
@@ -196,6 +217,7 @@ def _conclude(
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, write_results
 
     store = Store(runs)
+    codes = {name: None if ending is None else ending.code for name, ending in endings.items()}
     finished: dict[str, Named] = {name: named(store, name) for name, code in codes.items() if code == DONE}
     if not finished:
         return
@@ -215,15 +237,16 @@ def _conclude(
         console.print(f"next:\n  iowbc compare {found.name}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _tell_rest(asked: SweepRequest, codes: Mapping[str, int | None], folder: Path, code: int) -> None:
+def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -> None:
     """Say on standard error what failed, and how to go on."""
     said = Console(stderr=True, soft_wrap=True)
-    failed = [name for name, own in codes.items() if own not in (DONE, INTERRUPTED, None)]
+    ended = {name: ending for name, ending in endings.items() if ending is not None}
+    failed = {name: one.failure for name, one in ended.items() if one.code not in (DONE, INTERRUPTED)}
     if failed:
-        said.print(f"{len(failed)} of {len(codes)} points failed:", highlight=False)
-    for name in failed:
+        said.print(f"{len(failed)} of {len(endings)} points failed:", highlight=False)
+    for name, failure in failed.items():
         log = folder / LOGS / f"{name}.log"
-        said.print(f"  {name}: {failure(log)} (log {shown_path(log)})", markup=False, highlight=False)
+        said.print(f"  {name}: {failure} (log {shown_path(log)})", markup=False, highlight=False)
     if code != DONE:
         head = "interrupted; to go on:" if code == INTERRUPTED else "what is finished is kept; after a remedy:"
         said.print(f"{head}\n{asked.command}", markup=False, highlight=False)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Any
 
 from rich.console import Console
@@ -12,8 +11,9 @@ from rich.text import Text
 from iowbc.commands.as_json import print_json
 from iowbc.commands.tables import plain_table
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.ingredients import deciding_slices
-from iowbc.pipeline.planner import Planner, Step
+from iowbc.pipeline.ingredients import key_values
+from iowbc.pipeline.planner import Planner
+from iowbc.pipeline.step import Step
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.reading.sweep import Sweep
 
@@ -52,10 +52,10 @@ def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
         return step.key
     ingredients = {
         "stage": step.stage.name,
-        "recipe": deciding_slices(planner.deciding, step.stage),
+        "recipe": key_values(planner.loaded.recipe, planner.deciding, step.stage),
         "robot": planner.robot_digest,
         "inputs": {name: before[name] for name in planner.reads(step.stage)},
-        "start": step.stage.starts_from and attrgetter(step.stage.starts_from)(planner.loaded.recipe),
+        "borrowed": {name: one.named for name, one in step.stage.borrows(planner.loaded.recipe).items()},
     }
     return data_digest(ingredients)
 
@@ -67,15 +67,22 @@ def in_all(found: Planned, what: str = "points") -> str:
     shared = sum(bool(stage.shared_with) for stage in stages)
     cached = sum(stage.step.cached for stage in stages)
     head = f"{len(found)} {what}: {len(made)} stages would run, {shared} are shared, {cached} cached"
-    known = [step.guess for step in made if step.guess is not None]
-    rest = len(made) - len(known)
     if not made:
         return f"{len(found)} {what}: all stages are cached"
-    if not known:
+    rest = sum(step.guess is None for step in made)
+    if rest == len(made):
         return f"{head}; how long that takes is not known"
     unknown = f", and {rest} of unknown length" if rest else ""
-    sure = "about" if all(step.roughly is None for step in made) else "roughly"
-    return f"{head}; {sure} {duration(sum(known))} one after another{unknown}"
+    return f"{head}; {time_of(made)} one after another{unknown}"
+
+
+def time_of(steps: Sequence[Step]) -> str:
+    """The time that stages take together, as far as it is known: a range, or a guess where one of them has no more."""
+    known = [step for step in steps if step.guess is not None]
+    if any(step.expected is None for step in known):
+        return f"a guess: {duration(sum(step.guess or 0.0 for step in known))}"
+    low, high = (duration(sum((step.expected or 0.0) * step.spread[end] for step in known)) for end in (0, 1))
+    return f"{low} to {high}" if low != high else f"about {low}"
 
 
 def print_plan(sweep: Sweep, found: Planned, console: Console, as_json: bool = False) -> None:

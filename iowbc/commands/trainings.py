@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from iowbc.stages.registry import STAGES
+
 if TYPE_CHECKING:
     from iowbc.evaluation.report.tables import Table
     from iowbc.report.runs import Group, Run
 
 NOT_TRAINED = "not evaluated yet"
-TRAININGS = ("teacher", "distill")
-"""Stages that train."""
 
 
 def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> "Table":
@@ -18,17 +18,18 @@ def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> "
 
     from iowbc.evaluation.report.tables import ABSENT, Table
 
+    methods = {name: stage.presentation.trained_by for name, stage in STAGES.items() if stage.presentation.trained_by}
     rows: list[tuple[str, ...]] = []
     numbers: list[dict[str, object]] = []
     for group in groups:
         for run, seed in zip(group.runs, group.seeds, strict=True):
-            steps = {stage: steps_of(run, stage) for stage in TRAININGS}
+            steps = {stage: steps_of(run, stage) for stage in methods}
             told = [ABSENT if count is None else f"{count:,}" for count in steps.values()]
             label = str(run.recipe["eval"]["label"])
             rows.append((run.label, label, seed, *told))
             numbers.append({"recipe": run.label, "algorithm": label, "seed": seed, **steps})
-    rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(TRAININGS))) for name in missing]
-    head = ("Recipe", "Algorithm", "Seed", "Steps of PPO", "Steps of distillation")
+    rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(methods))) for name in missing]
+    head = ("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
     return Table("trainings", _caption(numbers, missing), head, head, tuple(rows), pd.DataFrame(numbers))
 
 

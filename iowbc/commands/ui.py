@@ -11,21 +11,14 @@ from rich.console import Console
 from iowbc.commands.ports import HOST, require_free
 from iowbc.commands.training import require_training
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, let_files_move, set_up
+from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, set_up
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
+from iowbc.stages.registry import STAGES
 
 VIEW = "iowbc"
 """Name under which MLflow keeps how the runs are shown."""
-COLUMNS = {
-    "rg-fit": ("joint_rmse",),
-    "teacher": ("best_score",),
-    "distill": ("action_agreement",),
-    "eval": ("succeeded", "trials"),
-    "export": ("parity",),
-}
-"""Metrics of stages that are columns."""
 
 
 def serve(runs: Runs, console: Console, port: int) -> int:
@@ -38,7 +31,6 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     with set_up(runs):
         mlflow = client(uri)
         mlflow.search_experiments(max_results=1)
-        let_files_move(runs)
         shown = experiment(mlflow, Execution.model_fields["experiment"].default, runs)
         mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):
@@ -59,7 +51,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
 
 def view() -> dict[str, object]:
     """How MLflow shows the runs: newest first, stages within their run, with the columns that tell most."""
-    metrics = [f"metrics.`{stage}/{name}`" for stage, names in COLUMNS.items() for name in names]
+    metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.presentation.columns]
     return {
         "searchFilter": "",
         "orderByKey": "attributes.start_time",

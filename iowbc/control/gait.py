@@ -49,8 +49,9 @@ def swing_progress(foot_phase: Array, stance: float) -> Array:
 
 
 def swing_height(foot_phase: Array, gait: GaitPrior) -> Array:
-    """Height of the soles above the ground, clearance·sin(π·progress), (n, 2) [m]."""
-    height: Array = gait.swing_clearance * namespace(foot_phase).sin(np.pi * swing_progress(foot_phase, gait.stance))
+    """Height of the soles above the ground by the recipe's profile, (n, 2) [m]."""
+    sine = namespace(foot_phase).sin(np.pi * swing_progress(foot_phase, gait.stance))
+    height: Array = gait.swing_clearance * (sine if gait.profile == "sine" else sine * sine)
     return height
 
 

@@ -4,6 +4,7 @@ import hashlib
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from textwrap import shorten
 from typing import Literal, Self
@@ -23,6 +24,8 @@ from iowbc.robot.description import DESCRIPTION
 
 LARGEST_CONTRACT = 1_000_000
 """Bytes of the largest contract that is read."""
+FORMAT: Literal[4] = 4
+"""Format of the contracts that are written and read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
 
 
@@ -68,7 +71,7 @@ class Latency(Section):
 class Contract(Section):
     """What `contract.json` says."""
 
-    format: Literal[4] = 4
+    format: Literal[4] = FORMAT
     """Raised when a reader of the old format would misread the new one."""
     recipe: str
     """Name of the recipe that was exported."""
@@ -263,6 +266,14 @@ def generator_folder(contract: Contract, folder: Path) -> Path | None:
     return folder / GENERATOR
 
 
+def _newer(error: ValidationError) -> bool:
+    """Whether a contract is of a later format, or has nothing wrong but entries that are not known yet."""
+    found = error.errors(include_url=False)
+    return all(one["type"] == "extra_forbidden" for one in found) or any(
+        one["loc"] == ("format",) and isinstance(one["input"], int) and one["input"] > FORMAT for one in found
+    )
+
+
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
@@ -273,7 +284,12 @@ def read_contract(folder: Path | str) -> Contract:
             raise ContractBroken(f"{folder / CONTRACT}: has {size:,} bytes, which no contract has; export again")
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
     except ValidationError as error:
-        raise ContractBroken(f"{folder / CONTRACT}: not a contract of format 4: {error}; export again") from error
+        if _newer(error):
+            text = f"made by a newer version of iowbc than {version('iowbc')}; install that here, or export again"
+            raise ContractBroken(f"{folder / CONTRACT}: {text} with this one: {error}") from error
+        raise ContractBroken(
+            f"{folder / CONTRACT}: not a contract of format {FORMAT}: {error}; export again"
+        ) from error
     require_sealed(contract, folder, STEP, SETTLE, f"{ROBOT}/{DESCRIPTION}")
     missing = [name for name in contract.files if not (folder / name).is_file()]
     if missing:

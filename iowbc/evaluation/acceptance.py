@@ -15,7 +15,7 @@ from iowbc.evaluation.trials.metrics import Measure, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
 from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.evaluation.trials.table import carried_along, held_weight, measure_of
+from iowbc.evaluation.trials.table import carried_along, measure_of, met
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
@@ -118,7 +118,7 @@ def played(
     outcomes = play_in(environment, policy, interrupted)
     trials = iter(zip(acceptance_episodes(world.recipe), outcomes, strict=True))
     asked = world.recipe.export.acceptance
-    measure = measure_of(world.recipe, load_robot(world.robot).joints)
+    measure = measure_of(world.recipe, load_robot(world.robot))
     return [judged(world.recipe, measure, one, [next(trials) for _ in range(one.trials)]) for one in asked]
 
 
@@ -127,8 +127,7 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
     hands, ways, errors, passed = [], [], [], 0
     for episode, outcome in trials:
         assert episode.script is not None
-        weight = held_weight(recipe, episode, outcome)
-        metrics = trial_metrics(outcome.trace, episode.script, measure, weight)
+        metrics = trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
         hands.append(metrics["weight_in_hands"])
         ways.append(metrics["transport_robot"])
         errors.append([metrics[name] for name in ERRORS])

@@ -26,7 +26,7 @@ QUALITY = 7
 """Of imageio-ffmpeg, 0 to 10; 20 s of 640 x 480 take about 2 MB."""
 LINES_PER_FRAME = 26
 """Height of the text: this many lines would fill the frame."""
-UNSEEN = ("robustness", "pushes")
+UNSEEN = ("robustness", "pushes", "impedance", "map")
 """Kinds of trials that look like others, and are not filmed."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
@@ -65,10 +65,11 @@ class Film:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.close()
-        if kind is None:
-            self._unfinished.replace(self.path)
-        else:
+        try:
+            self._writer.close()
+            if kind is None:
+                self._unfinished.replace(self.path)
+        finally:
             self._unfinished.unlink(missing_ok=True)
 
 

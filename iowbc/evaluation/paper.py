@@ -44,6 +44,10 @@ PUSHING: dict[float, dict[str, Errors | None]] = {
     60.0: {"IO-WBC": (0.152, 0.019, 0.486, 0.161), "WBC": None, "w/o RG": None, "w/o Distill.": None},
 }
 
+STAGNATING = 0.1
+"""Rolling resistance μ from which crates of 60 kg hardly follow in our trials (E_v 0.26 m/s at 0.1, 0.35 at 0.15), as
+in the paper's (0.486 m/s). The paper gives 0.02 to 0.15 for training and does not say with which it was tested."""
+
 TABLES: dict[str, dict[float, dict[str, Errors | None]]] = {"lifting": LIFTING, "pushing": PUSHING}
 
 TYRE_SUCCESS: dict[str, float] = {"IO-WBC": 0.8, "WBC": 0.0}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from iowbc.control.action import action_mirror
@@ -14,10 +14,12 @@ from iowbc.evaluation.films import EpisodeFilm, Film
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
+from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.viewer import play_in_viewer, require_display
 from iowbc.learning.acting import load_policy
 from iowbc.learning.unfinished import unfinished_policy
+from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.task.episodes import Episode
@@ -40,6 +42,16 @@ class Source:
         exported = (self.policy / exported_folder.CONTRACT).is_file()
         with contract.readable(self.policy) if exported else nullcontext():
             return VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(episode,))
+
+
+def asked_by(source: Source, evaluation: Evaluation) -> Source:
+    """The source in the world of another evaluation, with its sequence, scenes and film settings. An exported
+    controller keeps to the scenes that its contract knows."""
+    asked = source.world.recipe.model_copy(update={"eval": evaluation})
+    world = replace(source.world, recipe=asked)
+    if not (source.policy / exported_folder.CONTRACT).is_file():
+        world = evaluated_world(world)
+    return replace(source, world=world)
 
 
 def exported_source(folder: Path) -> Source:

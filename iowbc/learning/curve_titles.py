@@ -58,7 +58,7 @@ def title_of(name: str) -> str:
     family, _, rest = name.partition("/")
     if family == "error" and rest.count("/") == 2:
         scene, kind, error = rest.split("/")
-        return f"error of {error}, {scene}, {kind} [{ERROR_UNITS[error]}]"
+        return f"error of {error}, {scene}, {kind} [{ERROR_UNITS.get(error, '?')}]"
     for beginning, title in FAMILIES.items():
         if name.startswith(beginning):
             return title.format(name.removeprefix(beginning))

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
 
@@ -21,8 +21,8 @@ class Environments(Protocol):
     def reset(self) -> NDArray[np.float32]:
         """Observations, (num_envs, size), at the beginning of an episode everywhere."""
 
-    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
-        """Lets a pilot drive for some control steps."""
+    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+        """Make a rollout of some control steps."""
 
     def statistics(self) -> dict[str, float]:
         """Figures since the last call."""

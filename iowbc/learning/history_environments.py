@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from iowbc.rollouts.history import History
-from iowbc.rollouts.pilots import Explorer, Past
+from iowbc.rollouts.rollout_policies import ExploringPolicy, Past
 from iowbc.rollouts.trajectories import Trajectories
 
 
@@ -37,11 +37,11 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
             infos[index]["terminal_observation"] = self._last_row(index, infos[index]["terminal_observation"])
         return self._rows(row, dones), rewards, dones, infos
 
-    def roll(self, pilot: Explorer, steps: int) -> Trajectories:
-        """See `Environments`; the pilot sees histories, which the rows of its trajectories then are."""
-        before = np.roll(self._history.frames, 1, axis=1)  # the pilot takes in the newest observation itself
+    def roll(self, rollout_policy: ExploringPolicy, steps: int) -> Trajectories:
+        """See `Environments`; the policy sees histories, which the rows of its trajectories then are."""
+        before = np.roll(self._history.frames, 1, axis=1)  # the policy takes in the newest observation itself
         past = Past(before, np.zeros(self.num_envs, np.bool_))
-        found: Trajectories = self.venv.roll(replace(pilot, past=past), steps)
+        found: Trajectories = self.venv.roll(replace(rollout_policy, past=past), steps)
         rows = np.empty((steps + 1, self.num_envs, *self.observation_space.shape), np.float32)
         last = np.empty((len(found.cut), rows.shape[2]), np.float32)
         rows[0] = self._beside(self._history.frames, found.observation[0])

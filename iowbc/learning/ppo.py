@@ -1,8 +1,9 @@
 """PPO of stable-baselines3 with a rollout and an update of its own: whole arrays, few copies, and a true KL divergence.
 
-What differs from stable-baselines3's: the networks see a sample in a prepared form that is made once; values of a whole
-rollout are computed at once; the KL divergence is that of the two Gaussians, not a sampled estimate, whose heavy tail
-would starve the step size; no update ends early on it; the standard deviation has a step size and bounds of its own.
+Of stable-baselines3 it takes the constructor, saving and loading. What differs: the networks see a sample in a prepared
+form that is made once; values of a whole rollout are computed at once; the KL divergence is that of the two Gaussians,
+not a sampled estimate, whose heavy tail would starve the step size; no update ends early on it; the standard deviation
+has a step size and bounds of its own.
 """
 
 import time
@@ -28,7 +29,7 @@ from iowbc.learning.side_by_side import SideBySide
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.pilots import Explorer
+from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
 FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
@@ -36,17 +37,59 @@ FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 
 
 class Learner(PPO):  # type: ignore[misc]
-    """PPO with the recipe's numbers; starts as the reference itself (the mean action begins near zero)."""
+    """The learner of a recipe on a vector environment with raw observations and rewards. Starts as the reference itself
+    (the mean action begins near zero).
+
+    `collect` and `train`, in turn, are an update; stable-baselines3's `learn` has no part in it. What `save` leaves is
+    for `PPO.load`.
+    """
 
     policy: ActorCritic
     rollout_buffer: Rollout
+    env: Any
     _last_obs: Any
     learning_rate: float
 
-    def configure(self, teacher: Teacher, mirrors: Mirrors, cores: int) -> None:
-        """What stable-baselines3's constructor does not know; `cores`: on which the networks learn."""
+    def __init__(
+        self, teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int, value_only: Sequence[int] = ()
+    ) -> None:
+        """`mirrors`: of observation and action; `cores`: on which the networks learn; `value_only`: places of an
+        observation that the policy does not see."""
+        symmetric, student = teacher.symmetry != "none", None
+        if teacher.history is not None:
+            size = env.observation_space.shape[0] - len(mirrors[0])
+            observation = size // (teacher.history.length - 1)
+            student = student_architecture(teacher, observation, env.action_space.shape[0], mirrors)
+        constructed = [mirror_as_json(mirror) for mirror in mirrors] if teacher.symmetry == "construction" else None
+        super().__init__(
+            ActorCritic,
+            env,
+            learning_rate=teacher.learning_rate,
+            n_steps=teacher.rollout,
+            batch_size=teacher.environments * teacher.rollout // teacher.minibatches,
+            n_epochs=teacher.epochs,
+            gamma=teacher.gamma,
+            gae_lambda=teacher.gae_lambda,
+            clip_range=teacher.clip,
+            ent_coef=teacher.entropy,
+            vf_coef=teacher.value_weight,
+            max_grad_norm=teacher.gradient_norm,
+            seed=seed,
+            device="cpu",
+            rollout_buffer_class=Rollout,
+            policy_kwargs={
+                "hidden": list(teacher.hidden),
+                "activation": teacher.activation,
+                "clip": teacher.normalization_clip,
+                "initial_std": teacher.initial_std,
+                "std_learning_rate": teacher.std_learning_rate,
+                "mirrors": constructed,
+                "value_only": list(value_only),
+                "student": student,
+            },
+        )
+        self.set_logger(Logger(folder=None, output_formats=[]))
         self.settings, self.side_by_side = teacher, SideBySide(teacher.parts, cores)
-        symmetric = teacher.symmetry != "none"
         size = len(self.policy.normalizer.mean)
         self.normalization = Normalization(size, self.n_envs, self.gamma, mirrors[0] if symmetric else None)
         self.mirrored = MirroredSamples(mirrors, teacher.mirror_gap) if teacher.symmetry == "augment" else None
@@ -68,26 +111,25 @@ class Learner(PPO):  # type: ignore[misc]
         yield
         self.seconds[part] += time.perf_counter() - begin
 
-    def collect_rollouts(self, env: Any, callback: Any, rollout_buffer: Rollout, n_rollout_steps: int) -> bool:
-        """See stable-baselines3; observations and rewards of `env` are raw. The environments make the whole rollout
-        themselves; what they saw before it moves the normalisation of this one."""
-        policy = self.policy
+    def collect(self) -> None:
+        """One rollout into the buffer. The environments make the whole of it themselves; what they saw before it moves
+        the normalisation of this one."""
+        policy, env = self.policy, self.env
+        if self._last_obs is None:
+            self._last_obs = env.reset()
         policy.set_training_mode(False)
-        callback.on_rollout_start()
         self.normalization.frozen = self.num_timesteps >= self.settings.statistics_until
         with self._timed("simulation"), torch.inference_mode():
             self.normalization.move(policy.normalizer)
-            noise = torch.randn(n_rollout_steps, env.num_envs, self.action_space.shape[0]) * torch.exp(policy.log_std)
-            pilot = Explorer(acting_policy(policy), noise.numpy(), block_size(env.num_envs))
-            found = env.roll(pilot, n_rollout_steps)
+            noise = torch.randn(self.n_steps, self.n_envs, self.action_space.shape[0]) * torch.exp(policy.log_std)
+            rollout_policy = ExploringPolicy(acting_policy(policy), noise.numpy(), block_size(self.n_envs))
+            found = env.roll(rollout_policy, self.n_steps)
         self.seconds["simulation"] -= found.acting
         self.seconds["inference"] += found.acting
-        self.num_timesteps += n_rollout_steps * env.num_envs
+        self.num_timesteps += self.n_steps * self.n_envs
         self._last_obs = found.observation[-1]
         with self._timed("learning"):
-            self._look_back(rollout_buffer, found)
-        callback.on_rollout_end()
-        return True
+            self._look_back(self.rollout_buffer, found)
 
     def _look_back(self, rollout: Rollout, found: Trajectories) -> None:
         """What policy and value were during a rollout, and its advantages."""
@@ -243,46 +285,3 @@ def adapted(rate: float, kl: float, teacher: Teacher, caution: float = 1.0) -> f
 def explained_variance(values: Tensor, targets: Tensor) -> float:
     """Share of the targets' variance that the values foresaw; 1 is all of it, below 0 is worse than their mean."""
     return float(1.0 - (targets - values).var() / (targets.var() + 1e-8))
-
-
-def make_learner(
-    teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int, value_only: Sequence[int] = ()
-) -> Learner:
-    """The learner of a recipe on a vector environment with raw observations and rewards; `value_only`: places of an
-    observation that the policy does not see."""
-    symmetric = teacher.symmetry == "construction"
-    student = None
-    if teacher.history is not None:
-        size = env.observation_space.shape[0] - len(mirrors[0])
-        observation = size // (teacher.history.length - 1)
-        student = student_architecture(teacher, observation, env.action_space.shape[0], mirrors)
-    model = Learner(
-        ActorCritic,
-        env,
-        learning_rate=teacher.learning_rate,
-        n_steps=teacher.rollout,
-        batch_size=teacher.environments * teacher.rollout // teacher.minibatches,
-        n_epochs=teacher.epochs,
-        gamma=teacher.gamma,
-        gae_lambda=teacher.gae_lambda,
-        clip_range=teacher.clip,
-        ent_coef=teacher.entropy,
-        vf_coef=teacher.value_weight,
-        max_grad_norm=teacher.gradient_norm,
-        seed=seed,
-        device="cpu",
-        rollout_buffer_class=Rollout,
-        policy_kwargs={
-            "hidden": list(teacher.hidden),
-            "activation": teacher.activation,
-            "clip": teacher.normalization_clip,
-            "initial_std": teacher.initial_std,
-            "std_learning_rate": teacher.std_learning_rate,
-            "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
-            "value_only": list(value_only),
-            "student": student,
-        },
-    )
-    model.configure(teacher, mirrors, cores)
-    model.set_logger(Logger(folder=None, output_formats=[]))
-    return model

@@ -11,7 +11,16 @@ from typing import TypeVar
 import torch
 from torch import Tensor
 
+from iowbc.processes import keep_freed_memory
+
 Result = TypeVar("Result")
+
+
+def prepare_process() -> None:
+    """One thread for torch in this process: of more, small networks gain little, and round in another order. Freed
+    memory is kept for the next arrays."""
+    torch.set_num_threads(1)
+    keep_freed_memory()
 
 
 class SideBySide:

@@ -1,7 +1,7 @@
 """The student's training, one round of DAgger at a time: it drives, the teacher says what it would have done."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,11 @@ from iowbc.learning.distillation import Experience, mirror_half, spread
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
-from iowbc.processes import keep_freed_memory
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.history import History
-from iowbc.rollouts.pilots import Apprentice, Past
+from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
 
 
 @dataclass(frozen=True)
@@ -49,19 +48,19 @@ class StudentTraining:
         self,
         settings: Distillation,
         environments: Environments,
-        teacher: TeacherNetwork,
-        teachers: Mapping[str, Any],
+        teachers: Sequence[TeacherNetwork],
+        teacher_of: NDArray[np.int64],
+        architecture: Mapping[str, Any],
         rows: Rows,
         symmetry: Symmetry,
         seed: int,
     ) -> None:
-        """`teachers`: arguments that rebuild the teacher; `symmetry`: as the teacher's. Observations are normalised as
-        the teacher's are."""
-        torch.set_num_threads(1)  # small networks: more gain little, and stall wherever the cores are shared
+        """`teacher_of`: place of each environment's teacher, (n,); `architecture`: arguments that rebuild the first of
+        them, whose body and normalisation the student begins with; `symmetry`: as the teachers'."""
         torch.manual_seed(seed)
-        keep_freed_memory()
         self.settings, self.environments, self.rows, self.symmetry = settings, environments, rows, symmetry
-        self.teacher = teacher_policy(teacher)
+        self.teachers, self.teacher_of = tuple(map(teacher_policy, teachers)), teacher_of
+        teacher = teachers[0]
         size, actions = rows.observation.stop, environments.action_space.shape[0]
         mirrors = [mirror_as_json(rows.observation_mirror), mirror_as_json(rows.action_mirror)]
         inherits = settings.start == "teacher"
@@ -71,8 +70,8 @@ class StudentTraining:
             "actions": actions,
             "frame_features": settings.frame_features,
             "latent": settings.latent,
-            "hidden": list(teachers["hidden"] if inherits else settings.hidden),
-            "activation": teachers["activation"] if inherits else settings.activation,
+            "hidden": list(architecture["hidden"] if inherits else settings.hidden),
+            "activation": architecture["activation"] if inherits else settings.activation,
             "clip": teacher.normalizer.clip,
             "encoder": settings.encoder,
             "mirrors": mirrors if symmetry == "construction" else None,
@@ -84,7 +83,8 @@ class StudentTraining:
         self.network.normalizer.mean.copy_(teacher.normalizer.mean[rows.observation])
         self.network.normalizer.std.copy_(teacher.normalizer.std[rows.observation])
         floor = float(np.log(settings.std_floor))
-        self.loss = DistillationLoss(settings, teacher.log_std.clamp(min=floor), self.network, rows, symmetry)
+        log_std = torch.stack([one.log_std for one in teachers]).mean(0).clamp(min=floor)
+        self.loss = DistillationLoss(settings, log_std, self.network, rows, symmetry)
         self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
         self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)
@@ -139,17 +139,18 @@ class StudentTraining:
         rows, history = self.rows, self.history
         if self.observation is None:
             self.observation = self.environments.reset()
-        pilot = Apprentice(
+        rollout_policy = DaggerPolicy(
             student=student_policy(self.network),
-            teacher=self.teacher,
+            teachers=self.teachers,
+            teacher_of=self.teacher_of,
             observation=rows.observation,
             privileged=rows.privileged,
-            untold=rows.privileged.start + rows.withheld,
+            masked=rows.privileged.start + rows.withheld,
             taught=self.teacher_drives < teacher_share,
             block=block_size(len(self.starts)),
             past=Past(history.frames, self.starts),
         )
-        found = self.environments.roll(pilot, self.settings.rollout)
+        found = self.environments.roll(rollout_policy, self.settings.rollout)
         facts = (found.observation[:-1][..., rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
         frames, targets = found.observation[:-1, :, rows.observation], found.told["answer"]
         for frame, target, fact, ended in zip(frames, targets, facts, found.ended, strict=True):

@@ -5,9 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3.common.callbacks import BaseCallback
 
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
@@ -17,10 +15,9 @@ from iowbc.learning.best import Best
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
-from iowbc.learning.ppo import make_learner
+from iowbc.learning.ppo import Learner
 from iowbc.learning.storage import Network
 from iowbc.learning.trained import take_over, trained_network
-from iowbc.processes import keep_freed_memory
 from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
@@ -48,18 +45,15 @@ class TeacherTraining:
         """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest;
         `value_only`: places of an observation that the policy does not see; `score`: a fixed evaluation, by which the
         best policy is kept; `say`: is told when the training goes back."""
-        torch.set_num_threads(1)
-        keep_freed_memory()
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None
         self.say = say
-        self.model = make_learner(settings, environments, seed, mirrors, cores, value_only)
+        self.model = Learner(settings, environments, seed, mirrors, cores, value_only)
         self.average: PolicyAverage | None = None
         if settings.average_half_life is not None:
             updates = settings.average_half_life / (settings.environments * settings.rollout)
             self.average = PolicyAverage(self.model.policy, updates)
         self.best = Best(settings.check, self._learnt())
-        self._callback: BaseCallback | None = None
 
     @property
     def steps(self) -> int:
@@ -78,11 +72,9 @@ class TeacherTraining:
         """
         model, begin = self.model, time.perf_counter()
         model.seconds = dict.fromkeys(model.seconds, 0.0)
-        if self._callback is None:
-            _, self._callback = model._setup_learn(self.planned - self.steps, None, reset_num_timesteps=False)
         model.caution = self.best.caution
         model.explore_anew()
-        model.collect_rollouts(self.environments, self._callback, model.rollout_buffer, model.n_steps)
+        model.collect()
         model.train()
         if self.average is not None:
             self.average.take(model.policy)

@@ -1,15 +1,15 @@
-"""What the key of a stage is made of beside its inputs: its part of the recipe; and its code, which no key holds."""
+"""The part of a recipe that a stage's key holds."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.store.digests import PACKAGE, code_digests
+from iowbc.recipe.recipe import Recipe
 
 
-def deciding_slices(deciding: Mapping[str, Any], stage: Stage) -> dict[str, Any]:
-    """By dotted path: the parts of what decides a recipe's results that a stage depends on."""
-    return {path: slice_value(deciding, path, stage) for path in stage.slice}
+def key_values(recipe: Recipe, deciding: Mapping[str, Any], stage: Stage) -> dict[str, Any]:
+    """By dotted path: the values of a recipe that decide a stage's result, and the program's defaults beside them."""
+    return {path: slice_value(deciding, path, stage) for path in stage.slice} | dict(stage.defaults(recipe))
 
 
 def slice_value(values: Mapping[str, Any], path: str, stage: Stage) -> Any:
@@ -22,15 +22,3 @@ def slice_value(values: Mapping[str, Any], path: str, stage: Stage) -> Any:
             raise ValueError(f"stage {stage.name}: its slice names '{path}', which decides nothing in a recipe")
         value = value[part]
     return value
-
-
-def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
-    """Names of the subpackages and modules whose code differs."""
-    return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
-
-
-def stage_code(stage: Stage) -> dict[str, str]:
-    """Digests of a stage's own module and of the parts of the package that it declares."""
-    module = stage.run.__module__.removeprefix("iowbc.")
-    own = {module} if module != stage.run.__module__ else set()
-    return code_digests(PACKAGE, own | set(stage.packages))

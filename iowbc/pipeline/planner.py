@@ -1,75 +1,28 @@
 """What would run, and why."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from operator import attrgetter
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
-from iowbc.pipeline.ingredients import changed_code, deciding_slices, slice_value, stage_code
+from iowbc.pipeline.code import changed_code, stage_code
+from iowbc.pipeline.estimate import estimate
+from iowbc.pipeline.ingredients import key_values, slice_value
+from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
-from iowbc.pipeline.stage import START, Stage
+from iowbc.pipeline.stage import Borrowed, Stage
+from iowbc.pipeline.step import Options, Step
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
+from iowbc.processes import available_cores
 from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
-from iowbc.recipe.recipe import SEEDS
 from iowbc.recipe.section import deciding
 
 NOT_WHOLE = "its published artifact leaves out large files"
-OnCodeChange = Literal["report", "rerun"]
-
-
-@dataclass(frozen=True)
-class Options:
-    """How a run was asked for."""
-
-    until: str | None = None
-    force: frozenset[str] = frozenset()
-    on_code_change: OnCodeChange = "report"
-    workers: int | None = None
-    engine: Literal["local", "ray"] | None = None
-    address: str | None = None
-
-
-@dataclass(frozen=True)
-class Step:
-    """A stage of a recipe: its key, whether its artifact can be used, and why not."""
-
-    stage: Stage
-    key: str | None
-    """None while an input's content is not known."""
-    ingredients: Mapping[str, Any] | None
-    artifact: Artifact | None
-    """The stored artifact with this key, whole; also where it would be replaced."""
-    reasons: tuple[str, ...]
-    """Why it would run; empty where it is cached."""
-    notes: tuple[str, ...] = ()
-    damage: str = ""
-    """What is wrong with the stored artifact with this key."""
-    expected: float | None = None
-    """Time that it takes at the rate of a stored artifact or of its last attempt [s]; None where no rate is known."""
-    roughly: float | None = None
-    """Where no rate is known: time at the rate of the stored artifact that differs least, though it differs in more
-    than seed and counts [s]."""
-    rate_of: str = ""
-    """Recipe whose artifact that rate is of."""
-    code: Mapping[str, str] = field(default_factory=dict)
-    predecessor: Artifact | None = None
-    """The stored artifact that it would go on from."""
-
-    @property
-    def cached(self) -> bool:
-        """True where the stored artifact is used as it is."""
-        return not self.reasons
-
-    @property
-    def guess(self) -> float | None:
-        """The expected time, or what comes nearest to one [s]."""
-        return self.roughly if self.expected is None else self.expected
 
 
 class Planner:
@@ -78,59 +31,33 @@ class Planner:
     def __init__(
         self,
         loaded: LoadedRecipe,
-        registry: Mapping[str, Stage],
+        stages: Sequence[Stage],
         store: Store,
         robot: Path,
         options: Options,
-        above: Sequence[Path] = (),
+        origins: Mapping[tuple[str, str], "Planner"],
     ) -> None:
-        """`above`: files of the recipes that begin from this one."""
+        """`origins`: by stage and input, the planner of the recipe that makes what is borrowed; see `planner_for`."""
         self.loaded = loaded
+        self.stages = stages
         self.store = store
-        self.options = options
         self.robot = robot
+        self.options = options
+        self.origins = origins
         self.robot_digest = folder_digest(robot)
         self.deciding = deciding(loaded.recipe)
-        self.stages = self._selected(registry)
-        itself = () if loaded.overrides else (loaded.file.resolve(),)
-        origins = {stage.name: self._origin(stage, registry, (*above, *itself)) for stage in self.stages}
-        self.origins = {name: origin for name, origin in origins.items() if origin is not None}
-        """By stage: the planner of the recipe whose artifact it begins from."""
-        for stage in self.stages:
-            if stage.name not in self.origins:
-                self.start(stage)
 
-    def _selected(self, registry: Mapping[str, Stage]) -> list[Stage]:
-        """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
-        names = [str(name) for name in self.loaded.recipe.stages]
-        for option, asked in (("--until", [self.options.until or names[-1]]), ("--force", sorted(self.options.force))):
-            for name in asked:
-                if name not in names:
-                    text = f"'{name}' is not a stage of this recipe; valid: {', '.join(names)}"
-                    raise RecipeError([Problem(f"{option} {name}", text)])
-        stages = [registry[name] for name in names]
-        for stage in stages:
-            for wanted in stage.reads(self.loaded.recipe):
-                if wanted not in names:
-                    text = f"key 'stages': {stage.name} reads {wanted}, which is not among them: {', '.join(names)}"
-                    raise RecipeError([Problem(self.loaded.place("stages"), text)])
-        last = names.index(self.options.until) if self.options.until else len(names) - 1
-        late = [name for name in names[last + 1 :] if name in self.options.force]
-        if late:
-            text = f"{', '.join(late)} comes after {self.options.until}, where --until ends the run; leave one out"
-            raise RecipeError([Problem(f"--force {late[0]}", text)])
-        chosen = stages[: last + 1]
-        problems = [(path, text) for stage in chosen for path, text in stage.problems(self.loaded.recipe)]
-        if problems:
-            raise RecipeError([Problem(self.loaded.place(path), f"key '{path}': {text}") for path, text in problems])
-        return chosen
+    @property
+    def workers(self) -> int:
+        """Worker processes of a stage: as asked for, or the recipe's, or as many as there are cores."""
+        return self.options.workers or self.loaded.recipe.execution.workers or available_cores()
 
     def plan(self) -> list[Step]:
         """A step for each stage, as things stand; nothing is changed."""
         steps: dict[str, Step] = {}
         for stage in self.stages:
             inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
-            step = self.decide(stage, {**inputs, **self.start(stage)})
+            step = self.decide(stage, {**inputs, **self.borrowed(stage)})
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
@@ -140,54 +67,27 @@ class Planner:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         return list(steps.values())
 
-    def start(self, stage: Stage) -> dict[str, Artifact | None]:
-        """The artifact that a stage begins from, by its name among the inputs; empty where the recipe names none.
+    def borrowed(self, stage: Stage) -> dict[str, Artifact | None]:
+        """The artifacts of other recipes that a stage reads, by their names among the inputs.
 
-        None for one that another recipe has not made yet. Raises `RecipeError` for one that is not stored, or damaged.
+        None for one that is not made yet. Raises `RecipeError` for one that is not stored, or damaged.
         """
-        named = self._named_start(stage)
-        if named is None:
-            return {}
-        if stage.name in self.origins:
-            step = self.origins[stage.name].plan()[-1]
-            return {START: step.artifact if step.cached else None}
-        found = [one for one in self.store.artifacts(stage.name) if one.manifest.key.startswith(named)]
+        return {name: self._found(stage, name, one) for name, one in stage.borrows(self.loaded.recipe).items()}
+
+    def _found(self, stage: Stage, name: str, borrowed: Borrowed) -> Artifact | None:
+        if (stage.name, name) in self.origins:
+            step = self.origins[stage.name, name].plan()[-1]
+            return step.artifact if step.cached else None
+        found = [one for one in self.store.artifacts(borrowed.stage) if one.manifest.key.startswith(borrowed.named)]
         if len(found) != 1:
             keys = ", ".join(one.manifest.key[:12] for one in found) or "none"
-            raise self._wrong_start(stage, f"should begin one key of {stage.name}, begins {keys}; `iowbc ls` has them")
+            text = f"should begin one key of {borrowed.stage}, begins {keys}; `iowbc ls` has them"
+            raise wrong_origin(self.loaded, borrowed, text)
         try:
             found[0].verify()
         except Damaged as error:
-            raise self._wrong_start(stage, f"is damaged: {error}") from None
-        return {START: found[0]}
-
-    def _named_start(self, stage: Stage) -> str | None:
-        """What the recipe calls the artifact that a stage begins from."""
-        return None if stage.starts_from is None else attrgetter(stage.starts_from)(self.loaded.recipe)
-
-    def _origin(self, stage: Stage, registry: Mapping[str, Stage], above: Sequence[Path]) -> "Planner | None":
-        """The planner of the recipe whose artifact a stage begins from. Raises `RecipeError` where it cannot be it."""
-        named = self._named_start(stage)
-        if named is None or Path(named).suffix not in SUFFIXES:
-            return None
-        place = self.loaded.place(stage.starts_from or "")
-        said_in = self.loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])
-        try:
-            loaded = load_recipe(file_meant_in(said_in.parent, named))
-        except RecipeError as error:
-            raise self._wrong_start(stage, f"{error}") from None
-        if loaded.file.resolve() in above:
-            raise self._wrong_start(stage, "begins from itself in the end")
-        if loaded.recipe.robot != self.loaded.recipe.robot:
-            raise self._wrong_start(stage, f"is about another robot, {loaded.recipe.robot}")
-        options = replace(self.options, until=stage.name, force=frozenset())
-        return Planner(loaded, registry, self.store, self.robot, options, above)
-
-    def _wrong_start(self, stage: Stage, text: str) -> RecipeError:
-        path = stage.starts_from or ""
-        return RecipeError(
-            [Problem(self.loaded.place(path), f"key '{path}' = {shown(self._named_start(stage))}: {text}")]
-        )
+            raise wrong_origin(self.loaded, borrowed, f"is damaged: {error}") from None
+        return found[0]
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
         """Names of the stages whose artifacts a stage reads."""
@@ -198,78 +98,70 @@ class Planner:
 
         whole: a published artifact does not do that leaves out large files.
         """
-        code = stage_code(stage)
         unknown = [name for name, artifact in inputs.items() if artifact is None]
         ingredients = {
             "stage": stage.name,
             "version": stage.version,
-            "recipe": deciding_slices(self.deciding, stage),
+            "recipe": key_values(self.loaded.recipe, self.deciding, stage),
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
         former = self._closest(stage.name, ingredients)
-        expected, roughly = (None, None) if former is None else _reckoned(stage, former, ingredients)
-        rate_of = "" if former is None else former.manifest.recipe
+        step = Step(stage, code=stage_code(stage))
+        if former is not None:
+            found = estimate(stage, ingredients, self.store.artifacts(stage.name), former)
+            step = replace(step, **vars(found), rate_of=_origin_of(former))
         if unknown:
-            reasons = self._reasons(ingredients, former, unknown)
-            return Step(
-                stage,
-                None,
-                None,
-                None,
-                tuple(reasons),
-                expected=expected,
-                roughly=roughly,
-                rate_of=rate_of,
-                code=code,
-            )
-        key = data_digest(ingredients)
+            return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
+        step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients))
+        reasons = [*self._demands(step, whole)]
+        if step.artifact is None:
+            reasons += [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
+        return self._resumed(replace(step, reasons=tuple(reasons))) if reasons else step
+
+    def _looked_up(self, step: Step) -> Step:
+        """With the stored artifact of its key, where that is whole, and what there is to say about it."""
+        stage, key, notes = step.stage, str(step.key), []
         artifact, damage = _checked(self.store.find, stage.name, key)
-        notes: list[str] = []
         if artifact is None:
             artifact, published_damage = _checked(self.store.find_published, stage.name, key)
             if published_damage:
                 notes.append(f"the published artifact is ignored, it is damaged: {published_damage}")
-        found: list[str] = []
-        if stage.name in self.options.force:
-            found.append("forced by --force")
-        if artifact is None and damage:
-            found.append(f"damaged: {damage}")
-        elif artifact is None:
-            found.extend(self._reasons(ingredients, former, ()))
-        elif whole and not artifact.whole:
-            found.append(NOT_WHOLE)
-        else:
+        if artifact is not None:
             if damage:
                 notes.append(f"the published artifact is used; the one made here is damaged: {damage}")
-            expected = artifact.manifest.seconds
-            changed = changed_code(artifact.manifest.code, code)
-            if changed:
-                text = f"code changed since it was made: {', '.join(changed)}"
-                (found if self.options.on_code_change == "rerun" else notes).append(text)
+            changed = self._changed_code(step.code, artifact)
+            if changed and self.options.on_code_change == "report":
+                notes.append(changed)
             notes.extend(self._looks(stage, artifact))
+        return replace(step, artifact=artifact, damage=damage, notes=tuple(notes))
+
+    def _demands(self, step: Step, whole: bool) -> Iterator[str]:
+        """Why a stored artifact is not used although its key is the right one."""
+        if step.stage.name in self.options.force:
+            yield "forced by --force"
+        if step.artifact is None:
+            return
+        if whole and not step.artifact.whole:
+            yield NOT_WHOLE
+        elif self.options.on_code_change == "rerun" and (changed := self._changed_code(step.code, step.artifact)):
+            yield changed
+
+    def _changed_code(self, code: Mapping[str, str], artifact: Artifact) -> str:
+        changed = changed_code(artifact.manifest.code, code)
+        return f"code changed since it was made: {', '.join(changed)}" if changed else ""
+
+    def _resumed(self, step: Step) -> Step:
+        """A step that runs, with what it goes on from: an earlier attempt, or an artifact that ends earlier."""
+        stage, key = step.stage, str(step.key)
+        notes, expected = [*step.notes, *self._checkpoint(stage, key)], self._rest(stage, key, step.expected)
         predecessor = None
-        if found:
-            notes.extend(self._checkpoint(stage, key))
-            expected = self._rest(stage, key, expected)
-            predecessor = None if stage.name in self.options.force else self._predecessor(stage, ingredients)
-            if predecessor is not None:
-                notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
-                expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)
-        return Step(
-            stage,
-            key,
-            ingredients,
-            artifact,
-            tuple(found),
-            tuple(notes),
-            damage,
-            expected,
-            roughly,
-            rate_of,
-            code,
-            predecessor,
-        )
+        if stage.name not in self.options.force:
+            predecessor = self._predecessor(stage, step.ingredients or {})
+        if predecessor is not None:
+            notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
+            expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)
+        return replace(step, notes=tuple(notes), expected=expected, predecessor=predecessor)
 
     def _predecessor(self, stage: Stage, ingredients: Mapping[str, Any]) -> Artifact | None:
         """The whole artifact of a stage that differs in nothing but an earlier end, the latest of several."""
@@ -298,7 +190,7 @@ class Planner:
             of_stage = any(path == part or path.startswith(f"{part}.") for part in stage.slice)
             if (
                 of_stage
-                and path != stage.starts_from
+                and path not in {borrowed.path for borrowed in stage.borrows(self.loaded.recipe).values()}
                 and MISSING not in (old, new)
                 and stage.name not in self.options.force
             ):
@@ -356,6 +248,84 @@ class Planner:
         yield from (f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
 
 
+def planner_for(
+    loaded: LoadedRecipe,
+    registry: Mapping[str, Stage],
+    store: Store,
+    robot: Path,
+    options: Options,
+    above: Sequence[Path] = (),
+) -> Planner:
+    """The planner of a recipe, and of those whose artifacts it begins from. `above`: files of the recipes that begin
+    from this one.
+
+    Raises `RecipeError` for stages that the recipe has not, or that cannot run, and for a start that is not there.
+    """
+    stages = _selected(loaded, registry, options)
+    itself = () if loaded.overrides else (loaded.file.resolve(),)
+    origins = {}
+    for stage in stages:
+        for name, borrowed in stage.borrows(loaded.recipe).items():
+            origin = _origin(loaded, borrowed, (*above, *itself))
+            if origin is not None:
+                until = replace(options, until=borrowed.stage, force=frozenset())
+                made = planner_for(origin, registry, store, robot, until, (*above, *itself))
+                origins[stage.name, name] = made
+    planner = Planner(loaded, stages, store, robot, options, origins)
+    for stage in stages:
+        planner.borrowed(stage)
+    return planner
+
+
+def _selected(loaded: LoadedRecipe, registry: Mapping[str, Stage], options: Options) -> list[Stage]:
+    """The recipe's stages up to `--until`. Raises `RecipeError` for names that are not the recipe's."""
+    names = [str(name) for name in loaded.recipe.stages]
+    for option, asked in (("--until", [options.until or names[-1]]), ("--force", sorted(options.force))):
+        for name in asked:
+            if name not in names:
+                text = f"'{name}' is not a stage of this recipe; valid: {', '.join(names)}"
+                raise RecipeError([Problem(f"{option} {name}", text)])
+    stages = [registry[name] for name in names]
+    for stage in stages:
+        for wanted in stage.reads(loaded.recipe):
+            if wanted not in names:
+                text = f"key 'stages': {stage.name} reads {wanted}, which is not among them: {', '.join(names)}"
+                raise RecipeError([Problem(loaded.place("stages"), text)])
+    last = names.index(options.until) if options.until else len(names) - 1
+    late = [name for name in names[last + 1 :] if name in options.force]
+    if late:
+        text = f"{', '.join(late)} comes after {options.until}, where --until ends the run; leave one out"
+        raise RecipeError([Problem(f"--force {late[0]}", text)])
+    chosen = stages[: last + 1]
+    problems = [(path, text) for stage in chosen for path, text in stage.problems(loaded.recipe)]
+    if problems:
+        raise RecipeError([Problem(loaded.place(path), f"key '{path}': {text}") for path, text in problems])
+    return chosen
+
+
+def wrong_origin(loaded: LoadedRecipe, borrowed: Borrowed, text: str) -> RecipeError:
+    """The error that a stage cannot read what the recipe names."""
+    path = borrowed.path
+    return RecipeError([Problem(loaded.place(path), f"key '{path}' = {shown(borrowed.named)}: {text}")])
+
+
+def _origin(loaded: LoadedRecipe, borrowed: Borrowed, above: Sequence[Path]) -> LoadedRecipe | None:
+    """The recipe that makes what is borrowed, where a file is named. Raises `RecipeError` if it cannot be it."""
+    if Path(borrowed.named).suffix not in SUFFIXES:
+        return None
+    place = loaded.place(borrowed.path)
+    said_in = loaded.file if place.startswith("--set ") else Path(place.rsplit(":", 2)[0])
+    try:
+        origin = load_recipe(file_meant_in(said_in.parent, borrowed.named))
+    except RecipeError as error:
+        raise wrong_origin(loaded, borrowed, f"{error}") from None
+    if origin.file.resolve() in above:
+        raise wrong_origin(loaded, borrowed, "begins from itself in the end")
+    if origin.recipe.robot != loaded.recipe.robot:
+        raise wrong_origin(loaded, borrowed, f"is about another robot, {origin.recipe.robot}")
+    return origin
+
+
 def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) -> tuple[Artifact | None, str]:
     """The artifact that a store finds and whose files are what was written, or what is wrong with it."""
     try:
@@ -367,22 +337,10 @@ def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) 
     return artifact, ""
 
 
-def _reckoned(
-    stage: Stage, former: Artifact, ingredients: Mapping[str, Any]
-) -> tuple[float, None] | tuple[None, float]:
-    """The time that a stage takes at the rate of a stored artifact [s]: known, or roughly where more differs than seed
-    and counts.
-
-    It is proportional to each of the stage's counts.
-    """
-    old, seconds = former.ingredients, former.manifest.seconds
-    alike = old.get("version") == ingredients["version"]
-    for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
-        if path in stage.counts and MISSING not in (before, after) and before:
-            seconds *= after / before
-        elif path not in SEEDS:
-            alike = False
-    return (seconds, None) if alike else (None, seconds)
+def _origin_of(former: Artifact) -> str:
+    """Whose rate a guess is made at: the recipe of an artifact, and the machine where that is another one."""
+    made = former.manifest
+    return made.recipe if made.host == host() else f"{made.recipe} on another machine"
 
 
 def _shown(value: Any) -> str:

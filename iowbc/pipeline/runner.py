@@ -8,23 +8,28 @@ from pathlib import Path
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
+from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
-from iowbc.pipeline.ingredients import changed_code
 from iowbc.pipeline.machine import host, versions
-from iowbc.pipeline.planner import Planner, Step
+from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.step import Step
 from iowbc.pipeline.store.artifact import Artifact, seal
 from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
-from iowbc.processes import available_cores
 from iowbc.recipe.reading.writing import as_yaml
 
 Execute = Callable[[Stage, Job], None]
 """Carries a stage out."""
+
+
+def run_here(stage: Stage, job: Job) -> None:
+    """Carry a stage out in this process."""
+    stage.run(job)
 
 
 class Runner:
@@ -37,12 +42,15 @@ class Runner:
         display: Display,
         tracker: Tracker | None,
         interrupted: Callable[[], bool],
+        *,
         command: Callable[[list[str]], str] = lambda made: "",
-        execute: Execute = lambda stage, job: stage.run(job),
+        execute: Execute = run_here,
+        workers: int | None = None,
     ) -> None:
         """`command`: what goes on with this run once the stages named were made; kept with a stage while it is made.
 
-        `execute`: carries a stage out, here unless it says otherwise; the result is the same.
+        `execute`: carries a stage out, with the same result wherever. `workers`: processes of a stage, else the
+        planner's.
         """
         self.planner = planner
         self.loaded = planner.loaded
@@ -54,6 +62,7 @@ class Runner:
         self.interrupted = interrupted
         self.command = command
         self.execute = execute
+        self.workers = workers or planner.workers
         self.views = {stage.name: StageView(stage.name) for stage in planner.stages}
         self.artifacts: dict[str, Artifact] = {}
         self.made: list[str] = []
@@ -133,10 +142,10 @@ class Runner:
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
         """What a stage reads, by name."""
         read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
-        for name, artifact in self.planner.start(stage).items():
+        for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
-                origin = self.planner.origins[stage.name].loaded.file
-                raise PipelineFailed(f"{stage.name} begins from that of {origin}; first `iowbc run {origin}`")
+                origin = self.planner.origins[stage.name, name].loaded.file
+                raise PipelineFailed(f"{stage.name} reads an artifact of {origin}; first `iowbc run {origin}`")
             read[name] = artifact
         return read
 
@@ -175,7 +184,6 @@ class Runner:
             self.display.say(f"{stage.name}: code changed since its first attempt: {', '.join(changed)}")
         if self.tracker is not None:
             self.tracker.stage(stage.name, key, (step.ingredients or {}).get("recipe", {}), resumed)
-        workers = self.options.workers or self.loaded.recipe.execution.workers or available_cores()
         job = Job(
             recipe=self.loaded.recipe,
             key=key,
@@ -183,14 +191,14 @@ class Runner:
             inputs={name: artifact.folder for name, artifact in self._inputs(stage).items()},
             out=workspace.out,
             work=workspace.scratch,
-            workers=workers,
+            workers=self.workers,
             report=StageReport(view, self.display, self.tracker, workspace),
             interrupted=self.interrupted,
             predecessor=None if step.predecessor is None else step.predecessor.folder,
         )
         try:
             self.execute(stage, job)
-            artifact = self._published(step, workspace, workers)
+            artifact = self._published(step, workspace)
         except (Interrupted, KeyboardInterrupt) as error:
             self._ended(workspace, view, "stopped", "KILLED", str(error))
             text = str(error).removeprefix(f"{stage.name}: ")
@@ -216,7 +224,7 @@ class Runner:
             self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
 
-    def _published(self, step: Step, workspace: Workspace, workers: int) -> Artifact:
+    def _published(self, step: Step, workspace: Workspace) -> Artifact:
         """Seal what the stage left and move it into the store."""
         assert step.key is not None
         details = {
@@ -226,7 +234,7 @@ class Runner:
             "recipe": self.loaded.recipe.name,
             "seconds": workspace.seconds + (step.predecessor.manifest.seconds if step.predecessor else 0.0),
             "attempts": workspace.attempts,
-            "workers": workers,
+            "workers": self.workers,
             "host": host(),
             "code": dict(step.code),
             "versions": versions(),

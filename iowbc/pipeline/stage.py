@@ -12,7 +12,7 @@ Result = TypeVar("Result")
 SUMMARY = "summary.json"
 """File of an artifact with its metrics."""
 START = "start"
-"""Name among a job's inputs of the artifact that it begins from; see `Stage.starts_from`."""
+"""Name among a job's inputs of the artifact that it begins from; see `Stage.borrows`."""
 
 
 class Report(Protocol):
@@ -34,7 +34,7 @@ class Report(Protocol):
 class Member(Protocol):
     """An object that works for a stage on another machine, and can be remade there or elsewhere."""
 
-    def ask(self, request: str, arguments: tuple[Any, ...]) -> Any:
+    def ask(self, message: Any) -> Any:
         """Do what is asked; the answer."""
 
     def state(self) -> Any:
@@ -44,17 +44,15 @@ class Member(Protocol):
         """Inverse of `state`."""
 
 
-class Crew(Protocol):
+class ActorPool(Protocol):
     """Members that are asked side by side. Who is lost is remade in the state after the last request."""
 
     @property
     def states(self) -> list[Any]:
         """The state of each member after the last request that changed it."""
 
-    def ask(
-        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
-    ) -> None:
-        """Begin a request of every member, each with its own arguments. `changes`: whether it changes states;
+    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
+        """Send each member its message. `changes`: whether that changes states;
         `patience`: seconds after which a member that has not answered counts as lost."""
 
     def answers(self) -> list[Any]:
@@ -84,9 +82,9 @@ class Spread(Protocol):
         Raises `Interrupted` once the job is asked to stop.
         """
 
-    def crew(
+    def actor_pool(
         self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> Crew:
+    ) -> ActorPool:
         """Members of one core each on any machines, made by a function of a module from each of these arguments and
         `folders`, as above. `called`: what users know a member as."""
 
@@ -126,6 +124,10 @@ def _none(recipe: Recipe) -> Iterator[tuple[str, str]]:
     return iter(())
 
 
+def _empty(recipe: Recipe) -> Mapping[str, Any]:
+    return {}
+
+
 def _never(recipe: Recipe) -> bool:
     return False
 
@@ -133,6 +135,36 @@ def _never(recipe: Recipe) -> bool:
 def always(recipe: Recipe) -> bool:
     """Whatever the recipe says."""
     return True
+
+
+@dataclass(frozen=True)
+class Borrowed:
+    """An artifact that another recipe makes."""
+
+    path: str
+    """Dotted recipe path of the value that names it."""
+    named: str
+    """That value: a recipe's file, or the beginning of a key."""
+    stage: str
+    """Stage that makes it."""
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """How artifacts of a stage are shown, and what other commands find in them."""
+
+    headline: tuple[str, ...] = ()
+    """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
+    columns: tuple[str, ...] = ()
+    """Metrics that are columns of MLflow's page."""
+    pictures: tuple[str, ...] = ()
+    """Names of figures that a report shows at once; all others can be unfolded."""
+    curves: tuple[str, ...] = ()
+    """Learning curves that a report always shows; all others can be unfolded."""
+    trained_by: str = ""
+    """Name of the method whose steps `<stage>.steps` counts; empty for a stage that does not train."""
+    leaves_policy: bool = False
+    """Whether its artifact holds a policy that can be played."""
 
 
 @dataclass(frozen=True)
@@ -152,17 +184,17 @@ class Stage:
     records: curves, times, pictures, convenience."""
     problems: Callable[[Recipe], Iterator[tuple[str, str]]] = _none
     """What a recipe asks that this stage cannot do, known before it runs: dotted paths, and what is wrong there."""
-    packages: tuple[str, ...] = ()
-    """Subpackages whose code digest is recorded with the artifact, e.g. ("reference", "robot")."""
+    defaults: Callable[[Recipe], Mapping[str, Any]] = _empty
+    """Values of the program that decide the result where a recipe has none: JSON data by dotted path, for the key."""
     extends: str | None = None
     """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
     differs in nothing but a smaller one, as if it had never stopped."""
     extends_from: tuple[str, ...] = ()
     """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
-    starts_from: str | None = None
-    """Dotted recipe path of another recipe's file, the beginning of a key, or nothing: an artifact of this stage, made
-    by whatever recipe, which is then read as `START`. It needs the files `extends_from`, too."""
+    borrows: Callable[[Recipe], Mapping[str, Borrowed]] = _empty
+    """Artifacts that other recipes make, by their names among the job's inputs, for a given recipe."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
+    presentation: Presentation = Presentation()
     spreads: Callable[[Recipe], bool] = _never
     """Whether it leaves its heavy work to `Job.spread` where there is one, for a given recipe."""

@@ -24,10 +24,11 @@ def require_writable(folder: Path, option: str) -> None:
 
 
 def _remedy(folder: Path, option: str) -> str:
-    """What to do about a folder that cannot be written: another user's is to be given to this one."""
+    """What to do about a folder that cannot be written: another user's runs are to be given to this one; any other
+    folder is left to its owner."""
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     owner, user = there.stat().st_uid, os.geteuid()
-    if owner == user or there != folder or not folder.is_dir():
+    if option != "--runs" or owner == user or there != folder or not folder.is_dir():
         return f"give another folder with {option}"
     return (
         f"it belongs to user {owner} and this is user {user}: on the machine that it lies on (not inside a container) "

@@ -1,7 +1,8 @@
 """The small fixed evaluation by which a training keeps its best policy and notices that it got lost."""
 
-from pydantic import Field, NonNegativeFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from iowbc.recipe.evaluation.scripts import DrawnScripts
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.section import COSMETIC, LATER, Section
 from iowbc.recipe.simulation.holding import ObjectScene
@@ -14,6 +15,10 @@ STAND_WALK_TURN = (
     Segment(duration=2.0, ramp=0.5),
 )
 """Stand, walk, turn, crouch and lean, stand: 10 s."""
+
+
+Errors = tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
+IO_WBC_UNLOADED = (0.125, 0.015, 0.046, 0.134)
 
 
 class Check(Section):
@@ -31,12 +36,19 @@ class Check(Section):
     trials: int = Field(default=2, ge=1, le=1000)
     """Trials at each mass."""
     seed: int = Field(default=5000, ge=0, lt=2**32)
-    """Seed of the first trial: apart from those of training, evaluation and export."""
+    """Seed of the first trial: apart from those of training and export; those of the tables are of another split
+    (`eval.split`)."""
     films: int = Field(default=0, ge=0, le=100, json_schema_extra=COSMETIC)
     """Films of a trial of a middling load, one each time a further such part of the training is done; each takes some
     15 s without a graphics card. 0 makes none."""
     sequence: tuple[Segment, ...] = STAND_WALK_TURN
-    """Commands of a trial, in order; empty takes those of the evaluation, of lifting and of pushing."""
+    """Commands of a trial, in order; empty takes `scripts`, or without any the fixed sequences of lifting and of
+    pushing."""
+    scripts: DrawnScripts | None = Field(default=None, json_schema_extra=LATER)
+    """Scripts drawn trial by trial, where `sequence` is empty: a policy is then not chosen by one script."""
+    scales: Errors = Field(default=IO_WBC_UNLOADED, json_schema_extra=LATER)
+    """Errors E_α [rad], E_h [m], E_v [m/s] and E_ψ [rad] that halve their part of the score; by default the paper's
+    IO-WBC without a load (Table II). An error that is far below its scale counts little."""
     fall: float = Field(default=1.0, ge=0, le=1, json_schema_extra=LATER)
     """What the score of a trial is multiplied by that is not survived. At 1 who falls in the last second of twenty
     loses a twentieth, less than what walking a little nearer to the velocity brings."""

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width
 
 
 class Distillation(Section):
@@ -26,6 +26,9 @@ class Distillation(Section):
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1, le=16_384)
     """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
+    experts: dict[str, ArtifactName] = Field(default_factory=dict, json_schema_extra=COSMETIC)
+    """By scene: the recipe whose teacher the student follows there, or a key as in `teacher.start`. Empty follows this
+    recipe's own teacher everywhere. What the experts are is part of the key, not what they are called."""
     start: Literal["teacher", "anew"] = "teacher"
     """What the body behind the encoder begins as. `teacher`: the teacher's own body; where that sees s_priv, it sees
     what a linear map reads from the latent, at first the mean of training. Nothing of the teacher has to be learnt

@@ -74,6 +74,15 @@ class Recipe(Section):
         return self
 
     @model_validator(mode="after")
+    def _whole_physics_steps(self) -> Self:
+        period, step = 1.0 / self.task.control_frequency, self.simulation.physics.timestep
+        steps = round(period / step)
+        if steps < 1 or abs(steps * step - period) > 1e-9:
+            text = f"{step:g} s does not divide a control period of {period:g} s; take {period / max(1, steps):.6g} s"
+            raise Unfitting([("simulation.physics.timestep", text)])
+        return self
+
+    @model_validator(mode="after")
     def _scenes_are_known(self) -> Self:
         problems = list(misnamed(self.simulation, self.task, self.teacher, self.eval, self.export))
         if problems:

@@ -1,9 +1,11 @@
 """Whether all that goes by scene names one that there is, and whether a recipe's own scenes have all they need."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from iowbc.errors import nearest
 from iowbc.recipe.evaluation.evaluation import Evaluation
+from iowbc.recipe.evaluation.trial_scenes import TrialScene
 from iowbc.recipe.export import Export
 from iowbc.recipe.simulation.scene import Scenes
 from iowbc.recipe.simulation.simulation import Simulation
@@ -29,8 +31,15 @@ def misnamed(
     for place, name in _trained(teacher, export):
         yield from _without_object(place, name, "simulation.scenes", simulation.scenes)
     path, scenes = list(worlds.items())[-1]
+    if evaluation.scenes:
+        path, scenes = f"{path} and eval.scenes", with_scenes(scenes, evaluation.scenes)
     for place, name in _evaluated(evaluation):
         yield from _without_object(place, name, path, scenes)
+
+
+def with_scenes(scenes: Scenes, further: Mapping[str, TrialScene]) -> Scenes:
+    """Scenes with those of the trials, which may replace some."""
+    return Scenes.model_validate({**dict(scenes), **{name: own.scene for name, own in further.items()}})
 
 
 def _unknown(path: str, names: tuple[str, ...], known: tuple[str, ...]) -> Iterator[tuple[str, str]]:
@@ -70,9 +79,8 @@ def _trained(teacher: Teacher, export: Export) -> Iterator[tuple[str, str]]:
 
 def _evaluated(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
     """Places that name a scene of the world of trials."""
-    for path, sweep in (("lifting", evaluation.lifting), ("pushing", evaluation.pushing)):
-        if sweep is not None:
-            yield f"eval.{path}.scene", sweep.scene
+    for path, sweep in evaluation.sweeps.items():
+        yield f"eval.{path}.scene", sweep.scene
     suites = {
         "heavy": evaluation.heavy,
         "stagnation.cases": () if evaluation.stagnation is None else evaluation.stagnation.cases,
@@ -81,7 +89,9 @@ def _evaluated(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
     for path, cases in suites.items():
         for number, case in enumerate(cases):
             yield f"eval.{path}.{number}.scene", case.scene
-    if evaluation.robustness is not None and evaluation.robustness.pushes is not None:
-        yield "eval.robustness.pushes.scene", evaluation.robustness.pushes.scene
-    if evaluation.probe is not None:
-        yield "eval.probe.scene", evaluation.probe.scene
+    parts: dict[str, Any] = {"compliance": evaluation.compliance, "map": evaluation.map, "probe": evaluation.probe}
+    if (robustness := evaluation.robustness) is not None:
+        parts |= {"robustness.pushes": robustness.pushes, "robustness.walking_pushes": robustness.walking_pushes}
+    if (compliance := evaluation.compliance) is not None:
+        parts |= {"compliance.blocked": compliance.blocked, "compliance.impedance": compliance.impedance}
+    yield from ((f"eval.{path}.scene", part.scene) for path, part in parts.items() if part is not None)

@@ -15,6 +15,8 @@ decides nothing, so that their keys hold."""
 
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
+ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
+"""An artifact of another recipe: that recipe's file, or eight or more first characters of the artifact's key."""
 DEEPEST = 16
 """Hidden layers of the deepest network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
@@ -66,7 +68,8 @@ class Named(Section):
 
 
 class Unfitting(ValueError):
-    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value and what is wrong there."""
+    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value, from the section that
+    raises it, and what is wrong there."""
 
     def __init__(self, problems: Sequence[tuple[str, str]]) -> None:
         self.problems = tuple(problems)

@@ -13,7 +13,9 @@ from iowbc.recipe.section import Section
 DIGITS = 4
 """Significant digits of a drawn value: it can be read and typed again, and no result hangs on the fifth."""
 MOST_VALUES = 10_000
-"""Values of one axis, and points of a sweep, at most."""
+"""Values of one axis at most."""
+MOST_POINTS = 1_000
+"""Points of a sweep at most, unless more are asked for: planning one takes some 10 ms and 200 kB."""
 
 
 class Range(Section):
@@ -30,8 +32,14 @@ class Range(Section):
     def _few(self) -> Self:
         if self.stop < self.start:
             raise ValueError(f"stop {self.stop} comes before start {self.start}")
-        if self._count > MOST_VALUES:
-            raise ValueError(f"has {self._count:,} values; a range has {MOST_VALUES:,} at most")
+        try:
+            few = self._count <= MOST_VALUES
+        except (OverflowError, ValueError):  # of infinitely many, and of numbers whose distance is none
+            few = False
+        if not few:
+            raise ValueError(
+                f"step {self.step} makes more than {MOST_VALUES:,} values from {self.start} to {self.stop}"
+            )
         return self
 
     @property
@@ -60,6 +68,8 @@ class Drawn(Section):
     def _in_order(self) -> Self:
         if self.high <= self.low:
             raise ValueError(f"high {self.high} is not greater than low {self.low}")
+        if not math.isfinite(self.high - self.low):
+            raise ValueError(f"{self.low} to {self.high} is too wide to draw from")
         if self.scale == "log" and self.low <= 0:
             raise ValueError(f"low {self.low}: a logarithmic scale begins above 0")
         return self

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field, PositiveFloat, model_validator
 
 from iowbc.recipe.check import Check
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width
 
 LARGEST_UPDATE = 10_000_000
 """Samples that are kept in memory for one update."""
@@ -126,9 +126,7 @@ class Teacher(Section):
     seed: int | None = Field(default=None, ge=0, lt=2**32, json_schema_extra=LATER)
     """Seed of this training alone; the recipe's `seed` when empty. With another one here and in `distill`, a recipe is
     a second training of the same controller, on the same reference generator."""
-    start: str | None = Field(
-        default=None, pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300, json_schema_extra=COSMETIC
-    )
+    start: ArtifactName | None = Field(default=None, json_schema_extra=COSMETIC)
     """A trained teacher to begin from: that of another recipe, whose file is named as in `extends` and which runs
     first where it has not, or a stored one by eight or more first characters of its key, in quotes (`iowbc ls`). Its
     policy, the statistics of what that observes, and its curriculum are where this training begins, which counts its

@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from iowbc.learning.curve_titles import title_of
 from iowbc.learning.curves import TABLE
 from iowbc.report.runs import Group
+from iowbc.stages.registry import STAGES
 
 Values = NDArray[np.float64]
 
@@ -21,18 +23,6 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 """Colours that colour-blind readers tell apart (Okabe and Ito), one for each group."""
 BAND = "33"
 """Opacity of a band, as the last two digits of its colour."""
-LEARNING: Mapping[str, tuple[str, ...]] = {
-    "teacher": (
-        "reward",
-        "episode_seconds",
-        "terminations/fallen",
-        "curriculum_level",
-        "check/score",
-        "check/E_v",
-    ),
-    "distill": ("kl", "action_agreement", "episode_seconds"),
-}
-"""The curves of each stage that are always shown; all others can be unfolded."""
 ERRORS = {
     "rate": "success rate",
     "E_v": "E_v [m/s]",
@@ -56,13 +46,14 @@ class Panel:
 
     @property
     def figure(self) -> dict[str, Any]:
-        """What plotly draws; the page adds the colours of light and dark."""
+        """What plotly draws, which takes markup in its texts; the page adds the colours of light and dark."""
         layout: dict[str, Any] = {
-            "title": {"text": self.title, "font": {"size": 14}},
+            "title": {"text": escape(self.title, quote=False), "font": {"size": 14}},
             "xaxis": {"title": {"text": self.across}},
             "yaxis": {"rangemode": "tozero"} if self.from_zero else {},
         }
-        return {"data": self.traces, "layout": layout}
+        traces = [{**trace, "name": escape(trace["name"], quote=False)} for trace in self.traces]
+        return {"data": traces, "layout": layout}
 
 
 def learning_panels(
@@ -73,7 +64,7 @@ def learning_panels(
         [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
     ]
     names = dict.fromkeys(name for group in found for columns in group for name in columns if name != "step")
-    first = LEARNING.get(stage, ())
+    first = STAGES[stage].presentation.curves
     panels = {name: Panel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
@@ -102,12 +93,16 @@ def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
 
 def _columns(folder: Path) -> dict[str, Values]:
     """The columns of an artifact's learning curves; a value that a row lacks is NaN."""
-    path = folder / TABLE
+    rows = _rows(folder / TABLE)
+    return {name: _numbers(rows, name) for name in rows[0]} if rows and "step" in rows[0] else {}
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """The rows of a table of numbers and names, without cells that have no name; none where it is not there."""
     if not path.is_file():
-        return {}
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in (rows[0] if rows else ())}
+        return []
+    with path.open(newline="", encoding="utf-8", errors="replace") as file:
+        return [{name: cell or "" for name, cell in row.items() if name} for row in csv.DictReader(file)]
 
 
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
@@ -115,16 +110,11 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
 
     An error is no less than 0, nor is its interval; a mean over one trial has none, its ends are NaN.
     """
-    path = folder / "tables" / "summary.csv"
-    if not path.is_file():
-        return {}
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = [row for row in _rows(folder / "tables" / "summary.csv") if np.isfinite(_number(row.get("mass")))]
     found = {}
-    for suite in dict.fromkeys(row["suite"] for row in rows):
-        own = sorted(
-            (row for row in rows if row["suite"] == suite and row["case"] == suite), key=lambda row: float(row["mass"])
-        )
+    for suite in dict.fromkeys(row.get("suite", "") for row in rows):
+        own = [row for row in rows if row.get("suite") == row.get("case") == suite]
+        own.sort(key=lambda row: _number(row["mass"]))
         mass = _numbers(own, "mass")
         if len(set(mass)) < SWEPT:
             continue
@@ -136,7 +126,15 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
 
 
 def _numbers(rows: Sequence[Mapping[str, str]], name: str) -> Values:
-    return np.array([float(row.get(name) or "nan") for row in rows])
+    return np.array([_number(row.get(name)) for row in rows])
+
+
+def _number(text: str | None) -> float:
+    """What a cell says, NaN where it says no number."""
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return float("nan")
 
 
 def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:

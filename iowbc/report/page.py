@@ -1,8 +1,7 @@
 """The page itself: one HTML file with everything in it, which asks no network for anything."""
 
 import base64
-import html
-import json
+import secrets
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
@@ -15,12 +14,9 @@ from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.report.curves import Panel, evaluation_panels, learning_panels
 from iowbc.report.runs import Group, Run, metric_rows
+from iowbc.stages.registry import STAGES
 
-TRAINED = ("teacher", "distill")
-"""Stages with learning curves."""
 KINDS = {".png": "image/png", ".mp4": "video/mp4"}
-FIRST_PICTURES = ("postures.png", "comparison.png")
-"""Pictures that are shown at once; all others can be unfolded."""
 
 
 def write_page(
@@ -37,15 +33,15 @@ def write_page(
     tables: result tables in Markdown; more_tables: those that can be unfolded. differences: lines that say how the
     runs differ. together: pictures and films of all of them, by file name.
     """
-    from jinja2 import Environment, select_autoescape
+    from jinja2 import Environment
     from plotly.offline import get_plotlyjs
 
-    template = Environment(
-        autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True
-    ).from_string(files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8"))
+    template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
+        files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8")
+    )
     curves: dict[str, Panel] = {}
     learning = []
-    for stage in TRAINED:
+    for stage in (name for name, one in STAGES.items() if one.presentation.trained_by):
         main, others = learning_panels(groups, stage)
         learning.append((stage, _numbered(curves, main), _numbered(curves, others)))
     evaluation = _numbered(curves, evaluation_panels(groups))
@@ -62,14 +58,15 @@ def write_page(
         evaluation=evaluation,
         films=[*_together(together, ".mp4"), *_media(runs, "videos")],
         pictures=[*_together(together, ".png"), *_media(runs, "figures")],
-        first_pictures=FIRST_PICTURES,
+        first_pictures=[name for stage in STAGES.values() for name in stage.presentation.pictures],
         differences=differences,
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
         key_shown=KEY_LENGTH,
         duration=duration,
+        curves={name: panel.figure for name, panel in curves.items()},
+        plotly=get_plotlyjs().replace("</script", "<\\/script"),
+        nonce=secrets.token_urlsafe(),
     )
-    figures = json.dumps({name: panel.figure for name, panel in curves.items()}).replace("</", "<\\/")
-    text = text.replace("@FIGURES@", figures).replace("@PLOTLY@", get_plotlyjs().replace("</script", "<\\/script"))
     path.write_text(text, encoding="utf-8")
 
 
@@ -111,17 +108,12 @@ def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
 def _beside(artifact: Artifact) -> list[tuple[str, str]]:
     """What the key was computed from, and the recipe."""
     paths = [artifact.folder / name for name in (INGREDIENTS, RECIPE)]
-    return [(path.name, path.read_text(encoding="utf-8")) for path in paths if path.is_file()]
+    return [(path.name, path.read_text(encoding="utf-8", errors="replace")) for path in paths if path.is_file()]
 
 
-def _table(markdown: str) -> str:
-    """A Markdown table as HTML, which may be scrolled sideways, below its caption, which is not."""
+def _table(markdown: str) -> tuple[str, list[list[str]]]:
+    """Caption of a Markdown table, and its rows of cells, of which the first is its head."""
     lines = markdown.splitlines()
     caption = next((line.strip("*") for line in lines if line.startswith("*")), "")
     rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines if line.startswith("|")]
-    parts = []
-    for place, row in enumerate(rows):
-        if place != 1:
-            kind = "th" if place == 0 else "td"
-            parts.append("<tr>" + "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in row) + "</tr>")
-    return f'<p class="caption">{html.escape(caption)}</p><div class="wide"><table>{"".join(parts)}</table></div>'
+    return caption, rows[:1] + rows[2:]

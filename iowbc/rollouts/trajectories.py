@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 
 
 class Stepped(Protocol):
@@ -40,23 +40,23 @@ class Trajectories:
     cut_observation: Array
     """The last row of those episodes, (k, S)."""
     told: Mapping[str, Array]
-    """What the pilot recorded beside, (T, n, ...) by name."""
+    """What the policy recorded beside, (T, n, ...) by name."""
     acting: float
     """Time that the policy took of it [s], the mean over those who worked side by side."""
 
 
-def roll(environments: Stepped, pilot: Pilot, steps: int) -> Trajectories:
-    """Lets a pilot drive for some steps. Raises ValueError where an action is not finite."""
+def roll(environments: Stepped, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+    """Makes a rollout of some steps. Raises ValueError where an action is not finite."""
     buffers, acting = environments.buffers, 0.0
     observations, actions, rewards, ends = [], [], [], []
     told: list[Mapping[str, Array]] = []
     cut: list[tuple[int, int]] = []
     cut_off: list[Array] = []
-    starts = pilot.starts
+    starts = rollout_policy.starts
     for step in range(steps):
         began = time.perf_counter()
         observations.append(buffers["observation"].copy())
-        action, beside = pilot.act(step, observations[-1], starts)
+        action, beside = rollout_policy.act(step, observations[-1], starts)
         _check_finite(action)
         buffers["action"][:] = action
         acting += time.perf_counter() - began

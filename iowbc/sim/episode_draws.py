@@ -7,7 +7,7 @@ import numpy as np
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.distribution import Distribution
-from iowbc.recipe.simulation.holding import SWITCHES
+from iowbc.recipe.simulation.holding import BY_AXIS, SWITCHES
 from iowbc.recipe.simulation.partner import Partner
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
@@ -93,6 +93,8 @@ class Draws:
             if name != PUSH_SHARE:
                 single = place.stop - place.start == 1
                 self.values[name] = self._rows[:, place.start] if single else self._rows[:, place]
+        first = self._table.columns["object_com_offset"].start
+        self.values |= {name: self._rows[:, first + place] for place, name in enumerate(BY_AXIS)}
         self.values["object_mass"] = self._nominal_mass.copy()
         self.values["slip_force"] = self._strength.copy()
         self.values["rolling_resistance"] = np.zeros(n)

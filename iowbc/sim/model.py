@@ -10,7 +10,11 @@ from iowbc.robot.description import Robot
 from iowbc.sim.objects import OBJECT_BIT, add_object
 from iowbc.sim.timing import Timing
 
+GROUND = "ground"
+"""Name of its geom."""
 GROUND_BIT = 1
+FORCE, NET_FORCE = 1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3
+"""What a contact sensor of MuJoCo delivers: the force alone, summed over all contacts."""
 LEG_BITS = (8, 16)
 """What left and right leg are; each touches the other."""
 ARENA = 2 << 20
@@ -60,7 +64,7 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
         for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
             spec.delete(geom)
     spec.worldbody.add_geom(
-        name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0
+        name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0
     )
     _add_motors(spec, robot, timing)
     if scene.object is not None:
@@ -77,8 +81,25 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
 
 
 def compile_scene(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
-    """The model that is stepped. Its one sensor makes MuJoCo compute `cfrc_ext`, which holds all contact forces."""
-    return scene_spec(robot, physics, scene, timing, dressed=False).compile()
+    """The model that is stepped. Its first sensor makes MuJoCo compute `cfrc_ext`, which holds all contact forces."""
+    spec = scene_spec(robot, physics, scene, timing, dressed=False)
+    _add_ground_forces(spec, robot, timing)
+    return spec.compile()
+
+
+def _add_ground_forces(spec: Any, robot: Robot, timing: Timing) -> None:
+    """A sensor of the force between each foot and the ground, world frame, which keeps those of a control period."""
+    for body in robot.sole_bodies:
+        spec.add_sensor(
+            name=body,
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=body,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname=GROUND,
+            intprm=[FORCE, NET_FORCE, 1],
+            nsample=timing.substeps,
+        )
 
 
 def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:

@@ -54,6 +54,8 @@ class Layout:
     """Those velocities in qvel."""
     past_forces: slice
     """What MuJoCo remembers of each hand, in the history: two counters, times and forces, those of a period."""
+    past_ground: slice
+    """The same of the ground's force on each foot."""
     past_targets: slice
     """What MuJoCo remembers of each motor, the first in its history: two counters, times, past targets."""
     object_geom: int | None
@@ -93,14 +95,15 @@ class Layout:
             palms=_pair(geoms, "left_palm", "right_palm"),
             momentum=np.array([model.M_rowadr[3 : 6 + count] + axis for axis in range(3)]),
             momentum_speeds=slice(3, 6 + count),
-            past_forces=slice(0, 0) if thing is None else _past_forces(model),
+            past_forces=slice(0, 0) if thing is None else _past_forces(model, HANDS),
+            past_ground=_past_forces(model, robot.sole_bodies),
             past_targets=slice(0, int(np.sum(2 + 2 * model.actuator_history[:, 0]))),
             object_geom=geoms.get("object"),
         )
 
 
-def _past_forces(model: Any) -> slice:
-    first = model.sensor(HANDS[0]).id
+def _past_forces(model: Any, names: tuple[str, str]) -> slice:
+    first = model.sensor(names[0]).id
     start = int(model.sensor_historyadr[first])
     return slice(start, start + 2 * (2 + 4 * int(model.sensor_history[first, 0])))
 

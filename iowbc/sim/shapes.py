@@ -13,6 +13,8 @@ from iowbc.recipe.beside import MeshFile
 from iowbc.recipe.simulation.scene import Object
 from iowbc.robot import rotations
 
+SMALLEST, LARGEST = 1e-3, 10.0
+"""Edges of a mesh, at least and at most [m]: what two hands can hold, or push, with room for a mistake."""
 HOLE = 0.55
 """Inner radius of a tyre as a part of its outer one."""
 HULL = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
@@ -85,9 +87,13 @@ def _of_mesh(mesh: MeshFile, scale: float) -> Shape:
         ) from None
     turn, principal = model.body_iquat[1].copy(), model.body_inertia[1].copy()
     vertices = rotations.rotate(model.mesh_quat[:1], model.mesh_vert) + model.mesh_pos[0] - model.body_ipos[1]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    if not ((high - low).min() >= SMALLEST and (high - low).max() <= LARGEST):
+        extent = " x ".join(f"{edge:.3g}" for edge in high - low)
+        raise UsageError(f"{mesh.path}: extends over {extent} m; expected {SMALLEST:g} to {LARGEST:g}, see `scale`")
     return Shape(
-        low=vertices.min(axis=0),
-        high=vertices.max(axis=0),
+        low=low,
+        high=high,
         principal=principal,
         about_axes=np.square(rotations.matrix(turn)) @ principal,
         turn=turn,

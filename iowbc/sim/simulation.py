@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
@@ -161,12 +161,14 @@ class Simulation:
         return acting
 
     @property
-    def foot_slide(self) -> Array:
-        """Speed at which loaded soles slide over the ground, left and right, (n, 2) [m/s]."""
-        speed = np.empty((self.n, 2))
-        for world in self.worlds:
-            speed[world.place] = world.foot_slide()
-        return speed
+    def soles(self) -> dict[str, Array]:
+        """What the left and right sole do, by name, (n, 2) each; see `iowbc.sim.soles.Soles`."""
+        parts = [(world.place, world.soles.arrays()) for world in self.worlds]
+        gathered = {name: np.empty((self.n, 2)) for name in parts[0][1]}
+        for place, arrays in parts:
+            for name, values in arrays.items():
+                gathered[name][place] = values
+        return gathered
 
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
         """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Keeps what is held
@@ -188,11 +190,13 @@ class Simulation:
         joint_position: Array,
         base_pitch: Array | None = None,
         yaw: Array | None = None,
+        key: Keys | None = None,
     ) -> None:
         """Starts new episodes: draws what is random, puts the robot on its soles and the object into its hands.
 
         `which` (k,); `joint_position` (k, joints) [rad]; `base_pitch` (k,) [rad], zero by default; `yaw` (k,)
-        [rad], drawn by default. The height of the base follows from kinematics: the lowest corner of the soles touches
+        [rad], drawn by default; `key` (k,) of all that is random in the episodes, by default the next of each
+        environment. The height of the base follows from kinematics: the lowest corner of the soles touches
         the ground.
         """
         which = np.asarray(which, np.int64)
@@ -201,7 +205,8 @@ class Simulation:
         pitch = np.zeros(len(which)) if base_pitch is None else np.asarray(base_pitch)
         self.episode[which] += 1
         self.clock[which] = 0
-        key = random.absorb(self._key[which], self.episode[which])
+        if key is None:
+            key = random.absorb(self._key[which], self.episode[which])
         self._episode_key[which] = key
         self._draws.draw(which, key, self.fixed)
         heading = self.drawn["start_yaw"][which] if yaw is None else np.asarray(yaw)

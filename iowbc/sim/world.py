@@ -18,6 +18,7 @@ from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
 from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
+from iowbc.sim.soles import Soles
 from iowbc.sim.squeeze import Squeeze
 from iowbc.sim.stability import require_stable
 from iowbc.sim.state import SimulationState
@@ -73,9 +74,10 @@ class World:
         kept, count, history = timing.kept_targets, len(rows), bind("history")
         targets = history[:, self.layout.past_targets].reshape(count, -1, 2 + 2 * kept)
         self._past_targets = targets[..., 2 + kept :]
+        past_ground = _past(history, self.layout.past_ground, timing.substeps)
+        self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
         if self.layout.object is not None:
-            forces = history[:, self.layout.past_forces].reshape(count, 2, -1)
-            self._past_forces = forces[..., 2 + timing.substeps :].reshape(count, 2, timing.substeps, 3)
+            self._past_forces = _past(history, self.layout.past_forces, timing.substeps)
         self._spatial_velocity, self._subtree_com, self._sites = bind("cvel"), bind("subtree_com"), bind("site_xpos")
         self._centres = bind("xipos")
         self._squeeze, self._grip = self._grasp(scene)
@@ -286,24 +288,6 @@ class World:
         else:
             self._gather_object(state, layout.object, velocity)
 
-    def foot_slide(self) -> Array:
-        """Horizontal speed of the soles at their centres of pressure, (n, 2) [m/s]; zero in the air.
-
-        A foot that rolls over its edge does not slide: there its centre of pressure rests.
-        """
-        wrench, spatial = self._external[:, FEET], self._spatial_velocity[:, self.layout.feet]
-        torque, force = wrench[..., :3], wrench[..., 3:]
-        loaded = force[..., 2] > self.physics.contact_force
-        weight = np.where(loaded, force[..., 2], 1.0)
-        down = -self._subtree_com[:, self.layout.base, 2:]
-        ahead = (down * force[..., 0] - torque[..., 1]) / weight
-        left = (down * force[..., 1] + torque[..., 0]) / weight
-        turning, velocity = spatial[..., :3], spatial[..., 3:]
-        along_x = velocity[..., 0] + turning[..., 1] * down - turning[..., 2] * left
-        along_y = velocity[..., 1] + turning[..., 2] * ahead - turning[..., 0] * down
-        speed: Array = np.hypot(along_x, along_y) * loaded
-        return speed
-
     def _robot_velocity(self) -> Array:
         """Velocity of the robot's centre of mass, (n, 3) [m/s]: momentum, in the first rows of M qvel, by mass."""
         momentum = self._inertia.take(self.layout.momentum, axis=1)
@@ -369,6 +353,12 @@ class World:
         self._warnings[...] = values["warnings"]
         self.batch.forward(stage=VELOCITY)
         self._mass_cache()
+
+
+def _past(history: Array, place: slice, substeps: int) -> Array:
+    """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]."""
+    kept = history[:, place].reshape(len(history), 2, -1)
+    return kept[..., 2 + substeps :].reshape(len(history), 2, substeps, 3)
 
 
 def _places(layout: Layout, bodies: int) -> Indices:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import Borrowed, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import rolls_elsewhere, train
 
 PANELS = (
@@ -27,24 +27,39 @@ FACTS = ("object_mass", "base_linear_velocity")
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     """A teacher that is a student already, or what s_priv does not hold."""
     yield from not_privileged(recipe, "distill.withheld", recipe.distill.withheld)
+    if experts := recipe.distill.experts:
+        played = [name for name, share in recipe.task.scenes if share > 0.0]
+        for scene in (name for name in played if name not in experts):
+            yield "distill.experts", f"the scene {scene} is played and has no expert; name one for each of {played}"
+        for scene in (name for name in experts if name not in played):
+            yield f"distill.experts.{scene}", f"no scene {scene} is played; valid: {', '.join(played)}"
     if recipe.teacher.history is not None:
         text = "with teacher.history PPO trains the student's network itself, and nothing is to be distilled: leave "
         yield "stages", f"{text}`distill` out, or set teacher.history to null"
 
 
 def run(job: Job) -> None:
-    """Distil the teacher; leave the student's network, normalisation and curves."""
+    """Distil the teacher, or in each scene its expert; leave the student's network, normalisation and curves."""
+    import numpy as np
+
     from iowbc.control.action import action_mirror
     from iowbc.control.observation import observation_layout
+    from iowbc.learning.side_by_side import prepare_process
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
     from iowbc.stages.environments import training_environments
+    from iowbc.task.scenes import scene_of
 
+    prepare_process()
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)
     seed = recipe.seed if settings.seed is None else settings.seed
-    teacher, about = load_teacher(job.inputs["teacher"])
+    scenes = scene_of(settings.environments, recipe.task.scenes)
+    folder_of = {scene: job.inputs[f"expert/{scene}" if settings.experts else "teacher"] for scene in scenes}
+    folders = list(dict.fromkeys(folder_of.values()))
+    teachers, abouts = zip(*map(load_teacher, folders), strict=True)
+    about = abouts[0]
     environments = training_environments(job, count=settings.environments, seed=seed + 1)
     try:
         environments.set_curriculum(about["curriculum"])
@@ -63,7 +78,14 @@ def run(job: Job) -> None:
             action_mirror=action_mirror(robot),
         )
         training = StudentTraining(
-            settings, environments, teacher, about["architecture"], rows, recipe.teacher.symmetry, seed
+            settings,
+            environments,
+            teachers,
+            np.array([folders.index(folder_of[scene]) for scene in scenes]),
+            about["architecture"],
+            rows,
+            recipe.teacher.symmetry,
+            seed,
         )
         curves = train(job, training, settings.checkpoint_every, _note)
     finally:
@@ -83,11 +105,21 @@ STAGE = Stage(
     name="distill",
     version=4,
     slice=("seed", "rg.height", "simulation", "task", "teacher.symmetry", "teacher.normalization_clip", "distill"),
-    reads=lambda recipe: (*generator_stage(recipe), "teacher"),
+    reads=lambda recipe: (*generator_stage(recipe), *(() if recipe.distill.experts else ("teacher",))),
+    borrows=lambda recipe: {
+        f"expert/{scene}": Borrowed(f"distill.experts.{scene}", named, "teacher")
+        for scene, named in recipe.distill.experts.items()
+    },
     run=run,
     problems=problems,
     results=("student.safetensors", "student.json"),
-    packages=("stages.distill", "stages.training", "learning", "rollouts", *ENVIRONMENTS),
     counts=("distill.steps",),
+    presentation=Presentation(
+        headline=("kl", "action_agreement", "episode_seconds"),
+        columns=("action_agreement",),
+        curves=("kl", "action_agreement", "episode_seconds"),
+        trained_by="distillation",
+        leaves_policy=True,
+    ),
     spreads=rolls_elsewhere,
 )

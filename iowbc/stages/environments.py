@@ -3,15 +3,17 @@
 import secrets
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from iowbc.arrays import Array
 from iowbc.pipeline.stage import Job, Spread
 from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.specification import Specification
+from iowbc.task.vector.messages import Message, Roll
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
 from iowbc.task.vector.vector_env import PATIENCE, VectorEnv
@@ -21,8 +23,6 @@ ACTOR = "rollout actor"
 """What a group of environments on another machine is called."""
 WRITTEN = ("action", "counters", "terms")
 """Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
-LOOKS = ("levels", "drawn", "snapshot")
-"""Requests after which nothing depends on the environments but what depended on them before."""
 
 
 def training_environments(job: Job, *, count: int, seed: int, divergences: Path | None = None) -> VectorEnv:
@@ -31,11 +31,11 @@ def training_environments(job: Job, *, count: int, seed: int, divergences: Path 
     actors = job.recipe.execution.rollout_actors
     workers: int | Callable[[Setup], Workers] = job.workers
     if actors is not None and job.spread is not None:
-        workers = partial(Elsewhere, job.spread, min(actors, job.spread.width))
+        workers = partial(RemoteWorkers, job.spread, min(actors, job.spread.width))
     return VectorEnv(world, num_envs=count, workers=workers, seed=seed, divergences=divergences)
 
 
-class Elsewhere(Workers):
+class RemoteWorkers(Workers):
     """Environments in groups on other machines; what is here is a copy of their buffers after the last request."""
 
     def __init__(self, spread: Spread, count: int, setup: Setup) -> None:
@@ -45,25 +45,24 @@ class Elsewhere(Workers):
         self.groups = shares_in_blocks(setup.count, count)
         self.buffers = private_buffers(setup.buffer_fields(), setup.count)
         self._divergences = setup.divergences
-        self._crew = spread.crew(ACTOR, Group, [(setup, *group) for group in self.groups], folders)
-        self._looks = False
+        self._pool = spread.actor_pool(ACTOR, RolloutActor, [(setup, *group) for group in self.groups], folders)
+        self._changes = True
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+    def ask(self, messages: Sequence[Message]) -> None:
         """See `Workers`."""
-        self._looks = request in LOOKS
-        every = arguments or [()] * len(self.groups)
-        own = [
-            ({name: self.buffers[name][first:last] for name in WRITTEN}, *given)
-            for (first, last), given in zip(self.groups, every, strict=True)
+        self._changes = messages[0].changes
+        written = [
+            ({name: self.buffers[name][first:last] for name in WRITTEN}, message)
+            for (first, last), message in zip(self.groups, messages, strict=True)
         ]
-        steps = every[0][1] if request == "roll" else 0
-        self._crew.ask(request, own, changes=not self._looks, patience=STARTING + steps * PATIENCE)
+        steps = messages[0].steps if isinstance(messages[0], Roll) else 0
+        self._pool.ask(written, changes=self._changes, patience=STARTING + steps * PATIENCE)
 
     def answers(self) -> list[Any]:
         """See `Workers`."""
-        found = self._crew.answers()
-        if not self._looks:
-            for group, state in zip(self.groups, self._crew.states, strict=True):
+        found = self._pool.answers()
+        if self._changes:
+            for group, state in zip(self.groups, self._pool.states, strict=True):
                 for name, values in self.buffers.rows(*group).arrays.items():
                     values[:] = state[f"buffer/{name}"]
         for _, files in found:
@@ -75,10 +74,10 @@ class Elsewhere(Workers):
 
     def close(self) -> None:
         """See `Workers`."""
-        self._crew.close()
+        self._pool.close()
 
 
-class Group:
+class RolloutActor:
     """A group of environments where it is stepped: a `Member`."""
 
     def __init__(self, setup: Setup, first: int, last: int, *, robot: Path, generator: Path | None = None) -> None:
@@ -88,13 +87,13 @@ class Group:
         here = replace(setup, specification=world, divergences=folder)
         self._batch = here.batch(first, last, private_buffers(here.buffer_fields(), last - first))
 
-    def ask(self, request: str, arguments: tuple[Any, ...]) -> tuple[Any, dict[str, bytes]]:
-        """What a method of the batch returns, and the files of simulations that have diverged meanwhile. `arguments`:
-        rows of the buffers in `WRITTEN`, and the method's own."""
-        written, *own = arguments
+    def ask(self, message: tuple[Mapping[str, Array], Message]) -> tuple[Any, dict[str, bytes]]:
+        """The answer of the batch, and the files of simulations that have diverged meanwhile. `message`: rows of the
+        buffers in `WRITTEN`, and the message to the batch."""
+        written, own = message
         for name, values in written.items():
             self._batch.buffers[name][:] = values
-        answer = getattr(self._batch, request)(*own)
+        answer = own.carry_out(self._batch)
         files = {path.name: path.read_bytes() for path in sorted(self._kept.glob("*"))}
         if files:
             shutil.rmtree(self._kept)

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from iowbc.errors import Interrupted, StageFailed
-from iowbc.pipeline.stage import Job, Stage
+from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
+from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -129,5 +129,7 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("step.onnx", "settle.onnx", "contract.json", "golden.npz"),
-    packages=("stages.export", "export", "deploy", "evaluation", "learning", "rollouts", *ENVIRONMENTS),
+    presentation=Presentation(
+        headline=("parity", "step_ms", "acceptance_survived"), columns=("parity",), leaves_policy=True
+    ),
 )

@@ -1,11 +1,8 @@
-"""What the stages behind the reference generator share: the artifacts they read, the code of the environments."""
+"""What the stages behind the reference generator share: which artifacts they read."""
 
 from collections.abc import Iterator, Sequence
 
 from iowbc.recipe.recipe import Recipe
-
-ENVIRONMENTS = ("task", "sim", "control", "robot", "counter_random")
-"""Packages that decide how an environment steps."""
 
 
 def generator_stage(recipe: Recipe) -> tuple[str, ...]:

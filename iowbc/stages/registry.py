@@ -1,11 +1,8 @@
-"""All stages, by name, in the order in which they run."""
+"""All stages, by name, in the order in which they run: each is the `STAGE` of the module of its name."""
 
-from collections.abc import Mapping
+from importlib import import_module
 
 from iowbc.pipeline.stage import Stage
-from iowbc.stages import distill, evaluate, export, rg_dataset, rg_fit, teacher
+from iowbc.recipe.recipe import PIPELINE
 
-STAGES: Mapping[str, Stage] = {
-    stage.name: stage
-    for stage in (rg_dataset.STAGE, rg_fit.STAGE, teacher.STAGE, distill.STAGE, evaluate.STAGE, export.STAGE)
-}
+STAGES: dict[str, Stage] = {name: import_module(f"iowbc.stages.{name.replace('-', '_')}").STAGE for name in PIPELINE}

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from functools import partial
 
 from iowbc.errors import StageFailed
-from iowbc.pipeline.stage import Job, Stage, always
-from iowbc.stages.spreading import label_everywhere
+from iowbc.pipeline.stage import Job, Presentation, Stage, always
+from iowbc.stages.labelling import label_everywhere
 
 LABELLED = "labelled.npz"
 """The map of commands that have labels; `feasible.npz` of rg-fit is the part of it where the network moves gently."""
@@ -127,7 +127,7 @@ STAGE = Stage(
     reads=lambda recipe: (),
     run=run,
     results=("dataset.npz", LABELLED),
-    packages=("reference", "control", "robot"),
     counts=("rg.sampling.samples",),
+    presentation=Presentation(headline=("samples", "kept", "crosscheck_p90"), pictures=("postures.png",)),
     spreads=always,
 )

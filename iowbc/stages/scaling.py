@@ -29,10 +29,11 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.labelling import LabelTask
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.pilots import Explorer
-from iowbc.stages.environments import Elsewhere
+from iowbc.rollouts.rollout_policies import ExploringPolicy
+from iowbc.stages.environments import RemoteWorkers
+from iowbc.stages.eval import play_everywhere
+from iowbc.stages.labelling import SHARES, label_everywhere
 from iowbc.stages.rg_dataset import CHUNK
-from iowbc.stages.spreading import SHARES, label_everywhere, play_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -54,7 +55,7 @@ ROUNDS = 30
 
 
 @dataclass(frozen=True)
-class World:
+class Workload:
     """What is played and labelled."""
 
     recipe: Recipe
@@ -73,7 +74,7 @@ class World:
 
 
 @dataclass(frozen=True)
-class Pace:
+class Throughput:
     """How fast a cluster made some number of things."""
 
     count: int
@@ -93,7 +94,7 @@ class Pace:
 
 
 KINDS = ("labels", "trials", "rollouts")
-Turn = dict[int, dict[str, Pace]]
+Turn = dict[int, dict[str, Throughput]]
 """Paces of `KINDS` (rollouts in environment steps) and `pieces` (that do nothing) by the number of nodes."""
 
 
@@ -129,13 +130,13 @@ def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], N
     say(f"engine: {figures['piece_ms']:.1f} ms a piece; a trial takes {figures['trial_ms']:.0f} ms of a core")
     inputs, piece, answer = (figures[f"{name}_bytes"] for name in ("inputs", "piece", "answer"))
     say(f"bytes: {inputs:.0f} once to each node, {piece:.0f} to a piece of one trial, {answer:.0f} back from {TRIALS}")
-    down, up = figures["pilot_bytes"], figures["rollout_bytes"]
+    down, up = figures["policy_bytes"], figures["rollout_bytes"]
     say(f"bytes an update: {down:.0f} to an actor of {ENVIRONMENTS} environments, {up:.0f} back")
     return figures
 
 
 @contextmanager
-def _world(recipe: Recipe) -> Iterator[World]:
+def _world(recipe: Recipe) -> Iterator[Workload]:
     """Trials of a few seconds by an untrained policy of the recipe's size."""
     folder = robot_folder(recipe.robot)
     asked = recipe.eval.model_copy(update={"trials": TRIALS, "sequence": (Segment(duration=DURATION, ramp=0.0),)})
@@ -153,10 +154,10 @@ def _world(recipe: Recipe) -> Iterator[World]:
         torch.manual_seed(0)
         save_network(TeacherNetwork(**architecture), architecture, Path(place), "teacher", {})
         folders = {"robot": folder, "policy": Path(place), "generator": generator}
-        yield World(recipe, folders, sweep.trials(sweep.sweep.masses[-1:]))
+        yield Workload(recipe, folders, sweep.trials(sweep.sweep.masses[-1:]))
 
 
-def _paces(cluster: Cluster, world: World, nodes: int) -> tuple[dict[str, Pace], dict[str, float]]:
+def _paces(cluster: Cluster, world: Workload, nodes: int) -> tuple[dict[str, Throughput], dict[str, float]]:
     """How fast a cluster is, and the bytes of what passes between its nodes."""
     spread = cluster.spread(world.folders.values())
 
@@ -179,34 +180,34 @@ def _paces(cluster: Cluster, world: World, nodes: int) -> tuple[dict[str, Pace],
     return paces, sizes | {"answer_bytes": max(len(content) for _, content in answers)}
 
 
-def _rolled(spread: Spread, world: World, nodes: int) -> tuple[Pace, dict[str, float]]:
+def _rolled(spread: Spread, world: Workload, nodes: int) -> tuple[Throughput, dict[str, float]]:
     """How fast a training's rollouts are made, one actor on each node; and the bytes of an update, of one actor."""
     recipe, count = world.recipe, ENVIRONMENTS * nodes
     specification = Specification(recipe, world.folders["robot"], world.folders["generator"])
     policy = teacher_policy(load_teacher(world.folders["policy"])[0])
-    environments = VectorEnv(specification, num_envs=count, workers=partial(Elsewhere, spread, nodes), seed=0)
+    environments = VectorEnv(specification, num_envs=count, workers=partial(RemoteWorkers, spread, nodes), seed=0)
     with closing(environments):
         environments.reset()
         steps, actions = recipe.teacher.rollout, environments.action_space.shape[0]
         noise = np.random.default_rng(0).normal(0.0, recipe.teacher.initial_std, (steps, count, actions))
-        pilot = Explorer(policy, noise.astype(np.float32), block_size(count))
-        found = environments.roll(pilot, steps)
+        rollout_policy = ExploringPolicy(policy, noise.astype(np.float32), block_size(count))
+        found = environments.roll(rollout_policy, steps)
         sizes = {
-            "pilot_bytes": len(pickle.dumps(pilot.part(*environments.workers.groups[0]))),
+            "policy_bytes": len(pickle.dumps(rollout_policy.part(*environments.workers.groups[0]))),
             "rollout_bytes": len(pickle.dumps((found, environments.state()))) / nodes,
         }
-        return _timed(ROLLOUTS * steps * count, lambda: _repeat(environments, pilot, steps)), sizes
+        return _timed(ROLLOUTS * steps * count, lambda: _repeat(environments, rollout_policy, steps)), sizes
 
 
-def _repeat(environments: VectorEnv, pilot: Explorer, steps: int) -> None:
+def _repeat(environments: VectorEnv, rollout_policy: ExploringPolicy, steps: int) -> None:
     for _ in range(ROLLOUTS):
-        environments.roll(pilot, steps)
+        environments.roll(rollout_policy, steps)
 
 
-def _timed(count: int, work: Callable[[], None]) -> Pace:
+def _timed(count: int, work: Callable[[], None]) -> Throughput:
     began, used = time.perf_counter(), _processor_time()
     work()
-    return Pace(count, time.perf_counter() - began, _processor_time() - used)
+    return Throughput(count, time.perf_counter() - began, _processor_time() - used)
 
 
 def _processor_time() -> float:
@@ -218,7 +219,7 @@ def _processor_time() -> float:
     return total
 
 
-def _label(spread: Spread, world: World, shards: int) -> None:
+def _label(spread: Spread, world: Workload, shards: int) -> None:
     """Label some shards."""
     rg = world.recipe.rg
     with tempfile.TemporaryDirectory(prefix="iowbc-bench-") as folder:

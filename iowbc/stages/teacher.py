@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
-from iowbc.pipeline.stage import START, Job, Stage
+from iowbc.pipeline.stage import START, Borrowed, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, not_privileged
+from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
 
 if TYPE_CHECKING:
@@ -51,10 +51,17 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
         yield from taken_names(recipe.task.observation)
 
 
+def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
+    """The teacher that training begins from."""
+    start = recipe.teacher.start
+    return {} if start is None else {START: Borrowed("teacher.start", start, "teacher")}
+
+
 def run(job: Job) -> None:
     """Train the teacher; leave its best network, normalisation, curves, and an SB3 zip for users' own code."""
     from iowbc.control.action import action_mirror
     from iowbc.learning.history_environments import HistoryEnvironments
+    from iowbc.learning.side_by_side import prepare_process
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
@@ -62,6 +69,7 @@ def run(job: Job) -> None:
     from iowbc.stages.environments import training_environments
     from iowbc.task.specification import Specification
 
+    prepare_process()
     recipe, settings = job.recipe, job.recipe.teacher
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
@@ -125,7 +133,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
     from iowbc.task.specification import Specification
 
     check, shares = world.recipe.teacher.check, world.recipe.task.scenes
-    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence)})
+    recipe = world.recipe.model_copy(update={"eval": Evaluation(sequence=check.sequence, scripts=check.scripts)})
     own = Specification(recipe, world.robot, world.rg)
     played = {"lift": check.lifting, "push": check.pushing} | check.others
     trials = [
@@ -135,7 +143,7 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
         for trial in quick_trials(own, scene, masses, check.trials, check.seed)
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
-    return QuickEvaluation(own, trials, fall=check.fall, workers=min(workers, len(trials)))
+    return QuickEvaluation(own, trials, check=check, workers=min(workers, len(trials)))
 
 
 def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
@@ -176,10 +184,16 @@ STAGE = Stage(
     run=run,
     problems=problems,
     results=("teacher.safetensors", "teacher.json"),
-    packages=("stages.teacher", "stages.training", "learning", "rollouts", "evaluation.trials", *ENVIRONMENTS),
     extends="teacher.steps",
     extends_from=(STATE, TABLE),
-    starts_from="teacher.start",
+    borrows=borrows,
     counts=("teacher.steps",),
+    presentation=Presentation(
+        headline=("best_score", "check/survived", "episode_seconds"),
+        columns=("best_score",),
+        curves=("reward", "episode_seconds", "terminations/fallen", "curriculum_level", "check/score", "check/E_v"),
+        trained_by="PPO",
+        leaves_policy=True,
+    ),
     spreads=rolls_elsewhere,
 )

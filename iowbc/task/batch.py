@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices, as_slice
+from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, roll
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import MeasuredState
@@ -22,7 +23,7 @@ from iowbc.task.layout import full_layout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.observer import Observer
-from iowbc.task.planned_pushes import PlannedPushes
+from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.record.divergences import keep_divergences
 from iowbc.task.record.recorder import count_endings, count_pushes, count_step, write_signals, write_trial_signals
 from iowbc.task.schedule import Schedule
@@ -90,8 +91,10 @@ class Batch:
             period=period,
         )
         self._pushes = PlannedPushes(schedule.pushes, period)
+        self._pulls = PlannedPulls(schedule.pulls, period)
         self.observer = Observer(self.robot, self.layout, self.simulation, self.memory)
-        self._bound, self._divergences = task.action.bound, divergences
+        self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
+        self._divergences = divergences
 
     @property
     def command(self) -> Array:
@@ -132,6 +135,8 @@ class Batch:
         simulation.feed[:, 3] = memory.command[:, HEIGHT] + 0.5 * (left + right)
         if self._pushes.any:
             simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)
+        if self._pulls.any:
+            simulation.planned_impulse[:] = self._pulls.force(memory.steps, memory.heading_reference)
         simulation.step()
         memory.steps += 1
         self.guidance.turn(memory)
@@ -145,14 +150,14 @@ class Batch:
         )
         write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
         if self._schedule.repeats:
-            write_trial_signals(self.buffers, simulation.state, simulation.foot_slide)
-        memory.action[:] = action
+            write_trial_signals(self.buffers, simulation, action * self._scale)
+        memory.earlier_action[:], memory.action[:] = memory.action, action
         self.guidance.advance(memory, self._schedule.episode_key)
         self._finish(judgement)
 
-    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
-        """Lets a pilot of these environments drive for some control steps."""
-        return roll(self, pilot, steps)
+    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+        """Make a rollout of some control steps."""
+        return roll(self, rollout_policy, steps)
 
     def _finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""
@@ -184,7 +189,7 @@ class Batch:
         joints, pitch = self.guidance.start(which, memory, key)
         memory.clear(which)
         self.simulation.hold(self._schedule.scales(which, key), which)
-        self.simulation.reset(which, joints, base_pitch=pitch)
+        self.simulation.reset(which, joints, base_pitch=pitch, key=key)
         memory.infeasible[which] = self.simulation.infeasible[which]
         count_pushes(self.buffers, self._pushing, memory, which)
         moved = self.judge.motion(self.simulation.state)

@@ -20,6 +20,26 @@ class PlannedPush:
 
 
 @dataclass(frozen=True)
+class PlannedPull:
+    """A sinusoidal force on the object's centre of mass, f sin(2π ν (t - begin))."""
+
+    begin: float
+    """[s]."""
+    duration: float
+    """[s]."""
+    frequency: float
+    """ν [Hz]."""
+    force: tuple[float, float]
+    """Amplitude, forward and to the left of the commanded heading [N]."""
+
+    @property
+    def direction(self) -> str:
+        """The nearer axis: "forward" or "left"."""
+        forward, left = self.force
+        return "forward" if abs(forward) >= abs(left) else "left"
+
+
+@dataclass(frozen=True)
 class Episode:
     """A trial. Everything random in it follows from its seed, so that every policy meets the same trial."""
 
@@ -35,6 +55,8 @@ class Episode:
     """The commands; without, they are drawn as in training."""
     push: PlannedPush | None = None
     """A push on the base beside those that are drawn."""
+    pull: PlannedPull | None = None
+    """A pull on the object."""
 
     def __post_init__(self) -> None:
         if self.duration <= 0.0:
@@ -51,12 +73,13 @@ class Episode:
             "fixed": dict(self.fixed),
             "script": None if self.script is None else self.script.as_json(),
             "push": None if self.push is None else asdict(self.push),
+            "pull": None if self.pull is None else asdict(self.pull),
         }
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "Episode":
         """Inverse of `as_json`."""
-        push = values["push"]
+        push, pull = values["push"], values.get("pull")
         script = None if values["script"] is None else CommandScript.from_json(values["script"])
         return cls(
             scene=str(values["scene"]),
@@ -64,5 +87,6 @@ class Episode:
             duration=float(values["duration"]),
             fixed={str(name): float(value) for name, value in values["fixed"].items()},
             script=script,
-            push=None if push is None else PlannedPush(push["time"], push["duration"], tuple(push["impulse"])),
+            push=None if push is None else PlannedPush(**{**push, "impulse": tuple(push["impulse"])}),
+            pull=None if pull is None else PlannedPull(**{**pull, "force": tuple(pull["force"])}),
         )

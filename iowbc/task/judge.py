@@ -77,8 +77,9 @@ class Judge:
         `resistance`: of a crate's wheels, (n,) [N].
         """
         moved = self.motion(state)
-        needed = np.where(memory.infeasible, 0.0, resistance * (1.0 - state.partner_share))
-        self._filter(memory, moved, needed)
+        self._filter(memory, moved)
+        if not self._admittance.idle:
+            self._feel(memory, moved, np.where(memory.infeasible, 0.0, resistance * (1.0 - state.partner_share)))
         error = heading_error(moved, memory)
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
         follow(memory, target, error, disturbed, self._task.termination, self._period)
@@ -99,6 +100,7 @@ class Judge:
             heading_error=error,
             action=action,
             previous_action=memory.action,
+            earlier_action=memory.earlier_action,
             swing_profile=gait.swing_height(foot_phase, self._task.references.gait),
             stepping=memory.stepping,
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
@@ -107,14 +109,19 @@ class Judge:
             object_place=place,
             ended=ending.failed,
         )
-        return Judgement(moved, ending, self._reward(step, ending.diverged), memory.command.copy(), error)
+        scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
+        return Judgement(moved, ending, scored, memory.command.copy(), error)
 
-    def _filter(self, memory: Memory, moved: Motion, needed: Array) -> None:
+    def _filter(self, memory: Memory, moved: Motion) -> None:
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
         self._velocity[:, YAW_RATE] = moved.yaw_rate
         time_constant = self._task.reward.sync.filter_time
         memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
+
+    def _feel(self, memory: Memory, moved: Motion, needed: Array) -> None:
+        """Filters the force on the hands beyond what they need to overcome along the command, (n,) [N]."""
         force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
+        time_constant = self._task.reward.sync.filter_time
         memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(

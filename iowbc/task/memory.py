@@ -18,18 +18,8 @@ SCALARS = (
 )
 """Real numbers, one an environment."""
 OF_EPISODE = (
-    *(
-        "action",
-        "filtered_velocity",
-        "excess_force",
-        "lag",
-        "tracking",
-        "walked",
-        "commanded",
-        "covered",
-        "heading_error",
-        "total",
-    ),
+    *("action", "earlier_action", "filtered_velocity", "excess_force", "lag", "tracking"),
+    *("walked", "commanded", "covered", "heading_error", "total"),
 )
 """What begins at zero with every episode."""
 LONG_AGO = 1_000_000
@@ -58,6 +48,10 @@ class Memory:
     """Whether the episode has commands to walk, (n,) bool."""
     infeasible: Array
     """Whether the episode's crate resists more than the feet can hold against, (n,) bool."""
+    failed: Array
+    """Whether the episode of `failed_key` is still to be survived, (n,) bool."""
+    failed_key: Array
+    """Key of the last new episode that failed, (n,) uint64."""
     command: Array
     """C in force, rate-limited and clamped, (n, 11)."""
     goal: Array
@@ -76,6 +70,8 @@ class Memory:
     """θ_S_ref with the gait prior, (n, 15) [rad]."""
     action: Array
     """a_{t−1}, (n, 15)."""
+    earlier_action: Array
+    """a_{t−2}, (n, 15)."""
     filtered_velocity: Array
     """Low-passed v_sys in the plane, heading frame [m/s], and yaw rate [rad/s], (n, 3)."""
     excess_force: Array
@@ -114,6 +110,8 @@ class Memory:
             stepping=np.zeros(n, np.bool_),
             walking=np.zeros(n, np.bool_),
             infeasible=np.zeros(n, np.bool_),
+            failed=np.zeros(n, np.bool_),
+            failed_key=np.zeros(n, np.uint64),
             level=np.zeros((n, len(AXES))),
             played=np.zeros((n, len(AXES))),
             command=np.zeros((n, len(COMMAND))),
@@ -122,6 +120,7 @@ class Memory:
             posture=np.zeros((n, support)),
             support=np.zeros((n, support)),
             action=np.zeros((n, support)),
+            earlier_action=np.zeros((n, support)),
             filtered_velocity=np.zeros((n, 3)),
             excess_force=np.zeros((n, 2)),
             object_place=np.zeros((n, 3)),

@@ -1,11 +1,11 @@
-"""Pushes on the base at set times, for trials that ask how much a policy withstands."""
+"""Pushes on the base and pulls on the object at set times, for trials that ask how a policy responds."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from iowbc.arrays import Array, Indices
-from iowbc.task.episodes import PlannedPush
+from iowbc.task.episodes import PlannedPull, PlannedPush
 
 
 class PlannedPushes:
@@ -23,5 +23,33 @@ class PlannedPushes:
     def force(self, step: Indices, heading: Array) -> Array:
         """World force over the period that begins at `step` (n,), (n, 3) [N]; `heading`: commanded, (n,) [rad]."""
         forward, left = (self._strength * ((step >= self._first) & (step < self._last))[:, None]).T
-        cosine, sine = np.cos(heading), np.sin(heading)
-        return np.stack([cosine * forward - sine * left, sine * forward + cosine * left, np.zeros(len(step))], axis=1)
+        return _in_world(forward, left, heading)
+
+
+class PlannedPulls:
+    """Sinusoidal forces on the objects of n environments."""
+
+    def __init__(self, pulls: Sequence[PlannedPull | None], period: float) -> None:
+        """`period`: control period [s]."""
+        self.any = any(pull is not None for pull in pulls)
+        planned = [pull or PlannedPull(np.inf, 0.0, 1.0, (0.0, 0.0)) for pull in pulls]
+        self._begin = np.array([pull.begin for pull in planned])
+        self._end = self._begin + np.array([pull.duration for pull in planned])
+        self._rate = 2.0 * np.pi * np.array([pull.frequency for pull in planned])
+        self._force = np.array([pull.force for pull in planned])
+        self._period = period
+
+    def force(self, step: Indices, heading: Array) -> Array:
+        """World force over the period that begins at `step` (n,), taken in its middle, (n, 3) [N]; `heading`:
+        commanded, (n,) [rad]."""
+        time = (step + 0.5) * self._period
+        acting = (time > self._begin) & (time < self._end)
+        size = np.where(acting, np.sin(self._rate * np.where(acting, time - self._begin, 0.0)), 0.0)
+        forward, left = (self._force * size[:, None]).T
+        return _in_world(forward, left, heading)
+
+
+def _in_world(forward: Array, left: Array, heading: Array) -> Array:
+    """World vectors (n, 3) of horizontal ones in a heading frame."""
+    cosine, sine = np.cos(heading), np.sin(heading)
+    return np.stack([cosine * forward - sine * left, sine * forward + cosine * left, np.zeros(len(heading))], axis=1)

@@ -11,7 +11,7 @@ from iowbc.recipe.task.task import Task
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty, initial_levels, next_levels, played_levels
 from iowbc.task.endings import Ending
-from iowbc.task.episodes import Episode, PlannedPush
+from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
 from iowbc.task.memory import Memory
 from iowbc.task.progress import course
 
@@ -60,6 +60,11 @@ class Schedule:
         return [None] * len(self.key) if self._trials is None else [episode.push for episode in self._trials]
 
     @property
+    def pulls(self) -> list[PlannedPull | None]:
+        """The pull planned for each environment, if there is one."""
+        return [None] * len(self.key) if self._trials is None else [episode.pull for episode in self._trials]
+
+    @property
     def repeats(self) -> bool:
         """Whether a reset begins the same episodes again."""
         return self._trials is not None
@@ -72,7 +77,7 @@ class Schedule:
         """Begins new episodes: their keys, (k,)."""
         memory = self._memory
         memory.episode[which] += 1
-        key = random.absorb(self.key[which], memory.episode[which])
+        key = self._replayed(which, random.absorb(self.key[which], memory.episode[which]))
         self.episode_key[which] = key
         memory.steps[which] = 0
         memory.limit[which] = self._time_limits(which, key)
@@ -80,6 +85,15 @@ class Schedule:
         memory.walking[which] = ~standing
         memory.played[which] = played_levels(self._task.curriculum, memory.level[which], ~standing)
         return key
+
+    def _replayed(self, which: Indices, key: Keys) -> Keys:
+        """Keys of new episodes (k,), some replaced by that of the environment's failed episode."""
+        chance = self._task.curriculum.replay
+        if chance == 0.0 or self._trials is not None:
+            return key
+        memory = self._memory
+        again = memory.failed[which] & (random.uniform(key, "episode/replay", 1)[:, 0] < chance)
+        return np.where(again, memory.failed_key[which], key)
 
     def scales(self, which: Indices, key: Keys) -> dict[str, Array]:
         """How hard the simulation is to make new episodes, by name, (k,); trials say it themselves."""
@@ -118,6 +132,9 @@ class Schedule:
         moved = next_levels(curriculum, memory.level, memory.played, went)
         chosen = which[~ending.diverged[which]]
         memory.level[chosen] = moved[chosen]
+        lost, same = ending.failed[chosen], memory.failed_key[chosen] == self.episode_key[chosen]
+        memory.failed_key[chosen[lost]] = self.episode_key[chosen[lost]]
+        memory.failed[chosen] = lost | (memory.failed[chosen] & ~same)
 
     def set_levels(self, levels: Array) -> None:
         """Sets the curriculum levels (n, axes), from the next episodes on."""

@@ -30,6 +30,8 @@ class Admittance:
         self._damping = np.where(holding, held, pushed)
         self.rigid = bool(np.isinf(self._damping).all())
         """Whether no force changes any velocity."""
+        self.idle = self.rigid and recipe.force == 0.0
+        """Whether forces change nothing at all."""
 
     def _beyond(self, force: Array) -> tuple[Array, Array]:
         """Sizes of forces (n, 2) beyond the margin, (n,) [N], and the forces of these sizes, (n, 2) [N]."""
@@ -50,6 +52,8 @@ class Admittance:
     def unyielded(self, command: Array, force: Array) -> Array:
         """Size of the excess force beyond the margin and b·|v_coll|, or beyond the margin where b is infinite, no more
         than the largest that counts, (n,) [N]."""
+        if self._recipe.force == 0.0:
+            return np.zeros(len(command))
         speed = np.sqrt(np.vecdot(command, command))
         yielding = np.where(np.isinf(self._damping), 0.0, self._damping) * speed
         most = self._recipe.largest_force

@@ -121,6 +121,23 @@ def test_the_controller_is_found_by_its_recipes_name(tmp_path: Path, monkeypatch
     assert exported_folder("mine") == export
 
 
+def test_init_goes_on_with_what_was_cut_short_and_follows_no_link(folder: Path, command: Command) -> None:
+    assert command("init", "whole").returncode == 0
+    for name in ("recipes/full.yaml", "robots/g1"):
+        path = folder / "whole" / name
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    done = command("init", "whole")
+    assert (done.returncode, done.stdout.count("whole/")) == (0, 2)
+    assert not list((folder / "whole").rglob(".*"))
+    (folder / "linked" / "recipes").mkdir(parents=True)
+    (folder / "linked" / "recipes" / "full.yaml").symlink_to(folder / "elsewhere.yaml")
+    refused = command("init", "linked")
+    assert refused.returncode == 2
+    assert "linked/recipes/full.yaml: a link leads elsewhere" in refused.stderr
+    assert not (folder / "elsewhere.yaml").exists()
+    assert not (folder / "linked" / "robots").exists()
+
+
 def test_init_copies_recipes_and_a_robot_and_replaces_nothing(folder: Path, command: Command) -> None:
     done = command("init", "mine")
     assert done.returncode == 0, done.stderr

@@ -22,8 +22,8 @@ from iowbc.commands.status import print_status
 from iowbc.commands.sweep_plan import PlannedStage, plan_table
 from iowbc.commands.tables import folded, hanging
 from iowbc.pipeline.console.wording import figure
-from iowbc.pipeline.planner import Step
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Step
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 

@@ -2,6 +2,9 @@
 
 import io
 import os
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,10 +19,15 @@ from iowbc.commands.filming import Filming
 from iowbc.commands.in_training import in_training
 from iowbc.commands.play import _source, named_source
 from iowbc.errors import UsageError
+from iowbc.evaluation.play import requested_episode
+from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.recipe import Recipe
+from iowbc.stages.registry import STAGES
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_an_unfinished_training_is_told_and_played_from_its_checkpoint(folder: Path) -> None:
@@ -65,6 +73,38 @@ def test_only_a_policy_that_sees_s_priv_is_played_with_its_parts_in_a_users_file
     assert len(_source(artifact, None).world.recipe.task.observation.own) == told
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_film_that_is_terminated_leaves_no_part_of_it(tmp_path: Path, number: signal.Signals) -> None:
+    program = (
+        "import os, signal\nfrom pathlib import Path\nimport numpy as np\n"
+        "from iowbc.commands.interrupt import close_on_termination, leave\n"
+        "from iowbc.evaluation.films import Film\n"
+        "signal.signal(signal.SIGINT, leave)\nclose_on_termination()\n"
+        "with Film(Path('x.mp4'), 10) as film:\n"
+        "    while not Path('x.part.mp4').exists():\n"
+        "        film.add(np.zeros((32, 32, 3), np.uint8))\n"
+        f"    os.kill(os.getpid(), {int(number)})\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_play_that_is_terminated_leaves_no_part_of_its_film(tmp_path: Path) -> None:
+    export = next((Path(__file__).parents[2] / "runs" / "published" / "export").iterdir())
+    words = [sys.executable, "-m", "iowbc", "play", str(export), "--video", "x.mp4"]
+    playing = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    while not (tmp_path / "x.part.mp4").exists():
+        if playing.poll() is not None:
+            pytest.skip(f"nothing can be drawn here: {playing.communicate()[1].decode()}")
+        time.sleep(0.05)
+    playing.terminate()
+    assert playing.wait(60) == 130
+    assert list(tmp_path.glob("*.mp4")) == []
+    playing.communicate()
+
+
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filming, "INTERVAL", 0.0)
     stream = io.StringIO()
@@ -75,3 +115,25 @@ def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     with Filming(Console(file=silent), None) as told:
         told(5.0, 40.0)
     assert silent.getvalue() == ""
+
+
+def test_a_recipe_that_plans_cached_is_played_by_its_own_sequence_and_film_settings(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
+    own = tmp_path / "own.yaml"
+    own.write_text(
+        f"extends: {ROOT / 'recipes' / 'full.yaml'}\n"
+        "name: own\n"
+        "stages: [rg-dataset, rg-fit, teacher, distill, eval]\n"
+        "eval:\n"
+        "  sequence: [{duration: 2.0, ramp: 0.0}, {duration: 3.0, velocity: [0.3, 0.0, 0.0]}]\n"
+        "  video: {width: 96, height: 64}\n"
+    )
+    store, console = Store(Runs(tmp_path / "runs")), Console(file=io.StringIO())
+    source = named_source(store, console, str(own), None, "wide_box", STAGES)
+    assert source.policy.parent.name == "distill"
+    assert requested_episode(source.world.recipe, PlayRequest()).duration == 5.0
+    assert requested_episode(source.world.recipe, PlayRequest(scene="wide_box")).scene == "wide_box"
+    assert source.world.recipe.eval.video.width == 96
+    with pytest.raises(UsageError, match="did you mean 'wide_box'"):
+        named_source(store, console, str(own), None, "wide_bx", STAGES)

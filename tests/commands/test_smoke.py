@@ -47,6 +47,15 @@ def test_the_smoke_recipe_runs_in_an_empty_folder_and_is_cached_afterwards(smoke
 
 
 @pytest.mark.slow
+def test_a_run_goes_on_without_pictures_and_says_so_once(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "iowbc", "run", "smoke", "--until", "rg-dataset", *UNTRACKED]
+    environment = os.environ | {"MUJOCO_GL": "nonsense"}
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert (done.stdout + done.stderr).count("MUJOCO_GL=nonsense draws nothing") == 1
+
+
+@pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_a_sweep_of_it_on_ray_outlives_a_node_with_the_same_results(smoke: Path, tmp_path: Path) -> None:
     pytest.importorskip("ray", reason="the extra `cluster` brings Ray")

@@ -16,10 +16,11 @@ from typing import Any
 import pytest
 from network_watch import watched
 
-from iowbc.commands.ui import COLUMNS, view
+from iowbc.commands.ui import view
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.journal import Journal
 from iowbc.pipeline.tracking.tracker import DESCRIPTION
+from iowbc.stages.registry import STAGES
 
 PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 
@@ -57,7 +58,7 @@ def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
 
 def test_the_columns_are_metrics_that_stages_leave() -> None:
     columns = view()["selectedColumns"]
-    for stage, names in COLUMNS.items():
+    for stage, names in ((name, stage.presentation.columns) for name, stage in STAGES.items()):
         left = [json.loads(path.read_bytes())["metrics"] for path in PUBLISHED.glob(f"{stage}/*/summary.json")]
         for name in names:
             assert any(name in metrics for metrics in left), (stage, name)

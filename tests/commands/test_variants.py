@@ -9,9 +9,8 @@ from typing import Any, cast
 from made_up_trials import trials_of
 
 from iowbc.commands.compare import report_together
-from iowbc.commands.compared import film_of, record
+from iowbc.commands.members import film_of, points_of, record_comparison
 from iowbc.commands.named import Named
-from iowbc.commands.swept import points_of
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.report.runs import Run, grouped
@@ -33,7 +32,7 @@ def test_each_variant_runs_once_and_they_are_compared(folder: Path, command: Com
     assert rows[2][:5] == ["third", *["cached"] * 4]
     assert rows[2][5].replace(".", "").isdigit(), "eval has more trials: its rate is known"
     assert rows[2][7].startswith("~"), "export has another name: its time is like that of the other"
-    assert "2 recipes: 2 stages would run, 0 are shared, 10 cached; roughly " in planned
+    assert "2 recipes: 2 stages would run, 0 are shared, 10 cached; a guess: " in planned
     assert "`iowbc plan third` says why" in planned
     done = command("run", "both.yaml")
     assert done.returncode == 0, done.stderr
@@ -134,7 +133,7 @@ def test_the_film_of_a_comparison_is_found_by_its_runs_in_any_order(tmp_path: Pa
     runs = Runs(tmp_path)
     folder = runs.compared / "both"
     folder.mkdir(parents=True)
-    record(["first", "third"], folder)
+    record_comparison(["first", "third"], folder)
     assert film_of(runs, ["first", "third"]) is None, "none was made"
     (folder / "side_by_side.mp4").write_bytes(b"film")
     assert film_of(runs, ["third", "first"]) == folder / "side_by_side.mp4"

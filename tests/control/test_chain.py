@@ -9,19 +9,23 @@ import pytest
 from iowbc.control.chain import Chain, jacobian, rotated, rotated_back
 from iowbc.robot import rotations
 
-RANDOM = np.random.default_rng(0)
 LENGTH, ROWS = 4, 5
 
 
-def body(axis: Any) -> Any:
-    quaternion = rotations.normalized(RANDOM.normal(size=4))
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def body(axis: Any, random: np.random.Generator) -> Any:
+    quaternion = rotations.normalized(random.normal(size=4))
     return SimpleNamespace(
-        name="link", position=RANDOM.normal(size=3), quaternion=quaternion, hinge=SimpleNamespace(axis=np.array(axis))
+        name="link", position=random.normal(size=3), quaternion=quaternion, hinge=SimpleNamespace(axis=np.array(axis))
     )
 
 
-def unit() -> Any:
-    vector = RANDOM.normal(size=3)
+def unit(random: np.random.Generator) -> Any:
+    vector = random.normal(size=3)
     return vector / np.linalg.norm(vector)
 
 
@@ -47,10 +51,10 @@ def by_matrices(chain: list[Any], angle: Any) -> tuple[Any, Any, list[Any], list
     ],
     ids=["coordinate axes", "reversed axes", "axes of any direction"],
 )
-def test_points_axes_and_jacobian_are_those_of_the_matrices(axes: list[Any]) -> None:
-    pairs = [(unit(), unit()) if pair == "skew" else pair for pair in axes]
-    chains = [[body(pair[side]) for pair in pairs] for side in range(2)]
-    angle, grip = RANDOM.normal(size=(LENGTH, 2, ROWS)), RANDOM.normal(size=3)
+def test_points_axes_and_jacobian_are_those_of_the_matrices(axes: list[Any], random: np.random.Generator) -> None:
+    pairs = [(unit(random), unit(random)) if pair == "skew" else pair for pair in axes]
+    chains = [[body(pair[side], random) for pair in pairs] for side in range(2)]
+    angle, grip = random.normal(size=(LENGTH, 2, ROWS)), random.normal(size=3)
     frames = Chain(chains).frames(angle)
     end = frames[-1].origin + rotated(frames[-1].rotation, grip[:, None, None])
     columns = jacobian(frames, end)
@@ -64,25 +68,29 @@ def test_points_axes_and_jacobian_are_those_of_the_matrices(axes: list[Any]) -> 
             assert end[:, side, row] == pytest.approx(point)
 
 
-def test_rotating_back_undoes_a_rotation() -> None:
-    chain = Chain([[body([0, 0, 1]), body(unit())]])
-    rotation = chain.frames(RANDOM.normal(size=(2, 1, ROWS)))[-1].rotation
-    vector = RANDOM.normal(size=(3, 1, ROWS))
+def test_rotating_back_undoes_a_rotation(random: np.random.Generator) -> None:
+    chain = Chain([[body([0, 0, 1], random), body(unit(random), random)]])
+    rotation = chain.frames(random.normal(size=(2, 1, ROWS)))[-1].rotation
+    vector = random.normal(size=(3, 1, ROWS))
     assert rotated_back(rotation, rotated(rotation, vector)) == pytest.approx(vector)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_base_may_be_turned(axis: int) -> None:
-    chain, angle, base = Chain([[body([0, 0, 1])]]), RANDOM.normal(size=(1, 1, ROWS)), RANDOM.normal(size=(1, ROWS))
+def test_a_base_may_be_turned(axis: int, random: np.random.Generator) -> None:
+    chain, angle, base = (
+        Chain([[body([0, 0, 1], random)]]),
+        random.normal(size=(1, 1, ROWS)),
+        random.normal(size=(1, ROWS)),
+    )
     level, tilted = chain.frames(angle)[0], chain.frames(angle, chain.turned(axis, base))[0]
     matrices = rotations.axis_matrix(np.eye(3)[axis], base[0])
     assert pytest.approx(np.einsum("nij,jn->ni", matrices, level.origin[:, 0])) == tilted.origin[:, 0].T
 
 
-def test_a_body_without_a_hinge_is_fixed_to_the_one_before() -> None:
-    chain = [body([0, 0, 1]), body([1, 0, 0]), body([0, 1, 0])]
+def test_a_body_without_a_hinge_is_fixed_to_the_one_before(random: np.random.Generator) -> None:
+    chain = [body([0, 0, 1], random), body([1, 0, 0], random), body([0, 1, 0], random)]
     chain[1].hinge = None
-    angle, point = RANDOM.normal(size=(2, 1, 1)), RANDOM.normal(size=3)
+    angle, point = random.normal(size=(2, 1, 1)), random.normal(size=3)
     last = Chain([chain]).frames(angle)[-1]
     chain[1].hinge = SimpleNamespace(axis=np.array([1, 0, 0]))
     rotation, position, _, _ = by_matrices(chain, [angle[0, 0, 0], 0.0, angle[1, 0, 0]])
@@ -90,15 +98,15 @@ def test_a_body_without_a_hinge_is_fixed_to_the_one_before() -> None:
     assert carried.ravel() == pytest.approx(position + rotation @ point)
 
 
-def test_a_chain_ends_at_a_hinge() -> None:
-    stiff = body([1, 0, 0])
+def test_a_chain_ends_at_a_hinge(random: np.random.Generator) -> None:
+    stiff = body([1, 0, 0], random)
     stiff.hinge = None
     with pytest.raises(ValueError, match="'link' ends a joint chain but has no hinge"):
         Chain([[stiff]])
 
 
-def test_the_example_of_the_docstring() -> None:
-    upper, lower = body([0, 0, 1]), body([0, 1, 0])
+def test_the_example_of_the_docstring(random: np.random.Generator) -> None:
+    upper, lower = body([0, 0, 1], random), body([0, 1, 0], random)
     upper.quaternion = lower.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     upper.position, lower.position = np.zeros(3), np.array([0.2, 0.0, 0.0])
     frames = Chain([[upper, lower]]).frames(np.full((2, 1, 1), np.pi / 2))

@@ -52,6 +52,15 @@ def test_soles_swing_along_a_half_wave() -> None:
     assert height == pytest.approx(np.array([[0.0, 0.0], [0.08, 0.08 * np.sin(np.pi / 4)]]), abs=1e-12)
 
 
+def test_a_profile_at_rest_lifts_off_and_lands_without_speed() -> None:
+    phase = np.linspace(0.0, 1.0, 10_001)[:-1, None]
+    rest = gait.swing_height(phase, GaitPrior(profile="rest"))[:, 0]
+    sine = gait.swing_height(phase, GaitPrior())[:, 0]
+    assert rest.max() == pytest.approx(sine.max()) == pytest.approx(0.08)
+    speed = np.abs(np.diff(rest)) / np.diff(phase[:, 0])
+    assert speed[[5800, 5801, -1]] == pytest.approx(0.0, abs=0.01), "the sine has 0.6 m a stride"
+
+
 def test_the_phase_signal_is_on_the_circle_or_zero_at_rest() -> None:
     signal = gait.phase_signal(np.array([0.25, 0.25]), np.array([True, False]))
     assert signal[0] == pytest.approx([1.0, 0.0], abs=1e-12)

@@ -175,8 +175,14 @@ def changed(exported: Path, place: Path, **entries: Any) -> Path:
 
 
 def test_a_contract_of_another_format_is_refused(exported: Path, tmp_path: Path) -> None:
-    with pytest.raises(ContractBroken, match="not a contract of format 4"):
-        read_contract(changed(exported, tmp_path / "later", format=5))
+    with pytest.raises(ContractBroken, match=r"(?s)not a contract of format 4.*; export again"):
+        read_contract(changed(exported, tmp_path / "earlier", format=3))
+
+
+@pytest.mark.parametrize("entries", [{"format": 5}, {"format": 5, "joints": 3}, {"torque_limits": [1.0]}])
+def test_a_contract_of_a_newer_version_is_called_that(exported: Path, tmp_path: Path, entries: dict[str, Any]) -> None:
+    with pytest.raises(ContractBroken, match=r"made by a newer version of iowbc than \d.*install that here"):
+        read_contract(changed(exported, tmp_path / "later", **entries))
 
 
 @pytest.mark.parametrize(

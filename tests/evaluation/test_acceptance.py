@@ -28,7 +28,8 @@ def played(
     grip[:, [2, 5]] = -0.5 * in_hands * MASS * GRAVITY
     path[:, 0] = covered * WALK[0] * MEASURE.control_frequency**-1 * np.arange(STEPS)
     moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, beside, 1.0]))
-    drawn = {"object_mass": np.array([MASS])}
+    values = {"object_mass": MASS, "ground_friction": 1.0, "rolling_resistance": 0.0}
+    drawn = {name: np.array([value]) for name, value in values.items()}
     outcome = Outcome(moved, 8.0, fallen=fallen, dropped=False, finished=not fallen, drawn=drawn)
     commands = script(8.0, WALK if covered else (0.0, 0.0, 0.0))
     return Episode("lift", 0, 8.0, {}, commands), outcome

@@ -13,22 +13,24 @@ import torch
 from stage_jobs import Backwards, make_job
 
 from iowbc.errors import Interrupted
+from iowbc.evaluation.paper import LIFTING
 from iowbc.evaluation.report.aggregate import COSTS
 from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.plan import planned_sweeps
 from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-from iowbc.evaluation.trials.quick import FIGURES, SCALES, QuickEvaluation, figures, quick_trials
+from iowbc.evaluation.trials.quick import FIGURES, QuickEvaluation, figures, quick_trials
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.evaluation.trials.table import replayed
 from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
+from iowbc.recipe.check import Check
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.stages import evaluate
-from iowbc.stages.spreading import play_everywhere
+from iowbc.stages import eval as evaluate
+from iowbc.stages.eval import play_everywhere
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 
@@ -39,8 +41,14 @@ SOMETIMES = (
     "partner_weight_share",
     "weight_in_hands",
     "object_jerk",
+    "E_v_partner",
+    "partner_work",
+    *(f"{place}_force_{part}" for place in ("hand", "handle") for part in ("mean", "p95", "peak")),
+    *("push_force", "push_force_share", "impedance_real", "impedance_imag"),
+    *("touchdown_speed", "touchdown_speed_peak", "pressure_margin", "pressure_margin_low"),
+    *("friction_use", "friction_use_high"),
 )
-"""Figures that a trial without a walk, or without an object in the hands for a second, does not have."""
+"""Figures that a trial without a walk, an object in the hands for a second, a partner or a pull does not have."""
 QUESTION = {
     "name": "test",
     "task": {"references": {"use_rg": False}},
@@ -48,8 +56,14 @@ QUESTION = {
         "trials": 2,
         "label": "w/o RG",
         "sequence": [{"duration": 0.3, "ramp": 0.0}, {"duration": 0.1, "velocity": [0.3, 0, 0], "ramp": 0.1}],
-        "lifting": {"masses": [0, 4], "partner_shares": [0]},
-        "pushing": {"scene": "push", "masses": [20], "rolling_resistance": 0.05, "partner_shares": [0]},
+        "lifting": {"masses": [4], "partner_shares": [0]},
+        "pushing": {
+            "scene": "push",
+            "masses": [20],
+            "rolling_resistance": 0.05,
+            "partner_shares": [0],
+            "no_object": False,
+        },
         "batch": 4,
         "heavy": [{"name": "18 kg tyre", "scene": "tyre", "mass": 18.0}],
         "video": {"count": 1, "width": 96, "height": 64, "fps": 10, "duration": 1.0},
@@ -191,7 +205,7 @@ def test_a_sweep_goes_on_after_its_last_finished_mass(done: Job, recipe: Recipe,
 
 
 def test_a_trial_does_not_depend_on_the_batch_it_is_played_in(recipe: Recipe, student: Path, done: Job) -> None:
-    trials = [trial for sweep in planned_sweeps(recipe) for trial in sweep.trials(sweep.sweep.masses)]
+    trials = [trial for sweep in planned_sweeps(recipe) for trial in sweep.named()]
     table = pd.read_parquet(done.out / "trials.parquet")
     world = Specification(recipe, done.robot)
     for place, row in enumerate(table.query("kind != 'heavy'").to_dict("records")):
@@ -239,15 +253,19 @@ def test_the_quick_evaluation_plays_the_same_trials_again(recipe: Recipe, studen
         assert np.mean(own) == pytest.approx(first[error])
 
 
-def test_the_score_of_a_quick_evaluation_is_one_without_error_and_a_half_at_the_papers() -> None:
+def test_the_score_of_a_quick_evaluation_is_one_without_error_and_a_half_at_its_scales() -> None:
+    check = Check()
+    assert check.scales == LIFTING[0.0]["IO-WBC"], "the paper's own without a load"
     perfect = {**dict.fromkeys(FIGURES, 1.0), **dict.fromkeys(ERRORS, 0.0), "upright": 1.0}
-    assert figures([perfect])["score"] == 1.0
-    assert figures([perfect | SCALES])["score"] == pytest.approx(0.5)
-    assert figures([perfect, perfect | {"upright": 0.0}])["score"] == 0.5
-    assert figures([perfect | {"transport_robot": np.nan}])["transport"] == 0.0
+    assert figures([perfect], check)["score"] == 1.0
+    assert figures([perfect | dict(zip(ERRORS, check.scales, strict=True))], check)["score"] == pytest.approx(0.5)
+    coarse = Check(scales=(1.0, 1.0, 1.0, 1.0))
+    assert figures([perfect | dict.fromkeys(ERRORS, 1.0)], coarse)["score"] == pytest.approx(0.5)
+    assert figures([perfect, perfect | {"upright": 0.0}], check)["score"] == 0.5
+    assert figures([perfect | {"transport_robot": np.nan}], check)["transport"] == 0.0
     fallen = perfect | {"survived": 0.0, "upright": 0.9}
-    assert figures([fallen])["score"] == pytest.approx(0.9)
-    assert figures([perfect, fallen], fall=0.5)["score"] == pytest.approx((1.0 + 0.45) / 2)
+    assert figures([fallen], check)["score"] == pytest.approx(0.9)
+    assert figures([perfect, fallen], Check(fall=0.5))["score"] == pytest.approx((1.0 + 0.45) / 2)
 
 
 def test_progress_grows_within_a_batch(recipe: Recipe, student: Path, done: Job, tmp_path: Path) -> None:
@@ -292,7 +310,7 @@ def test_the_teacher_can_be_evaluated_too(student: Path, tmp_path: Path) -> None
     save_network(TeacherNetwork(**architecture), architecture, tmp_path, "teacher", {})
     finished = job(recipe, tmp_path, tmp_path / "job")
     evaluate.run(finished)
-    assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"]
+    assert pd.read_parquet(finished.out / "trials.parquet")["policy"].tolist() == ["teacher"] * 2
 
 
 def test_a_student_that_no_stage_trains_is_refused_before_anything_runs() -> None:
@@ -306,7 +324,7 @@ def test_a_student_that_no_stage_trains_is_refused_before_anything_runs() -> Non
 def test_a_sweep_goes_on_while_something_survives(recipe: Recipe, student: Path, tmp_path: Path) -> None:
     asked = {
         **QUESTION["eval"],  # type: ignore[dict-item]
-        "lifting": {"masses": [1], "beyond": {"step": 1, "limit": 3}, "partner_shares": [0, 0.5]},
+        "lifting": {"masses": [1], "beyond": {"step": 1, "limit": 3}, "partner_shares": [0, 0.5], "no_object": False},
         "pushing": None,
         "heavy": [],
         "trials": 1,

@@ -7,13 +7,13 @@ import pytest
 from made_up_trials import DT, GAIT_STEPS, MEASURE, script, trace
 
 from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average, wrapped
-from iowbc.evaluation.trials.metrics import jerk, trial_metrics
+from iowbc.evaluation.trials.metrics import Met, jerk, second_difference, trial_metrics
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.task.commands.script import CommandScript
 
 
-def metrics_of(signals: Trace, commands: CommandScript | None = None, weight: float = 0.0) -> dict[str, float]:
-    return trial_metrics(signals, commands or script(), MEASURE, weight)
+def metrics_of(signals: Trace, commands: CommandScript | None = None) -> dict[str, float]:
+    return trial_metrics(signals, commands or script(), MEASURE, Met())
 
 
 def test_a_perfect_trial_has_no_error() -> None:
@@ -112,6 +112,32 @@ def test_jerk_is_the_third_derivative_of_the_path() -> None:
     cubic = np.stack([0.5 * time**3, np.zeros(50), np.zeros(50)], axis=1)
     assert jerk(cubic, DT) == pytest.approx(3.0)
     assert np.isnan(jerk(cubic[:3], DT))
+
+
+def test_the_second_difference_of_the_action_is_that_of_a_parabola_and_none_of_a_line() -> None:
+    steps = np.arange(50.0)
+    action = np.stack([0.5 * 0.01 * steps**2, 0.3 * steps], axis=1)
+    assert second_difference(action) == pytest.approx(0.01 / 2**0.5), "one of two joints, root mean square"
+    metrics = metrics_of(replace(trace(50), action=action))
+    assert metrics["action_second_difference"] == pytest.approx(0.01 / 2**0.5)
+    assert np.isnan(second_difference(action[:2]))
+
+
+def test_torque_is_measured_against_the_limit_of_each_joint_and_the_worst_one_counts() -> None:
+    torque = np.zeros((400, 2))
+    torque[:, 0] = 20.0 * (-1.0) ** np.arange(400)  # of 80 N·m
+    torque[::2, 1] = 30.0  # half of the time, of 100 N·m
+    metrics = metrics_of(replace(trace(), joint_torque=torque))
+    assert metrics["torque_rms/hip"] == pytest.approx(0.25)
+    assert metrics["torque_rms/knee"] == pytest.approx(0.3 / 2**0.5)
+    assert metrics["torque_rms"] == metrics["torque_rms/hip"]
+
+
+def test_the_raw_velocity_error_is_told_of_the_moving_part_too() -> None:
+    walk = script(4.0).segments + script(4.0, (0.4, 0.0, 0.0)).segments
+    metrics = metrics_of(trace(), CommandScript(walk))
+    assert metrics["E_v_raw_moving"] == pytest.approx(0.4, abs=0.002)
+    assert np.isnan(metrics_of(trace())["E_v_raw_moving"])
 
 
 def test_moving_average_is_centred_and_shortened_at_the_ends() -> None:

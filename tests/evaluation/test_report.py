@@ -16,7 +16,13 @@ from iowbc.evaluation.report.differences import difference_table, mean_differenc
 from iowbc.evaluation.report.error_tables import error_table, moving_table
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness, style_of
 from iowbc.evaluation.report.interquartile import interquartile_table
-from iowbc.evaluation.report.other_tables import capacity_table, joint_table, push_table, success_table
+from iowbc.evaluation.report.other_tables import (
+    capacity_table,
+    contact_table,
+    joint_table,
+    push_table,
+    success_table,
+)
 from iowbc.evaluation.report.report import write_report
 from iowbc.evaluation.report.tables import latex, markdown
 from iowbc.evaluation.trials.errors import ERRORS
@@ -39,7 +45,7 @@ def test_fails_is_printed_only_where_none_survived() -> None:
     assert "0.100" in lines["7 kg"]
     assert "1/5" in lines["7 kg"]
     assert "Fails" not in lines["7 kg"]
-    assert lines["8 kg"].count("Fails") == 8, "ours and the paper's"
+    assert lines["8 kg"].count("Fails") == 9, "ours, one of them raw, and the paper's"
 
 
 def test_kept_is_the_weight_in_the_hands_or_how_often_a_pushed_object_was_not_lost() -> None:
@@ -56,9 +62,61 @@ def test_kept_is_the_weight_in_the_hands_or_how_often_a_pushed_object_was_not_lo
 def test_the_papers_numbers_stand_beside_ours() -> None:
     summary = aggregate(trials_of("IO-WBC", "pushing", {30.0: 5}))
     table = error_table(summary, "pushing")
-    assert "| 0.131 (2.29) | 0.016 (18.75) | 0.225 (1.33) | 0.143 (2.10) |" in markdown(table)
+    unknown = "the paper's μ is unknown"
+    assert f"| 0.131 (2.29) | 0.016 (18.75) | 0.225 (1.33; {unknown}) | 0.143 (2.10) |" in markdown(table)
     assert table.numbers["ratio_E_alpha"].iloc[0] == pytest.approx(0.3 / 0.131)
     assert table.numbers["paper_E_v"].iloc[0] == 0.225
+
+
+def test_the_papers_pushes_never_stand_beside_ours_without_their_unknown_friction_and_ours_in_their_regime() -> None:
+    grid = [
+        trials_of("IO-WBC", "map", {60.0: count}, f"μ {friction:g}", error=error).assign(rolling_resistance=friction)
+        for friction, count, error in ((0.06, 5, 0.05), (0.1, 5, 0.2), (0.15, 0, 0.3))
+    ]
+    pushes = trials_of("IO-WBC", "pushing", {0.0: 5, 60.0: 5})
+    summary = aggregate(pd.concat([pushes, trials_of("IO-WBC", "lifting", {4.0: 5}), *grid]))
+    said = "the paper's μ is unknown; ours in its regime 0.400 at μ 0.1, Fails at μ 0.15"
+    beside = paper_table(summary)
+    assert beside is not None
+    for table in (error_table(summary, "pushing"), beside):
+        loaded = [row for row in table.rows if any("0.486" in cell for cell in row)]
+        assert len(loaded) == 1
+        assert all(said in next(cell for cell in row if "0.486" in cell) for row in loaded), table.name
+        assert sum("unknown" in cell for row in table.rows for cell in row) == 1, "neither lifts nor empty hands"
+
+
+def test_the_row_without_an_object_says_so() -> None:
+    trials = pd.concat(
+        [trials_of("IO-WBC", "lifting", {0.0: 5}, "no object"), trials_of("IO-WBC", "lifting", {0.05: 5, 4.0: 5})]
+    )
+    assert [row[0] for row in error_table(aggregate(trials), "lifting").rows[:3]] == ["no object", "0.05 kg", "4 kg"]
+
+
+def test_the_velocity_error_stands_in_the_tables_raw_too() -> None:
+    summary = aggregate(trials_of("IO-WBC", "lifting", {4.0: 5}).assign(E_v_raw=0.77, E_v_raw_moving=0.88))
+    beside = paper_table(summary)
+    assert beside is not None
+    for table, value in (
+        (error_table(summary, "lifting"), "0.770"),
+        (moving_table(summary, "lifting"), "0.880"),
+        (beside, "0.770"),
+    ):
+        assert table.rows[0][table.head.index("E_v raw [m/s]")] == value
+        assert table.head.index("E_v raw [m/s]") == table.head.index("E_v [m/s]") + 1
+
+
+def test_trials_of_an_earlier_version_lack_what_it_did_not_record() -> None:
+    later = ["E_v_raw_moving", "hand_force_peak", "touchdown_speed", "torque_rms/hip", "torque_rms/knee"]
+    summary = aggregate(trials_of("IO-WBC", "lifting", {4.0: 5}).drop(columns=later))
+    assert summary[["E_v_raw_moving", "hand_force_peak", "torque_rms"]].isna().all(axis=None)
+    assert contact_table(summary).rows[0][2:4] == ("–", "1")
+    assert moving_table(summary, "lifting").rows[0][5] == "–"
+
+
+def test_the_joint_that_is_strained_most_is_named() -> None:
+    summary = aggregate(trials_of("IO-WBC", "lifting", {4.0: 5}))
+    assert (summary["torque_rms"].iloc[0], summary["torque_rms_joint"].iloc[0]) == (pytest.approx(0.3), "knee")
+    assert contact_table(summary).rows[0][-1] == "30 % (knee)"
 
 
 def test_the_papers_numbers_are_found_by_label_and_left_out_where_it_knows_none() -> None:
@@ -119,7 +177,7 @@ def test_latex_groups_rows_and_escapes() -> None:
     trials = pd.concat([trials_of(name, "lifting", {0.0: 5, 4.0: 5}) for name in VARIANTS])
     text = latex(error_table(aggregate(trials), "lifting"))
     assert text.count(r"\multirow[c]{4}{*}") == 2
-    assert text.count(r"\cline{1-14}") == 3
+    assert text.count(r"\cline{1-15}") == 3
     assert "±" not in text
     assert "95 \\% interval" in text
     assert "$E_{\\alpha}$ & $E_{h}$" in text
@@ -144,7 +202,7 @@ def test_report_writes_every_table_and_figure(variants: tuple[str, ...], tmp_pat
     assert len(summary) == 8 * len(variants)
     names = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*")}
     tables = ["lifting", "lifting_moving", "pushing", "pushing_moving", "heavy", "heavy_errors", "stagnation"]
-    tables += ["paper", "capacity", "pushes", "joints"]
+    tables += ["paper", "capacity", "pushes", "joints", "contact"]
     tables += ["differences", "interquartile"] if len(variants) > 1 else []
     assert names == {
         *(f"tables/{name}.{kind}" for name in tables for kind in ("md", "tex", "csv")),
@@ -193,8 +251,8 @@ def test_every_error_table_says_what_standing_still_scores() -> None:
         moving_table(summary, "lifting"),
     ):
         (row,) = [row for row in table.rows if row[1] == "stands still"]
-        assert row[2:6] == ("0.250",) * 4, table.name
-    assert "| any | stands still | 0.250 | 0.250 | 0.250 | 0.250 | – | none | 0.00 |" in markdown(
+        assert row[2:7] == ("0.250",) * 5, table.name
+    assert "| any | stands still | 0.250 | 0.250 | 0.250 | 0.250 | 0.250 | – | none | 0.00 |" in markdown(
         error_table(summary, "lifting")
     )
 
@@ -239,12 +297,26 @@ def test_errors_differ_in_pairs_of_the_same_trial() -> None:
 
 
 def test_significance_is_that_of_the_textbooks() -> None:
-    mean, half, p = mean_difference(pd.Series([0.1, 0.2, 0.3, 0.4, 0.5]))
+    differences = pd.Series([0.1, 0.2, 0.3, 0.4, 0.5])
+    mean, half, p = mean_difference(differences, pd.Series(range(5)))
     assert (mean, half) == pytest.approx((0.3, 0.1963), abs=1e-4)
     assert p == pytest.approx(0.01324, abs=1e-4)
-    assert all(map(np.isnan, mean_difference(pd.Series([], dtype=float))))
-    better = pd.DataFrame({"succeeded_variant": [True] * 6, "succeeded_reference": [False] * 6})
+    assert all(map(np.isnan, mean_difference(pd.Series([], dtype=float), pd.Series([], dtype=int))))
+    better = pd.DataFrame({"trial": range(6), "succeeded_variant": [True] * 6, "succeeded_reference": [False] * 6})
     assert success_p(better) == pytest.approx(2 * 0.5**6)
+
+
+def test_ten_masses_in_the_same_five_worlds_are_five_worlds() -> None:
+    trials = [trials_of(name, "lifting", {float(mass): 5 for mass in range(1, 11)}) for name in ("IO-WBC", "WBC")]
+    trials[1]["E_v"] += 0.1 + 0.02 * trials[1]["trial"]
+    trials[1]["succeeded"] = False
+    table = difference_table(pd.concat(trials))
+    assert table is not None
+    row = table.numbers.iloc[0]
+    worlds = 0.1 + 0.02 * np.arange(5)
+    assert row["E_v"] == pytest.approx(worlds.mean())
+    assert row["E_v_p"] == pytest.approx(mean_difference(pd.Series(worlds), pd.Series(range(5)))[2])
+    assert row["success_p"] == pytest.approx(2 * 0.5**5), "of fifty pairs it would be 2e-15"
 
 
 def test_the_largest_push_survived_is_told_by_direction() -> None:

@@ -13,7 +13,7 @@ from iowbc.evaluation.trials.table import survived
 from iowbc.recipe.evaluation.success import Success
 from iowbc.task.record.signals import SIGNALS, trial_signals
 
-WIDTHS = SIGNALS | trial_signals(29)
+WIDTHS = SIGNALS | trial_signals(29, 15)
 
 
 class CountingEnvironment:

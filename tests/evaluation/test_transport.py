@@ -97,6 +97,7 @@ def test_success_asks_for_transport_of_robot_and_object() -> None:
 
 def test_stagnation_asks_for_posture_and_not_for_transport() -> None:
     stuck = {"E_alpha": 0.1, "E_h": 0.01, "transport_robot": 0.0, "transport_object": 0.0}
+    stuck |= {"push_force_share": 0.6, "foot_slip": 0.5, "seconds": 10.0}
     assert succeeded(Success(), "stagnation", stuck)
     assert not succeeded(Success(), "stagnation", stuck | {"E_alpha": 0.4})
     assert not succeeded(Success(), "stagnation", stuck | {"E_h": 0.2})

@@ -9,7 +9,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, roll
 
 MIRRORS = (
@@ -59,8 +59,8 @@ class PointMasses(VecEnv):  # type: ignore[misc]
         self.masses[ended], self.age[ended] = self.start[ended], 0
         return self.observed(), reward, ended, infos
 
-    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
-        return roll(Buffered(self), pilot.part(0, 8), steps)
+    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+        return roll(Buffered(self), rollout_policy.part(0, 8), steps)
 
     def statistics(self) -> dict[str, float]:
         mean = self.total[0] / max(self.total[1], 1)

@@ -19,7 +19,9 @@ from iowbc.learning.teacher import TeacherTraining
 from iowbc.learning.unfinished import unfinished_policy
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
-from iowbc.rollouts.pilots import Explorer
+from iowbc.rollouts.rollout_policies import ExploringPolicy
+
+pytestmark = pytest.mark.integration
 
 SEEN, LENGTH = 2, 4
 """Of a mass its position and velocity are observed; the distance is privileged."""
@@ -59,7 +61,7 @@ def test_the_rows_of_a_rollout_are_those_of_its_steps() -> None:
     noise = np.random.default_rng(0).normal(size=(30, 8, 1)).astype(np.float32)
     np.testing.assert_array_equal(whole.reset(), single.reset())
     for _ in range(2):
-        found = whole.roll(Explorer(student, noise, 1), 30)
+        found = whole.roll(ExploringPolicy(student, noise, 1), 30)
         histories = found.observation[:-1, :, : LENGTH * SEEN].reshape(30, 8, LENGTH, SEEN)
         expected = student(histories) + noise
         np.testing.assert_allclose(found.action, expected, rtol=1e-6, atol=4e-6, err_msg="acts on what it tells")

@@ -101,7 +101,9 @@ def students_training(symmetry: Symmetry, **changes: Any) -> tuple[StudentTraini
         steps=2560,
         learning_rate=2e-3,
     ).model_copy(update=changes)
-    return StudentTraining(settings, PointMasses(), teacher, architecture, rows, symmetry, seed=0), teacher
+    return StudentTraining(
+        settings, PointMasses(), [teacher], np.zeros(8, int), architecture, rows, symmetry, seed=0
+    ), teacher
 
 
 @pytest.mark.parametrize("symmetry", ["construction", "none"])

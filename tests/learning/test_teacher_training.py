@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import torch
 from point_masses import MIRRORS, SETTINGS, PointMasses
+from stable_baselines3 import PPO
 
 from iowbc.learning import ppo
 from iowbc.learning.gaussian import log_density
@@ -165,7 +166,7 @@ def test_the_network_that_is_kept_acts_as_the_trained_policy_and_as_its_zip_for_
     own = some.model.policy.get_distribution(torch.from_numpy(raw)).mode()
     torch.testing.assert_close(network(torch.from_numpy(raw)), own, rtol=1e-5, atol=1e-6)
     some.model.save(tmp_path / "teacher_sb3.zip")
-    loaded = ppo.Learner.load(tmp_path / "teacher_sb3.zip", device="cpu")
+    loaded = PPO.load(tmp_path / "teacher_sb3.zip", device="cpu")
     action, _ = loaded.predict(raw, deterministic=True)
     np.testing.assert_allclose(action, own.detach().numpy().clip(-1, 1), rtol=1e-5, atol=1e-6)
 

@@ -21,6 +21,7 @@ from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.tracking import tracker as tracking
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import DESCRIPTION
+from iowbc.stages import registry as real
 
 CHECKPOINT = "checkpoint.one"
 STARTED = "started_at.json"
@@ -82,15 +83,23 @@ def stage(
     reads: tuple[str, ...],
     slice: tuple[str, ...],
     counts: tuple[str, ...] = (),
-    starts_from: str | None = None,
 ) -> Stage:
     """A counting stage that reads the others that its recipe has."""
 
     def known(recipe: Recipe) -> tuple[str, ...]:
         return tuple(read for read in reads if read in recipe.stages)
 
-    run, results = counting(name), ("result.json",)
-    return Stage(name, 1, slice, reads=known, run=run, results=results, counts=counts, starts_from=starts_from)
+    return Stage(
+        name,
+        1,
+        slice,
+        reads=known,
+        run=counting(name),
+        results=("result.json",),
+        counts=counts,
+        borrows=real.STAGES[name].borrows,
+        presentation=real.STAGES[name].presentation,
+    )
 
 
 STAGES = {
@@ -98,7 +107,7 @@ STAGES = {
     for made in (
         stage("rg-dataset", (), ("seed", "rg")),
         stage("rg-fit", ("rg-dataset",), ("seed", "rg")),
-        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), ("teacher.steps",), "teacher.start"),
+        stage("teacher", ("rg-fit",), ("seed", "simulation", "task", "teacher"), ("teacher.steps",)),
         stage("distill", ("rg-fit", "teacher"), ("distill",)),
         stage("eval", ("distill",), ("eval",), counts=("eval.trials",)),
         stage("export", ("distill",), ("name", "export")),

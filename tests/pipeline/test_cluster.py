@@ -91,7 +91,6 @@ def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: S
     sweep.wait("was lost", 1)
     sweep.gate.touch()
     assert command.finish() == 0, command.errors
-    assert any(re.search(r"a piece took \d+\.\d s on \S+, the others \d+\.\d s", sweep.log(seed)) for seed in range(3))
 
     assert sweep.workplace.command(*WORDS, "--runs", "here").code == 0
     stored = {

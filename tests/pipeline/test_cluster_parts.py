@@ -100,7 +100,7 @@ def test_a_piece_is_refused_by_a_node_that_is_not_as_the_driver(strange: Identit
 
 
 class Heard:
-    """A desk that keeps what it is told, and wants the second who tells to stop."""
+    """A mailbox that keeps what it is told, and wants the second who tells to stop."""
 
     def __init__(self) -> None:
         self.told: list[list[Any]] = []

@@ -2,18 +2,24 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import fake_stages
 import pytest
 from workplace import RECIPE, Workplace
 
+from iowbc.commands.sweep_plan import time_of
 from iowbc.errors import RecipeError
 from iowbc.pipeline import planner as planning
+from iowbc.pipeline.code import stage_code
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.ingredients import slice_value, stage_code
-from iowbc.pipeline.store.digests import canonical_json, code_digests, data_digest
+from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.store.artifact import MANIFEST, Manifest, write_manifest
+from iowbc.pipeline.store.digests import canonical_json, data_digest, syntax_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.workspace import Workspace
+
+pytestmark = pytest.mark.unit
 
 
 def test_a_first_plan_says_that_nothing_is_stored(workplace: Workplace) -> None:
@@ -203,6 +209,28 @@ def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_p
     assert again.record["done"] == 0, "a forced attempt begins anew"
 
 
+def rewritten(folder: Path, **entries: Any) -> None:
+    """The manifest of an artifact with other entries."""
+    manifest = Manifest.model_validate_json((folder / MANIFEST).read_bytes())
+    write_manifest(folder, manifest.model_copy(update=entries))
+
+
+def test_a_time_is_a_range_over_the_last_runs_here_and_a_guess_where_there_are_none(workplace: Workplace) -> None:
+    for seed, seconds in enumerate((100.0, 300.0, 200.0)):
+        rewritten(workplace.run(f"teacher.seed={seed}")["teacher"].folder, seconds=seconds)
+    step = workplace.plan("teacher.seed=9")["teacher"]
+    assert (step.expected, step.roughly) == (200.0, None)
+    assert [step.expected * end for end in step.spread] == pytest.approx([80.0, 375.0])
+    assert time_of([step]) == "80 s to 6 min"
+    for artifact in workplace.store.artifacts("teacher"):
+        rewritten(artifact.folder, host="elsewhere")
+    step = workplace.plan("teacher.seed=9")["teacher"]
+    assert step.expected is None
+    assert step.roughly in (100.0, 200.0, 300.0)
+    assert step.rate_of == "small on another machine"
+    assert time_of([step]).startswith("a guess: ")
+
+
 def test_where_more_differs_the_time_of_what_differs_least_is_told_as_rough(workplace: Workplace) -> None:
     made = {name: artifact.manifest.seconds for name, artifact in workplace.run().items()}
     step = workplace.plan("name=other", "teacher.steps=40960", "teacher.gamma=0.9")["teacher"]
@@ -252,19 +280,13 @@ def test_changed_code_reruns_the_stage_when_asked(changing_code: Workplace) -> N
 
 def test_comments_and_docstrings_are_not_code(tmp_path: Path) -> None:
     def digest(text: str) -> str:
-        part = tmp_path / str(len(list(tmp_path.iterdir()))) / "part"
-        part.mkdir(parents=True)
-        (part / "module.py").write_text(text)
-        return code_digests(part.parent, ["part"])["part"]
+        module = tmp_path / f"{len(list(tmp_path.iterdir()))}.py"
+        module.write_text(text)
+        return syntax_digest(module)
 
     first = digest('"""Doc."""\ndef f(x):\n    """Twice."""\n    return 2 * x\n')
     assert digest("def f(x):\n    # twice\n    return 2 * x\n") == first
     assert digest("def f(x):\n    return 3 * x\n") != first
-
-
-def test_a_part_of_the_package_that_does_not_exist_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="no subpackage or module 'nothing'"):
-        code_digests(tmp_path, ["nothing"])
 
 
 def test_a_key_does_not_depend_on_the_order_of_what_is_hashed() -> None:

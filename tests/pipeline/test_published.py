@@ -1,11 +1,14 @@
 """What was published with the repository is used like what was made here, and never changed."""
 
 import shutil
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from workplace import Workplace
 
+from iowbc import files
 from iowbc.errors import UsageError
 from iowbc.pipeline.store import publishing
 
@@ -133,3 +136,45 @@ def test_a_repository_that_grows_too_large_is_refused(cloned: Workplace, monkeyp
     monkeypatch.setattr(publishing, "LARGEST_REPOSITORY", 1000)
     with pytest.raises(UsageError, match="more than the 0 MB"):
         publishing.published_size(cloned.store.runs)
+
+
+def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(
+    cloned: Workplace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs, published = cloned.store.runs, cloned.store.find_any
+    teacher, fit = (next((runs.published / stage).iterdir()) for stage in ("teacher", "rg-fit"))
+    artifact, other = published("teacher", teacher.name), published("rg-fit", fit.name)
+    assert artifact is not None
+    assert other is not None
+
+    def dies(source: object, target: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(files, "move_folder", dies)
+    with pytest.raises(KeyboardInterrupt):
+        publishing.publish(runs, artifact)
+    monkeypatch.undo()
+    (teacher.parent / f".{'a' * 64}.4711").mkdir()
+    assert {path.name for path in teacher.parent.iterdir()} == {
+        f".{teacher.name}.old",
+        f".{teacher.name}.new",
+        f".{'a' * 64}.4711",
+    }
+    ignored = ["git", "check-ignore", "-q", "--no-index", f"../../runs/published/teacher/.{teacher.name}.old"]
+    assert subprocess.run(ignored, cwd=Path(__file__).parent, check=False).returncode == 0
+    removed = cloned.command("gc", "--unused").output
+    assert removed.count("removed") == 2
+    assert f".{teacher.name}.old" not in removed
+    publishing.publish(runs, other)
+    assert [path.name for path in teacher.parent.iterdir()] == [teacher.name]
+    again = published("teacher", teacher.name)
+    assert again is not None
+    again.verify()
+
+
+def test_two_processes_publish_one_after_the_other(cloned: Workplace) -> None:
+    cloned.run(force=frozenset({"teacher"}))
+    both = [cloned.start("publish", "small.yaml") for _ in range(2)]
+    assert [one.finish() for one in both] == [0, 0], both[0].errors + both[1].errors
+    assert not list(cloned.store.runs.published.glob("*/.*"))
+    assert all(step.cached for step in cloned.plan().values())

@@ -4,14 +4,18 @@ import dataclasses
 import json
 import os
 import shutil
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from workplace import Workplace
 
+from iowbc import files
 from iowbc.errors import Damaged, Interrupted, PipelineFailed
 from iowbc.pipeline.store.artifact import MANIFEST
+from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import PROGRESS, Workspace
 
@@ -170,3 +174,67 @@ def test_no_flipped_bit_of_a_progress_stops_a_plan(workplace: Workplace) -> None
         flipped[place] ^= 1 << place % 8
         path.write_bytes(flipped)
         assert not planner.plan()[0].cached
+
+
+@pytest.fixture
+def elsewhere() -> Iterator[Path]:
+    """A folder on another file system than temporary files."""
+    memory = Path("/dev/shm")
+    if not memory.is_dir() or memory.stat().st_dev == Path(tempfile.gettempdir()).stat().st_dev:
+        pytest.skip("no second file system here")
+    with tempfile.TemporaryDirectory(dir=memory) as folder:
+        yield Path(folder)
+
+
+@pytest.mark.parametrize("part", ["store", "damaged", "work"])
+def test_any_part_of_the_runs_may_be_on_another_file_system(workplace: Workplace, elsewhere: Path, part: str) -> None:
+    workplace.store.runs.root.mkdir(exist_ok=True)
+    (workplace.store.runs.root / part).symlink_to(elsewhere)
+    folder = workplace.run()["teacher"].folder
+    shorten(folder / "result.json")
+    workplace.run()["teacher"].verify()
+    workplace.run(force=frozenset({"teacher"}))["teacher"].verify()
+    assert len(list(workplace.store.runs.damaged.iterdir())) == 1
+    assert not list(workplace.store.runs.store.glob("*/.*"))
+    workplace.ran()
+    workplace.run()
+    assert workplace.ran() == []
+
+
+def test_a_death_between_two_renames_loses_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    old, new = tmp_path / "name", tmp_path / "fresh"
+    for folder, text in ((old, "old"), (new, "new")):
+        folder.mkdir()
+        (folder / "file").write_text(text)
+
+    def dies(source: Path, target: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(files, "move_folder", dies)
+    with pytest.raises(KeyboardInterrupt):
+        files.replace_folder(new, old)
+    monkeypatch.undo()
+    assert (tmp_path / ".name.old" / "file").read_text() == "old"
+    files.restore_folder(tmp_path / ".name.old")
+    assert (old / "file").read_text() == "old"
+    files.replace_folder(new, old)
+    assert (old / "file").read_text() == "new"
+    assert not list(tmp_path.glob(".*"))
+
+
+def rewritten(folder: Path, sealed: bool, **entries: Any) -> None:
+    """The manifest with other entries, as a newer version may write it."""
+    found = json.loads((folder / MANIFEST).read_text()) | entries
+    seal = found.pop("seal")
+    (folder / MANIFEST).write_text(json.dumps(found | {"seal": data_digest(found) if sealed else seal}))
+
+
+def test_a_manifest_with_more_entries_is_read_and_one_of_another_form_is_called_newer(workplace: Workplace) -> None:
+    made = workplace.run()
+    rewritten(made["teacher"].folder, True, cost=3.5)
+    assert workplace.plan()["teacher"].cached
+    rewritten(made["teacher"].folder, False, cost=4.0)
+    assert "differs from its seal" in workplace.plan()["teacher"].reasons[0]
+    rewritten(made["eval"].folder, True, results={"result.json": "deciding"})
+    with pytest.raises(Damaged, match="was written by a newer version of iowbc"):
+        workplace.store.find("eval", made["eval"].manifest.key)

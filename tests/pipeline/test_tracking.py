@@ -12,7 +12,6 @@ from typing import Any
 from workplace import RECIPE, SLOW, Workplace, until
 
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.tracking.delivery import let_files_move
 from iowbc.pipeline.tracking.journal import Journal, close_orphaned, statuses, unsent
 from iowbc.pipeline.tracking.tracker import backlog
 
@@ -99,22 +98,6 @@ def test_a_moved_folder_takes_mlflows_files_along_and_leaves_nothing_behind(work
     assert not former.database.exists(), "what was not sent yet goes where the journal lies now"
     for (location,) in tracked(here, "SELECT artifact_uri FROM runs"):
         assert "recipe.yaml" in files_of(here, location)
-
-
-def test_files_recorded_under_an_absolute_place_are_found_again(workplace: Workplace) -> None:
-    workplace.recipe.write_text(TRACKED)
-    runs = workplace.store.runs
-    assert workplace.command("run", "small.yaml", "--until", "rg-dataset", FAKE_SENDER="off").code == 0
-    assert deliver(runs) == 0
-    former = "file:///iowbc/runs/mlartifacts"
-    with sqlite3.connect(runs.database) as database:
-        database.execute("UPDATE experiments SET artifact_location = ? WHERE name = 'iowbc'", (former,))
-        database.execute("UPDATE runs SET artifact_uri = ? || '/' || run_uuid || '/artifacts'", (former,))
-    database.close()
-    let_files_move(runs)
-    for (location,) in tracked(runs, "SELECT artifact_uri FROM runs"):
-        assert "recipe.yaml" in files_of(runs, location)
-    assert tracked(runs, "SELECT artifact_location FROM experiments WHERE name = 'iowbc'") == [("mlflow-artifacts:/",)]
 
 
 def test_two_first_runs_at_once_share_a_fresh_database(workplace: Workplace) -> None:

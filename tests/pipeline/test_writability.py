@@ -7,7 +7,7 @@ import pytest
 from iowbc.errors import UsageError
 from iowbc.pipeline import writability
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.writability import require_writable_runs
+from iowbc.pipeline.writability import require_writable, require_writable_runs
 
 
 def test_a_missing_folder_is_made_and_nothing_is_left_in_it(tmp_path: Path) -> None:
@@ -46,6 +46,8 @@ def test_anothers_folder_is_to_be_given_to_this_user(tmp_path: Path, monkeypatch
     monkeypatch.setattr(writability.os, "geteuid", lambda: owner + 1000)
     with pytest.raises(UsageError, match=rf"belongs to user {owner} and .* `sudo chown -R {owner + 1000} runs`"):
         require_writable_runs(Runs(runs))
+    with pytest.raises(UsageError, match="Permission denied; give another folder with --output"):
+        require_writable(runs, "--output")
     monkeypatch.setattr(writability.os, "geteuid", lambda: owner)
     with pytest.raises(UsageError, match="Permission denied; give another folder with --runs"):
         require_writable_runs(Runs(runs))

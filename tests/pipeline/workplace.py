@@ -16,9 +16,10 @@ import fake_stages
 
 from iowbc.files import read_checked
 from iowbc.pipeline.console.display import StageView
-from iowbc.pipeline.planner import Options, Planner, Step
+from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.step import Options, Step
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.pipeline.store.store import Store
@@ -72,7 +73,7 @@ class Workplace:
 
     def planner(self, *overrides: str, **options: Any) -> Planner:
         loaded = load_recipe(self.recipe, overrides)
-        return Planner(loaded, self.registry, self.store, self.robot, Options(**options))
+        return planner_for(loaded, self.registry, self.store, self.robot, Options(**options))
 
     def plan(self, *overrides: str, **options: Any) -> dict[str, Step]:
         return {step.stage.name: step for step in self.planner(*overrides, **options).plan()}

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from iowbc.errors import RecipeError
+from iowbc.recipe.reading import sweep as reading
 from iowbc.recipe.reading.sweep import Sweep, load_sweep
 
 
@@ -109,6 +110,18 @@ def test_what_is_wrong_is_told_before_anything_runs(recipe: str, sets: list[str]
     assert told in str(caught.value)
 
 
+def test_points_are_counted_before_any_is_read_and_more_are_allowed_by_an_option(
+    recipe: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(reading, "_points", lambda word, fixed, settings: told.append("read") or [])
+    with pytest.raises(RecipeError, match=r"10,000 points, more than 1,000; .* `iowbc sweep --points 10000`"):
+        load_sweep(recipe, ["seed=0..9999"])
+    assert told == []
+    load_sweep(recipe, ["seed=0..1999"], most=2000, counted=lambda count: told.append(f"{count}"))
+    assert told == ["2000", *["read"] * 2000]
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -117,6 +130,10 @@ def test_what_is_wrong_is_told_before_anything_runs(recipe: str, sets: list[str]
         ("draws: {count: 2, values: {seed: {low: 0, high: 5, scale: log}}}", "a logarithmic scale begins above 0"),
         ("grid: {seed: !!python/object:os.system x}", "is not allowed"),
         ("[1, 2]", "a sweep is a mapping"),
+        ("grid:\n  seed: {start: 0, stop: 1, step: 1.0e-320}", "wide.yaml:2:3: key 'grid.seed"),
+        ("grid:\n  seed: {start: -1.0e+308, stop: 1.0e+308, step: 1}", "wide.yaml:2:3: key 'grid.seed"),
+        ("grid:\n  seed: {start: 0, stop: 1.0e+308, step: 1.0e-308}", "wide.yaml:2:3: key 'grid.seed"),
+        ("draws: {count: 2, values: {seed: {low: -1.0e+308, high: 1.0e+308}}}", "is too wide to draw from"),
         ("grid: {robot: [g1, /etc]}", "a sweep names a folder under robots/"),
     ],
 )

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -159,11 +160,78 @@ def test_a_mean_over_one_trial_has_no_band_and_no_interval_of_an_error_is_below_
 
 def test_a_page_asks_no_network_and_no_content_ends_its_scripts(runs: list[Run], tmp_path: Path) -> None:
     text = written(runs, tmp_path).read_text()
-    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    own = re.sub(r'<script nonce="[^"]*">.*?</script>', "", text, flags=re.DOTALL)
     assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", own)
     assert "</script><b>" not in own
     assert html.escape("first </script><b>") in own
     json.loads(re.search(r'id="curves">(.*?)</script>', text, re.DOTALL).group(1))  # type: ignore[union-attr]
+
+
+HOSTILE = (
+    "x<img src=q onerror=\"document.documentElement.dataset.owned='yes'\">"
+    "</title></script><script>document.documentElement.dataset.owned='yes'</script>@FIGURES@{{ 7 * 7 }}|safe&amp;"
+)
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> list[Run]:
+    """Runs with markup in every text, and tables with text in the place of numbers."""
+    name = HOSTILE.replace("/", "|")  # of files, too
+    found = []
+    for seed in (0, 1):
+        run = make_run(tmp_path, f"{name}{seed}", seed, 0.99, 1.0)
+        texts = {"recipe": HOSTILE, "host": HOSTILE, "code": {HOSTILE: HOSTILE}, "versions": {HOSTILE: HOSTILE}}
+        artifacts = {
+            stage: replace(artifact, manifest=artifact.manifest.model_copy(update=texts))
+            for stage, artifact in run.artifacts.items()
+        }
+        for artifact in artifacts.values():
+            (artifact.folder / "summary.json").write_text(json.dumps({"metrics": {HOSTILE: seed}}))
+            (artifact.folder / "recipe.yaml").write_bytes(HOSTILE.encode() + b"\xff")
+            (artifact.folder / "key.json").write_text(json.dumps({HOSTILE: HOSTILE}))
+            (artifact.folder / "figures" / f"{name}.png").write_bytes(b"picture")
+        cell = HOSTILE.replace('"', '""')
+        (run.artifacts["teacher"].folder / "tables" / "learning_curves.csv").write_text(
+            f'step,"{cell}","error/a/b/{cell.replace("/", "|")}",reward\n1,2,3,4\n2,3,"{cell}",5,6,7\n'
+        )
+        (run.artifacts["eval"].folder / "tables" / "summary.csv").write_text(
+            "suite,case,mass,rate,E_v\n"
+            + "".join(f'"{cell}","{cell}",{mass},"{cell}",0.1\n' for mass in (0, 1, f'"{cell}"'))
+        )
+        recipe = {"description": HOSTILE, "robot": HOSTILE, "seed": HOSTILE, "teacher": {"gamma": seed}}
+        found.append(Run(run.label, artifacts, recipe))
+    return found
+
+
+def hostile_page(runs: list[Run], folder: Path) -> Path:
+    path = folder / "page.html"
+    table = f"*{HOSTILE}*\n\n| {HOSTILE} | b |\n|---|---|\n| {HOSTILE} | 2 |\n"
+    media = {f"{HOSTILE}.png": b"picture", f"{HOSTILE}.mp4": b"film"}
+    write_page(path, runs, grouped(runs), [table], [table], [HOSTILE], media)
+    return path
+
+
+def test_markup_in_any_text_stays_text(hostile: list[Run], tmp_path: Path) -> None:
+    text = hostile_page(hostile, tmp_path).read_text()
+    own = re.sub(r'<script nonce="[^"]*">.*?</script>', "", text, flags=re.DOTALL)
+    assert "<img src=q" not in own
+    assert "owned='yes'</script>" not in own
+    assert "@FIGURES@{{ 7 * 7 }}" in own
+    assert len(own) < 300_000
+    _, _, curves = own.partition('id="curves">')
+    assert "<" not in curves.partition("</script>")[0]
+
+
+@pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
+@pytest.mark.parametrize("injected", [False, True], ids=["in every text", "past the template"])
+def test_a_browser_runs_no_script_that_an_artifact_brings(hostile: list[Run], tmp_path: Path, injected: bool) -> None:
+    page = hostile_page(hostile, tmp_path)
+    if injected:
+        page.write_text(page.read_text().replace("<main>", f"<main>{HOSTILE}"))
+    root, drawn = opened(page, tmp_path / "profile")
+    assert "data-owned" not in root
+    assert "data-error" not in root
+    assert 'data-drawn="yes"' in drawn
 
 
 def test_the_main_tables_are_shown_at_once_and_the_others_folded(runs: list[Run], tmp_path: Path) -> None:
@@ -229,17 +297,23 @@ def test_postures_come_first_and_every_artifact_says_where_it_comes_from(runs: l
     assert MANIFEST.versions["python"] in provenance
 
 
+def opened(page: Path, profile: Path, *more: str) -> tuple[str, str]:
+    """A page in a browser without a network: the tag of its root, and all of it once it is drawn."""
+    assert BROWSER is not None
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--host-resolver-rules=MAP * ~NOTFOUND"]
+    words += ["--window-size=390,6000", "--virtual-time-budget=8000", f"--user-data-dir={profile}", *more]
+    command = [BROWSER, *words, "--dump-dom", page.as_uri()]
+    drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    return drawn.partition("<html")[2].partition(">")[0], drawn
+
+
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_a_phone_without_a_network_draws_every_curve(runs: list[Run], tmp_path: Path, theme: str) -> None:
-    assert BROWSER is not None
-    words = ["--headless", "--no-sandbox", "--disable-gpu", "--host-resolver-rules=MAP * ~NOTFOUND"]
-    words += ["--window-size=390,6000", "--virtual-time-budget=8000", f"--user-data-dir={tmp_path / 'profile'}"]
-    words += ["--force-dark-mode"] * (theme == "dark")
-    command = [BROWSER, *words, "--dump-dom", written(runs, tmp_path).as_uri()]
-    drawn = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
-    assert f'data-theme="{theme}"' in drawn
-    assert "data-error" not in drawn.partition(">")[0] + drawn.partition("<html")[2].partition(">")[0]
+    words = ["--force-dark-mode"] * (theme == "dark")
+    root, drawn = opened(written(runs, tmp_path), tmp_path / "profile", *words)
+    assert f'data-theme="{theme}"' in root
+    assert "data-error" not in root
     places = re.findall(r'class="curve[^"]*"[^>]*', drawn)
     assert len(places) == 2 + 5
     assert all('data-drawn="yes"' in place for place in places)

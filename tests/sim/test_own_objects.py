@@ -56,6 +56,23 @@ def test_a_cylinder_has_the_inertia_that_mujoco_computes() -> None:
     assert cylinder.principal == pytest.approx(spec.compile().body_inertia[1])
 
 
+CUBE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [CUBE.replace("1 0 0", "nan 0 0"), CUBE.replace("1 0 0", "1e30 0 0"), CUBE.replace("1", "1e-5", 3)]
+    + [f"{CUBE}f 1 2 {index}\n" for index in (99_999_999, -9)]
+    + ["no mesh"],
+)
+def test_a_mesh_that_no_hands_can_hold_is_named(tmp_path: Path, text: str) -> None:
+    (tmp_path / "odd.obj").write_text(text)
+    with pytest.raises(
+        UsageError, match=r"odd.obj: (no object that MuJoCo can weigh|extends over .* expected 0.001 to)"
+    ):
+        measured(Object(shape="mesh", mesh=MeshFile.taken_in(tmp_path / "odd.obj", "odd.obj"), mass=1.0))
+
+
 def test_a_mesh_without_volume_is_named(tmp_path: Path) -> None:
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     flat = MeshFile.taken_in(tmp_path / "flat.obj", "flat.obj")

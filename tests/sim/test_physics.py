@@ -233,7 +233,7 @@ def test_feet_slide_as_their_loaded_points_do(start, calm, push, friction, first
         for foot, name in enumerate(("left_ankle_roll_link", "right_ankle_roll_link")):
             moved, load = sliding_points(model, data, model.body(name).id)
             if load > 50.0:
-                slid += simulation.foot_slide[0, foot]
+                slid += simulation.soles["foot_slide"][0, foot]
                 points += np.hypot(*moved[:2]) / load
     assert slid == pytest.approx(points, rel=0.1)
     assert slid > 0.5

@@ -130,3 +130,13 @@ def test_shares_of_uncommon_episodes_leave_the_others_as_they_are(start):
     same = usual["action_latency"] == slow["action_latency"]
     assert 0 < (~same).sum() < COUNT
     assert np.array_equal(usual["object_mass"], slow["object_mass"])
+
+
+def test_the_loads_centre_is_held_along_one_axis_and_drawn_along_the_others(start):
+    simulation = start(Recipe(), ["lift"] * COUNT, object_com_offset_y=0.08)
+    offset = simulation.drawn["object_com_offset"]
+    assert np.all(offset[:, 1] == 0.08)
+    assert np.ptp(offset[:, 0]) > 0.03
+    assert np.ptp(offset[:, 2]) > 0.03
+    free = start(Recipe(), ["free"], object_com_offset_y=0.08)
+    assert not free.drawn["object_com_offset"].any(), "nothing has a centre where there is no object"

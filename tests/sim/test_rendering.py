@@ -1,5 +1,9 @@
 """Pictures."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from stepping import run
@@ -78,6 +82,24 @@ def test_drawing_switched_off_says_how_to_switch_it_on(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "off")
     with pytest.raises(headless.NoRenderer, match="unset it or set it to one of egl, osmesa"):
         headless.backend()
+
+
+@pytest.mark.parametrize("asked", ["osmesa", "egl", "nonsense"])
+def test_a_command_loads_the_simulation_and_says_why_nothing_is_drawn(asked):
+    program = (
+        "from iowbc.__main__ import load_no_graphics\n"
+        "load_no_graphics()\n"
+        "import mujoco\n"
+        "from iowbc.sim.rendering import backend\n"
+        "backend.ctypes.util.find_library = lambda name: None\n"
+        "mujoco.mj_step(*(lambda m: (m, mujoco.MjData(m)))(mujoco.MjModel.from_xml_string('<mujoco/>')))\n"
+        "try:\n    backend.context(8, 8)\n"
+        "except backend.NoRenderer as error:\n    print(error)\n"
+    )
+    environment = os.environ | {"MUJOCO_GL": asked, "PYOPENGL_PLATFORM": "glx"}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"MUJOCO_GL={asked}")
 
 
 def test_without_libraries_the_error_names_the_package(monkeypatch):

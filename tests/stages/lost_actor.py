@@ -20,7 +20,7 @@ def main(folder: Path) -> None:
     def after_an_update() -> bool:
         if not killed:
             every = psutil.Process().children(recursive=True)
-            killed.extend(process.pid for process in every if process.name().startswith("ray::Holder"))
+            killed.extend(process.pid for process in every if process.name().startswith("ray::ActorHost"))
             psutil.Process(killed[0]).kill()
         return False
 

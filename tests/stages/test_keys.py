@@ -10,6 +10,7 @@ from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import Section, deciding
+from iowbc.stages import eval as evaluate
 from iowbc.stages.registry import STAGES
 
 SIMULATING = {"teacher", "distill", "eval", "export"}
@@ -44,6 +45,7 @@ COSMETIC = {
     "simulation.physics.divergences_kept",
     "teacher.check.films",
     "teacher.start",
+    "distill.experts",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",
     "eval.label",
@@ -133,3 +135,12 @@ def test_a_variant_without_the_generators_posture_still_heeds_its_feasible_map(n
     assert "rg-fit" in stage.reads(variant(whole, use_rg=False))
     assert "rg-fit" not in stage.reads(variant(whole[2:], use_rg=False))
     assert "rg-fit" in stage.reads(variant(whole[2:], use_rg=True))
+
+
+def test_the_default_sequences_are_in_the_key_of_an_evaluation_that_names_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = Recipe(name="any")
+    before = data_digest(dict(STAGES["eval"].defaults(recipe)))
+    own = recipe.model_copy(update={"eval": recipe.eval.model_copy(update={"sequence": evaluate.PUSHING})})
+    assert STAGES["eval"].defaults(own) == {}
+    monkeypatch.setattr(evaluate, "LIFTING", evaluate.LIFTING[:-1])
+    assert data_digest(dict(STAGES["eval"].defaults(recipe))) != before

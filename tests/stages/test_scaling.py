@@ -1,6 +1,6 @@
 """`iowbc bench scale` measures one node against two and names its figures."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +9,12 @@ import pytest
 from stage_jobs import Backwards
 
 from iowbc.stages import scaling
+
+
+def timed(count: int, work: Callable[[], None]) -> scaling.Throughput:
+    """Two seconds, on a machine that is half busy."""
+    work()
+    return scaling.Throughput(count, 2.0, 1.0)
 
 
 def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -20,7 +26,8 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
         yield SimpleNamespace(spread=lambda paths: Backwards())
 
     monkeypatch.setattr(scaling, "begun_here", here)
-    monkeypatch.setattr(scaling, "label_everywhere", lambda *words, **settings: sum(range(10**6)))
+    monkeypatch.setattr(scaling, "label_everywhere", lambda *words, **settings: None)
+    monkeypatch.setattr(scaling, "_timed", timed)
     monkeypatch.setattr(scaling, "SHARES", 1)
     monkeypatch.setattr(scaling, "TRIALS", 2)
     monkeypatch.setattr(scaling, "DURATION", 0.1)
@@ -32,7 +39,7 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
     kinds = ("1", "2", "efficiency", "a_core_1", "a_core_2")
     assert {f"{name}_{kind}" for name in ("labels", "trials", "rollouts") for kind in kinds} <= set(figures)
     assert all(value > 0 for value in figures.values())
-    assert figures["trials_efficiency"] == pytest.approx(figures["trials_2"] / (2 * figures["trials_1"]))
+    assert figures["trials_efficiency"] == pytest.approx(figures["trials_2"] / (2 * figures["trials_1"])) == 1.0
     assert figures["answer_bytes"] < figures["inputs_bytes"]
     assert lines[2].startswith("labels ")
     assert lines[4].startswith("rollouts ")

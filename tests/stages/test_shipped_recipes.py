@@ -1,11 +1,16 @@
 """The recipes that come with the package: they can be run, and variants differ from IO-WBC in what they say alone."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
+from typer.testing import CliRunner
 
+from iowbc.cli import app
 from iowbc.evaluation.paper import VARIANTS as VARIANTS_OF_THE_PAPER
+from iowbc.learning.networks import StudentNetwork
 from iowbc.pipeline.ingredients import slice_value
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
@@ -29,6 +34,15 @@ VARIANTS = {
         "task.reward.object.orientation",
         "task.reward.object.vertical_velocity",
         "eval.simulation",
+    },
+    "wbc_fair": {
+        "stages",
+        *(f"simulation.scenes.{name}_arms" for name in ("lift", "tyre", "push")),
+        *(f"task.scenes.{name}" for name in ("lift", "tyre", "push", "lift_arms", "tyre_arms", "push_arms")),
+        *(f"task.references.{kind}.{name}_arms" for kind in ("grasps", "loads") for name in ("lift", "tyre", "push")),
+        *(f"task.references.loads.{name}" for name in ("lift", "squeeze", "tyre")),
+        "task.observation.observe_object",
+        *(f"task.reward.object.{name}" for name in ("position", "orientation", "vertical_velocity")),
     },
     "wo_rg": {
         "stages",
@@ -57,10 +71,19 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 
 def differences(one: Recipe, other: Recipe) -> set[str]:
-    """Dotted paths of the values that differ; a whole world pinned for the evaluation counts as one."""
+    """Dotted paths of the values that differ; a whole world pinned for the evaluation, or a scene of one's own, counts
+    as one."""
     a, b = leaves(one.model_dump()), leaves(other.model_dump())
     found = {name.removeprefix(".") for name in a.keys() | b.keys() if a.get(name) != b.get(name)}
-    return {"eval.simulation" if name.startswith("eval.simulation.") else name for name in found}
+    whole = ["eval.simulation", *(f"simulation.scenes.{name}" for name in one.simulation.scenes.own)]
+    return {next((path for path in whole if name.startswith(f"{path}.")), name) for name in found}
+
+
+def trial_world(recipe: Recipe) -> dict[str, Any]:
+    """The world of a recipe's trials, in which no scene of its own is played."""
+    simulation = recipe.eval.simulation or recipe.simulation
+    own = set(simulation.scenes.own)
+    return {name: value for name, value in leaves(simulation.model_dump()).items() if name.split(".")[2] not in own}
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in RECIPES.glob("*.yaml") if path.stem != "paper"))
@@ -84,8 +107,81 @@ def test_a_variant_shares_the_reference_generator(name: str) -> None:
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_a_variant_is_evaluated_in_the_world_where_iowbc_was_trained(name: str) -> None:
-    variant, full = recipe(name), recipe("full")
-    assert (variant.eval.simulation or variant.simulation) == (full.eval.simulation or full.simulation)
+    assert trial_world(recipe(name)) == trial_world(recipe("full"))
+
+
+def test_the_fair_load_agnostic_controller_never_meets_an_object_in_training() -> None:
+    fair = recipe("wbc_fair")
+    played = {name: getattr(fair.simulation.scenes, name) for name, share in fair.task.scenes if share > 0}
+    assert {scene.object for scene in played.values()} == {None}
+    assert not fair.task.observation.observe_object
+    weights = fair.task.reward.object
+    assert (weights.position, weights.orientation, weights.vertical_velocity, weights.beside) == (0, 0, 0, 0)
+
+
+def test_the_fair_load_agnostic_controller_practises_the_arms_of_every_grasp_as_often_as_iowbc() -> None:
+    shares = {}
+    for name in ("wbc_fair", "full"):
+        task = recipe(name).task
+        grasps = dict(task.references.grasps)
+        played = [(grasps[scene], share) for scene, share in task.scenes if share > 0]
+        shares[name] = {grasp: sum(share for own, share in played if own == grasp) for grasp, _ in played}
+    assert shares["wbc_fair"] == shares["full"]
+
+
+ABLATIONS = {
+    "history_1": {"distill.history"},
+    "history_5": {"distill.history"},
+    "history_50": {"distill.history"},
+    "no_auxiliary": {"distill.auxiliary"},
+    "no_gait_prior": {"task.references.gait.enabled"},
+    "no_r_gait": {"task.reward.without"},
+    "no_r_obj": {"task.reward.without"},
+    "no_randomization": {"simulation.randomization.enabled", "eval.simulation"},
+}
+"""What each ablation changes; the others' trials go on in the training's world."""
+
+
+@pytest.mark.parametrize("name", ABLATIONS)
+def test_an_ablation_is_one_line_and_changes_nothing_else(name: str) -> None:
+    ablation = recipe(f"ablations/{name}")
+    of_teacher = ablation.teacher.start is not None
+    control = recipe("ablations/continued" if of_teacher else "full")
+    stages = set() if of_teacher else {"stages"}
+    assert differences(ablation, control) - NAMES == ABLATIONS[name] | stages
+    text = (RECIPES / "ablations" / f"{name}.yaml").read_text().partition("eval:")[0].splitlines()
+    own = [line for line in text if not line.startswith(("extends", "name", "description", "stages"))]
+    assert len(own) == 1
+    full = recipe("full")
+    assert (ablation.eval.simulation or ablation.simulation) == (full.eval.simulation or full.simulation)
+
+
+def test_all_ablations_plan_and_share_what_they_can(tmp_path: Path) -> None:
+    study = RECIPES / "ablations" / "ablations.yaml"
+    done = CliRunner().invoke(app, ["plan", str(study), "--json", "--runs", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    planned = [(one["recipe"], {stage["stage"] for stage in one["stages"]}) for one in json.loads(done.stdout)]
+    whole = {name for name, stages in planned if {"teacher", "distill", "eval"} <= stages}
+    assert whole == {"full", "continued", *ABLATIONS}
+    full = deciding(recipe("full"))
+    for name in ("history_1", "history_5", "history_50", "no_auxiliary"):
+        own = deciding(recipe(f"ablations/{name}"))
+        for path in STAGES["teacher"].slice:
+            assert slice_value(own, path, STAGES["teacher"]) == slice_value(full, path, STAGES["teacher"])
+
+
+@pytest.mark.parametrize("length", [1, 50])
+def test_a_student_of_any_history_can_be_made(length: int) -> None:
+    assert StudentNetwork(
+        observation=10,
+        history=length,
+        actions=4,
+        frame_features=4,
+        latent=4,
+        hidden=[8],
+        activation="elu",
+        clip=10.0,
+    )(torch.zeros(2, length, 10)).shape == (2, 4)
 
 
 def test_the_papers_recipe_compares_them() -> None:

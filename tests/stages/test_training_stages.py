@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from changes import changed
 from safetensors.numpy import load_file
 from stable_baselines3 import PPO
 from stage_jobs import Backwards, make_job
@@ -27,12 +28,14 @@ from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.stages import distill, evaluate, export, teacher
-from iowbc.stages.environments import WRITTEN, Group
+from iowbc.stages import distill, export, teacher
+from iowbc.stages import eval as evaluate
+from iowbc.stages.environments import WRITTEN, RolloutActor
 from iowbc.stages.inputs import leaves_student
 from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
+from iowbc.task.vector.messages import Reset
 from iowbc.task.vector.setup import Setup
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -66,7 +69,7 @@ def test_rollouts_by_other_machines_that_are_lost_all_the_time_change_nothing(tr
         job = make_job(tmp_path / stage.name, asked, inputs=inputs, workers=0)
         elsewhere = Backwards()
         stage.run(dataclasses.replace(job, spread=elsewhere))
-        assert elsewhere.crews == [2], "two groups, each by a member of its own"
+        assert elsewhere.pools == [2], "two groups, each by a member of its own"
         for name in stage.results:
             assert (job.out / name).read_bytes() == (trained / stage.name / "out" / name).read_bytes(), name
         assert rows(job.work) == rows(trained / stage.name / "work")
@@ -75,9 +78,9 @@ def test_rollouts_by_other_machines_that_are_lost_all_the_time_change_nothing(tr
 def test_a_group_on_another_machine_reads_what_lies_there() -> None:
     there = Path("/nowhere")
     world = Specification(small_recipe(), there / "g1", there / "rg")
-    group = Group(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
+    group = RolloutActor(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
     written = {name: group.state()[f"buffer/{name}"] for name in WRITTEN}
-    answer, files = group.ask("reset", (written,))
+    answer, files = group.ask((written, Reset()))
     assert (answer, files) == (None, {})
     assert len(group.state()["buffer/observation"]) == 2
 
@@ -301,3 +304,23 @@ def test_the_teachers_sb3_zip_plays_as_the_teacher_does_without_any_normalisatio
     np.testing.assert_allclose(actions, own.act(seen[:, :state], seen[:, state:]), rtol=0, atol=1e-6)
     assert abs(seen).max() > 10.0, "what the environment gives is not normalised"
     assert example["hold"](out / "teacher_sb3.zip", environment) > 5
+
+
+def test_experts_of_every_scene_that_are_one_teacher_make_the_student_of_that_teacher(
+    trained: Path, tmp_path: Path
+) -> None:
+    recipe = changed(small_recipe(), "distill.experts", {"free": "a.yaml", "lift": "b.yaml"})
+    folder = trained / "teacher" / "out"
+    distill.STAGE.run(make_job(tmp_path, recipe, inputs={"expert/free": folder, "expert/lift": folder}, workers=0))
+    left = (tmp_path / "out" / "student.safetensors").read_bytes()
+    assert left == (trained / "distill" / "out" / "student.safetensors").read_bytes()
+    assert "teacher" not in distill.STAGE.reads(recipe)
+    assert {one.named for one in distill.STAGE.borrows(recipe).values()} == {"a.yaml", "b.yaml"}
+
+
+def test_a_scene_without_an_expert_and_an_expert_without_a_scene_are_refused() -> None:
+    recipe = changed(small_recipe(), "distill.experts", {"free": "a.yaml", "push": "b.yaml"})
+    assert dict(distill.STAGE.problems(recipe)) == {
+        "distill.experts": "the scene lift is played and has no expert; name one for each of ['free', 'lift']",
+        "distill.experts.push": "no scene push is played; valid: free, lift",
+    }

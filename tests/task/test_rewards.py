@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from changes import changed
+from pydantic import ValidationError
 from task_worlds import QUIET, rollout
 
 from iowbc.recipe.recipe import Recipe
@@ -72,6 +73,45 @@ def test_a_pushed_object_costs_by_how_far_it_is_beside_the_hands_up_to_where_it_
 def test_an_object_that_only_turns_about_the_vertical_is_level() -> None:
     turned = np.array([[np.cos(0.4), 0.0, 0.0, np.sin(0.4)]])
     assert equilibrium.orientation(turned, np.array([True]))[0] == pytest.approx(0.0)
+
+
+def test_a_sole_that_sinks_near_the_ground_costs_and_one_that_rises_or_is_high_does_not() -> None:
+    height = np.array([[0.0, 0.02], [0.0, 0.0], [1.0, 1.0]])
+    velocity = np.array([[-0.8, -0.8], [0.8, 0.0], [-0.8, -0.8]])
+    cost = gait.touchdown(height, velocity, 0.02)
+    assert cost == pytest.approx([0.64 * (1.0 + np.exp(-1.0)), 0.0, 0.0], abs=1e-9)
+
+
+def test_the_second_difference_of_the_action_is_zero_for_a_steady_change() -> None:
+    actions = np.array([[0.3]]), np.array([[0.2]]), np.array([[0.1]])
+    assert smooth.action_curvature(*actions) == pytest.approx([0.0])
+    assert smooth.action_curvature(np.array([[0.1]]), np.array([[-0.1]]), np.array([[0.1]])) == pytest.approx([0.16])
+
+
+def test_torque_costs_beyond_the_comfortable_part_of_its_limit() -> None:
+    torque, limit = np.array([[10.0, -45.0, 3.0]]), np.array([[50.0, 50.0, 0.0]])
+    assert smooth.effort(torque, limit, 0.5) == pytest.approx([0.4**2 + 2.5**2])
+
+
+def test_weights_of_a_robot_that_walks_take_over_with_its_level() -> None:
+    recipe = Reward.model_validate(
+        {"alive": 0.5, "later": {"begin": 0.5, "end": 1.0, "weights": {"alive": 1.5, "termination": -25.0}}}
+    )
+    terms = {path: (lambda step: np.zeros(4)) for path in TERMS} | {
+        "alive": lambda step: np.ones(4),
+        "termination": lambda step: np.array([0.0, 0.0, 0.0, 1.0]),
+    }
+    step = SimpleNamespace(command=np.zeros((4, 11)))
+    level, none = np.array([0.2, 0.75, 1.0, 2.0]), np.zeros(4, bool)
+    found = RewardFunction(recipe, 0.02, terms)(step, none, level).terms  # type: ignore[arg-type]
+    column = list(TERMS).index
+    assert found[:, column("alive")] == pytest.approx([0.01, 0.02, 0.03, 0.03])
+    assert found[:, column("termination")] == pytest.approx([0.0, 0.0, 0.0, -25.0])
+
+
+def test_a_later_weight_of_no_term_is_refused() -> None:
+    with pytest.raises(ValidationError, match=r"no term 'sync.speed'; valid: alive, gait.contact_timing"):
+        Reward.model_validate({"later": {"weights": {"sync.speed": 1.0}}})
 
 
 def test_progress_counts_along_the_command_and_no_faster_than_it() -> None:
@@ -177,8 +217,9 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
     recipe = recipe.model_copy(
         update={"sync": recipe.sync.model_copy(update={"height": Kernel(weight=0.0, width=1.0)})}
     )
-    RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]))  # type: ignore[arg-type]
+    RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]), np.ones(1))  # type: ignore[arg-type]
     idle = {"alive", "sync.support_reference", "sync.lateral_reference", "object.beside", "yielding.force"}
+    idle |= {"smooth.action_curvature", "smooth.effort", "gait.touchdown"}
     assert set(TERMS) - set(called) == idle
 
 
@@ -189,3 +230,16 @@ def test_every_number_of_the_recipes_reward_that_is_a_weight_has_its_term() -> N
 
 def test_squared_norm_goes_over_all_but_the_first_axis() -> None:
     assert squared_norm(np.ones((2, 3, 4))).tolist() == [12.0, 12.0]
+
+
+def test_a_group_left_out_counts_nothing_and_the_others_as_before(make: Make) -> None:
+    found = []
+    for without in ((), ("gait",)):
+        env = make(num_envs=2, changes=QUIET | {"task.reward.without": without})
+        env.reset()
+        rollout(env, 10)
+        found.append(env.statistics())
+    before, after = found
+    assert any(before[f"reward/{term}"] for term in TERMS if term.startswith("gait."))
+    for term in TERMS:
+        assert after[f"reward/{term}"] == (0.0 if term.startswith("gait.") else before[f"reward/{term}"]), term

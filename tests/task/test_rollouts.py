@@ -11,13 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faulty import StepBy
 
 from iowbc.errors import WorkerFailed
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
-from iowbc.rollouts.pilots import Explorer
 from iowbc.rollouts.policies import RowPolicy
+from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
+from iowbc.task.vector.messages import GetLevels
 from iowbc.task.vector.vector_env import VectorEnv
 from iowbc.task.vector.workers import WorkerProcesses
 
@@ -25,7 +27,7 @@ Make = Callable[..., VectorEnv]
 STEPS = 30
 
 
-def explorer(env: VectorEnv, steps: int = STEPS) -> Explorer:
+def explorer(env: VectorEnv, steps: int = STEPS) -> ExploringPolicy:
     """A policy that nobody trained, with noise."""
     random = np.random.default_rng(0)
     sizes = (env.layout.size, 32, 15)
@@ -33,7 +35,7 @@ def explorer(env: VectorEnv, steps: int = STEPS) -> Explorer:
     layers = [Linear(weight, np.zeros(weight.shape[1], np.float32)) for weight in weights]
     normal = Normal(np.zeros(sizes[0], np.float32), np.ones(sizes[0], np.float32), 10.0)
     noise = 0.3 * random.normal(size=(steps, env.num_envs, 15)).astype(np.float32)
-    return Explorer(RowPolicy(normal, Perceptron(tuple(layers), "elu")), noise, block_size(env.num_envs))
+    return ExploringPolicy(RowPolicy(normal, Perceptron(tuple(layers), "elu")), noise, block_size(env.num_envs))
 
 
 def same(first: Trajectories, second: Trajectories) -> bool:
@@ -93,9 +95,9 @@ def test_a_worker_that_makes_steps_does_not_count_as_hung(make: Make, monkeypatc
     env.roll(explorer(env, 3), 3)
     workers = env.workers
     assert isinstance(workers, WorkerProcesses)
-    workers.ask("levels")
+    workers.ask([GetLevels()])
     assert workers._steps() == 3 * 2
     workers.answers()
     monkeypatch.setattr(workers, "_steps", itertools.count().__next__)
-    env._call("__setattr__", [("step", functools.partial(time.sleep, 1.6))])
+    env._call([StepBy(functools.partial(time.sleep, 1.6))])
     env.step(np.zeros((2, 15)))

@@ -4,6 +4,7 @@ import functools
 import operator
 import os
 import signal
+import statistics
 import subprocess
 import sys
 import textwrap
@@ -15,6 +16,8 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
+from faulty import StepBy
+from processor_time import processor_seconds
 from task_worlds import actions
 
 from iowbc.errors import WorkerFailed
@@ -23,7 +26,7 @@ from iowbc.task.vector.vector_env import VectorEnv
 from iowbc.task.vector.workers import WorkerProcesses
 
 Make = Callable[..., VectorEnv]
-SOON = 5.0
+SOON = 60.0
 """What "within seconds" means here [s]."""
 
 
@@ -42,10 +45,11 @@ def gone(processes: list[int], patience: float = SOON) -> bool:
     return False
 
 
-def test_two_workers_start_and_reset_in_less_than_five_seconds(make: Make) -> None:
-    start = time.monotonic()
-    make(num_envs=8, workers=2).reset()
-    assert time.monotonic() - start < 5.0
+def test_a_worker_takes_little_more_of_a_processor_to_start_than_its_imports(make: Make) -> None:
+    env = make(num_envs=8, workers=2)
+    env.reset()
+    started = statistics.mean(sum(psutil.Process(pid).cpu_times()[:2]) for pid in processes_of(env))
+    assert started < 4.0 * processor_seconds("-c", "import iowbc.task.vector.setup")
 
 
 def test_workers_do_not_import_what_only_the_learner_needs(make: Make) -> None:
@@ -74,16 +78,14 @@ def test_a_forgotten_environment_takes_its_workers_along(make: Make, folder: Pat
 
 
 def test_a_killed_worker_is_noticed_at_once_and_nothing_is_left(make: Make) -> None:
-    env = make(num_envs=4, workers=2)
+    env = make(num_envs=4, workers=2, patience=3600.0)
     env.reset()
     processes = processes_of(env)
     os.kill(processes[1], signal.SIGKILL)
-    start = time.monotonic()
     with pytest.raises(
         WorkerFailed, match=r"worker 1 .*environments 2 to 3\) died with exit status -9: it was ended from outside"
     ):
         env.step(actions(0, 4))
-    assert time.monotonic() - start < SOON
     assert gone(processes)
 
 
@@ -99,7 +101,7 @@ def test_an_exception_in_a_worker_arrives_with_its_traceback(make: Make) -> None
     env = make(num_envs=2, workers=1)
     env.reset()
     processes = processes_of(env)
-    env._call("__setattr__", [("step", functools.partial(operator.truediv, 1, 0))])
+    env._call([StepBy(functools.partial(operator.truediv, 1, 0))])
     with pytest.raises(WorkerFailed, match=r"(?s)worker 0 .*Traceback.*ZeroDivisionError"):
         env.step(actions(0, 2))
     assert gone(processes)
@@ -114,11 +116,9 @@ def test_a_hung_worker_is_noticed_and_says_where_it_hangs(make: Make) -> None:
     env = make(num_envs=4, workers=2, patience=1.0)
     env.reset()
     processes = processes_of(env)
-    env._call("__setattr__", [("step", functools.partial(time.sleep, 60.0))] * 2)
-    start = time.monotonic()
+    env._call([StepBy(functools.partial(time.sleep, 3600.0))] * 2)
     with pytest.raises(WorkerFailed, match=r"(?s)has not answered for 1 s.*in _serve"):
         env.step(actions(0, 4))
-    assert time.monotonic() - start < SOON
     assert gone(processes)
 
 

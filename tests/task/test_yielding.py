@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+from task_worlds import rollout
 
 from iowbc.recipe.task.reward import Yielding
+from iowbc.task.commands.script import CommandScript, CommandSegment
+from iowbc.task.episodes import Episode
 from iowbc.task.yielding import Admittance, excess_force
 
 WALK = np.array([[0.5, 0.0]])
+WALKING = (0.5, 0.0, 0.0, 0.72, *(0.0,) * 7)
 
 
 def law(**changes):
@@ -36,7 +40,7 @@ def test_the_change_of_velocity_is_bounded():
 
 
 def test_force_costs_beyond_what_stops_the_robot():
-    settings = Yielding(held=60.0, pushed=280.0, margin=10.0, largest_force=100.0)
+    settings = Yielding(held=60.0, pushed=280.0, margin=10.0, largest_force=100.0, force=-0.01)
     law = Admittance(settings, np.array([True] * 4))
     command = np.array([[0.5, 0.0], [0.5, 0.0], [0.0, 0.0], [0.0, 0.0]])
     force = np.array([[-40.0, 0.0], [-55.0, 0.0], [0.0, 25.0], [900.0, 0.0]])
@@ -49,3 +53,15 @@ def test_what_a_crate_needs_to_roll_is_not_excess():
     assert excess_force(force, command, np.array([38.0, 38.0, 38.0])) == pytest.approx(
         np.array([[0.0, 0.0], [-162.0, 0.0], [-20.0, 0.0]])
     )
+
+
+def test_a_robot_that_a_blocked_crate_holds_back_is_asked_for_less_velocity(make) -> None:
+    script = CommandScript((CommandSegment(0.2, (0.0, 0.0, 0.0, 0.72, *(0.0,) * 7)), CommandSegment(2.0, WALKING, 0.3)))
+    episode = Episode("push", 5, 2.0, {"resistance_scale": 50.0, "partner_share": 0.0}, script)
+    rewards = []
+    for damping in (None, 280.0):
+        env = make(num_envs=1, changes={"task.reward.yielding.pushed": damping}, episodes=[episode])
+        env.reset()
+        rollout(env, 90, size=0.0)
+        rewards.append(env.statistics()["reward/sync.system_velocity"])
+    assert rewards[1] > rewards[0] + 0.01

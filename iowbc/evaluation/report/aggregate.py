@@ -1,12 +1,13 @@
 """From the long table of trials to one row for each variant, suite, case and mass."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import VARIANTS
-from iowbc.evaluation.report.statistics import mean_half_width, wilson_interval
+from iowbc.evaluation.report.statistics import design_effect, mean_half_width, wilson_interval
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
 PARTS = ("", "_moving", "_clamped")
@@ -16,6 +17,8 @@ STILL = tuple(f"still_{name}{part}" for part in ("", "_moving") for name in ERRO
 """The errors of a robot that stands still, from the script alone."""
 COSTS = (
     "E_v_raw",
+    "E_v_raw_moving",
+    "E_v_partner",
     "distance",
     "saturation",
     "saturation_peak",
@@ -36,16 +39,40 @@ COSTS = (
     "weight_in_hands",
     "torso_jerk",
     "object_jerk",
+    "touchdown_speed",
+    "touchdown_speed_peak",
+    "foot_force_peak",
+    "pressure_margin",
+    "pressure_margin_low",
+    "friction_use",
+    "friction_use_high",
+    "action_second_difference",
+    "push_force",
+    "push_force_share",
+    "impedance_real",
+    "impedance_imag",
 )
 """Other columns averaged over the surviving trials."""
 WAYS = ("transport_robot", "transport_object")
-"""Columns averaged over all trials."""
-SETTINGS = ("commanded_distance", "partner_share", "rolling_resistance", "height", "gait_period")
+FORCES = (
+    *("hand_force_mean", "hand_force_p95", "hand_force_peak"),
+    *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
+)
+"""Columns averaged over all trials, up to their end: who falls has pulled before."""
+SETTINGS = (
+    *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
+    *("height", "gait_period"),
+)
 """Columns that are the same for all trials of a row."""
-JOINT_COSTS = ("peak_torque/", "saturated/")
+TORQUE = "torque_rms"
+"""Root mean square of a joint's torque as a part of its limit: the worst joint's, and of each after a slash."""
+JOINT_COSTS = ("peak_torque/", "saturated/", f"{TORQUE}/")
 """Beginnings of columns with a value a joint, averaged over the surviving trials."""
 TRAINING = "training_seed"
 """Column that tells the trainings of one variant apart; where it is absent, there is one."""
+WORLD = "trial"
+"""Column that tells worlds apart: trials of one number have the same draws and commands at every mass, in every suite
+and with every training, and count as one where intervals are concerned."""
 GROUP = ["variant", "kind", "suite", "case", "mass", "impulse"]
 
 
@@ -55,10 +82,12 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
     in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
     `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving trials and
-    `<error>_half`, half its 95 % interval; `norm`, the norm of the four means. NaN where no trial survived (or one
-    alone, for the half widths): "Fails" in the tables.
+    `<error>_half`, half its 95 % interval; `norm`, the norm of the four means; `torque_rms` of the worst joint by the
+    means of all, and its name `torque_rms_joint`. Intervals take `WORLD` as clusters. NaN where no trial survived (or
+    one alone, for the half widths): "Fails" in the tables; and in columns that trials of an earlier version lack.
     """
-    trials = with_trainings(trials)
+    missing = [name for name in (*COSTS, *FORCES, *SETTINGS) if name not in trials]
+    trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
     rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
     table = pd.DataFrame(rows)
     ranks = {
@@ -71,12 +100,13 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     return order.drop(columns=list(places)).reset_index(drop=True)
 
 
-def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
+def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
     survivors = group[group["survived"]]
     succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
     pushed = group["object_beside"].notna() & ~held
-    low, high = wilson_interval(succeeded, len(group))
-    row: dict[str, object] = {
+    design = design_effect(group["succeeded"].to_numpy(bool), group[WORLD].to_numpy())
+    low, high = wilson_interval(succeeded, len(group), design)
+    row: dict[str, Any] = {
         **key,
         "trainings": group[TRAINING].nunique(),
         "trials": len(group),
@@ -91,14 +121,18 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, object]:
         "rate_high": high,
     }
     for name in ALL_ERRORS:
-        values = survivors[name].dropna().to_numpy(np.float64)
-        row[name] = float(values.mean()) if len(values) else np.nan
-        row[f"{name}_half"] = mean_half_width(values)
+        told = survivors[[WORLD, name]].dropna()
+        row[name] = float(told[name].mean()) if len(told) else np.nan
+        row[f"{name}_half"] = mean_half_width(told[name].to_numpy(np.float64), told[WORLD].to_numpy())
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
     joints = [name for name in group.columns if name.startswith(JOINT_COSTS)]
     for name in (*COSTS, *joints):
         row[name] = float(survivors[name].mean()) if len(survivors) else np.nan
-    for name in (*WAYS, *STILL):
+    by_joint = {name: float(row[name]) for name in joints if name.startswith(TORQUE)}
+    worst = max(by_joint, key=lambda name: by_joint[name], default="")
+    row[TORQUE] = by_joint.get(worst, np.nan)
+    row[f"{TORQUE}_joint"] = worst.removeprefix(f"{TORQUE}/")
+    for name in (*WAYS, *FORCES, *STILL):
         row[name] = float(group[name].mean())
     return row | {name: group[name].iloc[0] for name in SETTINGS}
 

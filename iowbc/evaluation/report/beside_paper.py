@@ -1,6 +1,6 @@
 """Every cell of the paper's Tables II and III: ours, the paper's, and the ratio."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -8,12 +8,15 @@ import pandas as pd
 from iowbc.evaluation.paper import TABLES, VARIANTS, reported
 from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.error_tables import ANY_MASS, HEADS, LATEX_HEADS, NO_LABELS, NUMBERS, STANDS_STILL
+from iowbc.evaluation.report.error_tables import ANY_MASS, LATEX_TOLD, NO_LABELS, NUMBERS, RAW, STANDS_STILL, TOLD
+from iowbc.evaluation.report.regime import regime
 from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS
 
 CELL = "{} / {} = {}"
 """Ours, the paper's, and ours in parts of it."""
+PLACE = list(TOLD).index(RAW)
+"""Of our velocity error without averaging, among the errors."""
 
 
 def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
@@ -38,7 +41,11 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
                     theirs = [np.nan] * len(ERRORS) if paper is None or paper == "absent" else list(paper)
                     ours = [float(row[name]) for name in ERRORS]
                     survived = f"{row['survived']}/{row['trials']}"
-                    cells = [_cell(*pair) for pair in zip(ours, theirs, strict=True)]
+                    cells = [
+                        _cell(own, one, regime(summary, row, name) if np.isfinite(one) else [])
+                        for name, own, one in zip(ERRORS, ours, theirs, strict=True)
+                    ]
+                    cells.insert(PLACE, _told(float(row[RAW])))
                     rows.append((f"{NUMBERS[kind]}, {suite}", str(variant), f"{mass:g} kg", survived, *cells))
                     numbers += _numbers(suite, str(variant), mass, ours, theirs)
                     at_most += sum(one <= other for one, other in zip(ours, theirs, strict=True))
@@ -46,6 +53,7 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
             counted += [f"{variant} in {suite} {at_most} of {of}"] if of else []
         if rows and rows[-1][0] == f"{NUMBERS[kind]}, {suite}":
             still = [f"{float(chosen[f'still_{name}'].mean()):.3f}" for name in ERRORS]
+            still.insert(PLACE, still[PLACE - 1])
             rows.append((f"{NUMBERS[kind]}, {suite}", STANDS_STILL, ANY_MASS, ABSENT, *still))
     if not rows:
         return None
@@ -56,17 +64,21 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
         f"its own commands. {FAILS}: no trial survived. Cells with a number of the paper's in which ours is at most as "
         f"large: {', '.join(counted)}. {STANDS_STILL}: what doing nothing scores, from the script. "
         f"{in_common(summary)}",
-        (*columns, *HEADS.values()),
-        (*columns, *LATEX_HEADS.values()),
+        (*columns, *TOLD.values()),
+        (*columns, *LATEX_TOLD.values()),
         tuple(rows),
         pd.DataFrame(numbers),
     )
 
 
-def _cell(ours: float, theirs: float) -> str:
-    told = [FAILS if np.isnan(value) else f"{value:.3f}" for value in (ours, theirs)]
+def _cell(ours: float, theirs: float, beside: Sequence[str]) -> str:
     ratio = ours / theirs
-    return CELL.format(*told, ABSENT if np.isnan(ratio) else f"{ratio:.2f}")
+    cell = CELL.format(_told(ours), _told(theirs), ABSENT if np.isnan(ratio) else f"{ratio:.2f}")
+    return f"{cell} ({'; '.join(beside)})" if beside else cell
+
+
+def _told(value: float) -> str:
+    return FAILS if np.isnan(value) else f"{value:.3f}"
 
 
 def _numbers(suite: str, variant: str, mass: float, ours: list[float], theirs: list[float]) -> list[dict[str, object]]:

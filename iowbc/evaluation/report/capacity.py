@@ -35,8 +35,10 @@ def capacity(rows: pd.DataFrame, by: str, rate: float) -> Capacity | None:
 
 
 def load_capacity(summary: pd.DataFrame, suite: str, variant: str, rate: float) -> Capacity | None:
-    """The largest mass of a sweep [kg] up to which every mass reached the success rate; None if it was not played."""
-    return capacity(summary[(summary["suite"] == suite) & (summary["variant"] == variant)], "mass", rate)
+    """The largest mass of a sweep [kg] up to which every mass of an object reached the success rate; None if it was not
+    played."""
+    loaded = (summary["suite"] == suite) & (summary["variant"] == variant) & (summary["case"] == suite)
+    return capacity(summary[loaded], "mass", rate)
 
 
 def push_capacity(summary: pd.DataFrame, direction: str, variant: str, rate: float) -> Capacity | None:

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
+from iowbc.evaluation.report.aggregate import TRAINING, WORLD, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
 from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL
-from iowbc.evaluation.report.statistics import mean_half_width
+from iowbc.evaluation.report.statistics import mean_half_width, mean_p, sign_flip_p
 from iowbc.evaluation.report.tables import ABSENT, Table
 from iowbc.evaluation.trials.errors import ERRORS
 
@@ -26,23 +25,20 @@ def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
     return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"), validate="one_to_one")
 
 
-def mean_difference(values: pd.Series) -> tuple[float, float, float]:
-    """Mean of paired differences, half its 95 % interval, Student's p of no difference; NaN of too few or equal."""
-    differences = values.to_numpy(np.float64)
+def mean_difference(values: pd.Series, worlds: pd.Series) -> tuple[float, float, float]:
+    """Mean of paired differences, half its 95 % interval, Student's p of no difference, with the worlds (n,) that they
+    were met in as clusters; NaN of too few or equal."""
+    differences, clusters = values.to_numpy(np.float64), worlds.to_numpy()
     if len(differences) < 2 or np.allclose(differences, differences[0]):
         return float(np.mean(differences)) if len(differences) else np.nan, np.nan, np.nan
-    return (
-        float(differences.mean()),
-        mean_half_width(differences),
-        float(stats.ttest_1samp(differences, 0.0).pvalue),
-    )
+    return float(differences.mean()), mean_half_width(differences, clusters), mean_p(differences, clusters)
 
 
 def success_p(pairs: pd.DataFrame) -> float:
-    """McNemar's exact p of equal success; 1 where no pair differs."""
-    better = int((pairs["succeeded_variant"] & ~pairs["succeeded_reference"]).sum())
-    worse = int((~pairs["succeeded_variant"] & pairs["succeeded_reference"]).sum())
-    return float(stats.binomtest(better, better + worse).pvalue) if better + worse else 1.0
+    """Exact p of equal success if the variants' names might be exchanged in each world; 1 where no pair differs.
+    McNemar's where no two pairs share a world."""
+    better = pairs["succeeded_variant"].astype(int) - pairs["succeeded_reference"].astype(int)
+    return sign_flip_p(better.groupby(pairs[WORLD]).sum().to_numpy(np.int64))
 
 
 def difference_table(trials: pd.DataFrame) -> Table | None:
@@ -56,7 +52,10 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
             if pairs.empty:
                 continue
             both = pairs[pairs["survived_variant"] & pairs["survived_reference"]]
-            found = {name: mean_difference(both[f"{name}_variant"] - both[f"{name}_reference"]) for name in ERRORS}
+            found = {
+                name: mean_difference(both[f"{name}_variant"] - both[f"{name}_reference"], both[WORLD])
+                for name in ERRORS
+            }
             success = float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean())
             p = success_p(pairs)
             cells = [_cell(*found[name]) for name in ERRORS]
@@ -72,7 +71,9 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
             )
         if rows and rows[-1][0] == suite:
             survivors = within[(within["variant"] == reference) & within["survived"]]
-            still = {name: mean_difference(survivors[f"still_{name}"] - survivors[name]) for name in ERRORS}
+            still = {
+                name: mean_difference(survivors[f"still_{name}"] - survivors[name], survivors[WORLD]) for name in ERRORS
+            }
             rows.append((suite, STANDS_STILL, str(len(survivors)), *(_cell(*still[name]) for name in ERRORS), ABSENT))
             numbers.append(
                 {"suite": suite, "variant": STANDS_STILL, "reference": reference, "both": len(survivors)}
@@ -83,7 +84,8 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     return Table(
         "differences",
         f"Differences to {reference} in pairs of trials that met the same world and commands, over all masses of a "
-        "suite: errors where both survived, with their 95 % interval and Student's p; success with McNemar's exact p. "
+        "suite: errors where both survived, with their 95 % interval and Student's p; success with an exact p. Both "
+        "take the worlds as clusters, in each of which all masses and trainings stand or fall together. "
         f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
         f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}",
         ("Suite", "Algorithm", "Pairs", *(f"Δ{head}" for head in HEADS.values()), "Δ success"),

@@ -9,13 +9,21 @@ import pandas as pd
 from iowbc.evaluation.paper import VARIANTS, reported
 from iowbc.evaluation.report.aggregate import asks_for_steps
 from iowbc.evaluation.report.captions import conditions, measures
+from iowbc.evaluation.report.regime import regime
 from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.transport import SHORTEST_WAY
 
 HEADS = {"E_alpha": "E_α [rad]", "E_h": "E_h [m]", "E_v": "E_v [m/s]", "E_psi": "E_ψ [rad]"}
 LATEX_HEADS = {"E_alpha": r"$E_{\alpha}$", "E_h": "$E_{h}$", "E_v": "$E_{v}$", "E_psi": r"$E_{\psi}$"}
+RAW = "E_v_raw"
+"""E_v without the mean over a gait period."""
+TOLD = {name: HEADS.get(name, "E_v raw [m/s]") for name in ("E_alpha", "E_h", "E_v", RAW, "E_psi")}
+LATEX_TOLD = {name: LATEX_HEADS.get(name, "$E_{v}$ raw") for name in TOLD}
+"""Heads of the errors with it."""
 NUMBERS = {"lifting": "II", "pushing": "III"}
+SWEPT = (*NUMBERS, "squeezing")
+"""Kinds of suites that go over masses; the paper has no table of the last."""
 STANDS_STILL = "stands still"
 """The row of a robot that does nothing, computed from the script: who scores no better has done nothing."""
 ANY_MASS = "any"
@@ -32,14 +40,14 @@ def error_table(
     """
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
-    swept = kind in NUMBERS
+    swept = kind in SWEPT
     known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
-    with_paper = swept and known and asks_for_steps(chosen)
+    with_paper = kind in NUMBERS and known and asks_for_steps(chosen)
     rows = []
     for first, group in _groups(chosen, swept):
         for _, row in group.iterrows():
             variant = str(row["variant"])
-            theirs = _theirs(kind, row, labels.get(variant, variant)) if with_paper else []
+            theirs = _theirs(summary, row, labels.get(variant, variant)) if with_paper else []
             rows.append((first, variant, *_errors(row), *_outcome(row), *theirs))
         if not swept:
             rows.append((first, STANDS_STILL, *_still(group), *_still_outcome(group)))
@@ -53,8 +61,8 @@ def error_table(
     return Table(
         name=name or slug(suite),
         caption=_caption(chosen, kind, with_paper),
-        head=(*columns, *HEADS.values(), *outcome, *paper),
-        latex_head=(*columns, *LATEX_HEADS.values(), *outcome, *latex_paper),
+        head=(*columns, *TOLD.values(), *outcome, *paper),
+        latex_head=(*columns, *LATEX_TOLD.values(), *outcome, *latex_paper),
         rows=tuple(rows),
         numbers=_with_papers(chosen, kind, labels) if with_paper else chosen,
     )
@@ -63,7 +71,7 @@ def error_table(
 def moving_table(summary: pd.DataFrame, suite: str) -> Table:
     """The errors over the part of the trials in which steps are asked for."""
     chosen = summary[summary["suite"] == suite]
-    swept = str(chosen["kind"].iloc[0]) in NUMBERS
+    swept = str(chosen["kind"].iloc[0]) in SWEPT
     rows = []
     for first, group in _groups(chosen, swept):
         rows += [(first, str(row["variant"]), *_errors(row, "_moving")) for _, row in group.iterrows()]
@@ -76,8 +84,8 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
         name=f"{slug(suite)}_moving",
         caption=f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
         f"95 % interval. {conditions(chosen)} {measures(chosen)}",
-        head=(*columns, *HEADS.values()),
-        latex_head=(*columns, *LATEX_HEADS.values()),
+        head=(*columns, *TOLD.values()),
+        latex_head=(*columns, *LATEX_TOLD.values()),
         rows=tuple(rows),
         numbers=chosen,
     )
@@ -90,12 +98,19 @@ def slug(suite: str) -> str:
 
 def _groups(chosen: pd.DataFrame, swept: bool) -> list[tuple[str, pd.DataFrame]]:
     """The rows of each mass, or case with its mass, with what stands in the first column."""
-    named = chosen.groupby("mass" if swept else ["case", "mass"], sort=False)
-    return [(f"{key:g} kg" if swept else f"{key[0]} ({key[1]:g} kg)", group) for key, group in named]
+    groups = [(str(case), float(mass), group) for (case, mass), group in chosen.groupby(["case", "mass"], sort=False)]
+    by_mass = set(chosen["suite"]) if swept else set()
+    return [
+        (f"{mass:g} kg" if case in by_mass else case if swept else f"{case} ({mass:g} kg)", group)
+        for case, mass, group in groups
+    ]
 
 
 def _errors(row: pd.Series, part: str = "") -> list[str]:
-    return [_with_half(row[f"{name}{part}"], row[f"{name}{part}_half"]) for name in ERRORS]
+    if not row["survived"]:
+        return [FAILS] * len(TOLD)
+    halves = [row.get(f"{name}{part}_half", np.nan) for name in TOLD]
+    return [with_half(row[f"{name}{part}"], half) for name, half in zip(TOLD, halves, strict=True)]
 
 
 def _outcome(row: pd.Series) -> list[str]:
@@ -111,7 +126,8 @@ def _outcome(row: pd.Series) -> list[str]:
 
 
 def _still(rows: pd.DataFrame, part: str = "") -> list[str]:
-    values = [float(rows[f"still_{name}{part}"].mean()) for name in ERRORS]
+    names = ["E_v" if name == RAW else name for name in TOLD]
+    values = [float(rows[f"still_{name}{part}"].mean()) for name in names]
     return [ABSENT if np.isnan(value) else f"{value:.3f}" for value in values]
 
 
@@ -125,18 +141,19 @@ def _still_outcome(rows: pd.DataFrame) -> list[str]:
     return [ABSENT, "none" if walks else ABSENT, "0.00" if walks else ABSENT, ABSENT]
 
 
-def _theirs(kind: str, row: pd.Series, variant: str) -> list[str]:
-    """The paper's errors, and in brackets ours in parts of them."""
-    paper = reported(kind, float(row["mass"]), variant)
+def _theirs(summary: pd.DataFrame, row: pd.Series, variant: str) -> list[str]:
+    """The paper's errors, and in brackets ours in parts of them; of pushes with what it does not say."""
+    paper = reported(str(row["kind"]), float(row["mass"]), variant)
     if paper == "absent":
         return [ABSENT] * len(ERRORS)
     if paper is None:
         return [FAILS] * len(ERRORS)
-    ratios = [float(row[name]) / value for name, value in zip(ERRORS, paper, strict=True)]
-    return [
-        f"{value:.3f}" if np.isnan(ratio) else f"{value:.3f} ({ratio:.2f})"
-        for value, ratio in zip(paper, ratios, strict=True)
-    ]
+    cells = []
+    for name, value in zip(ERRORS, paper, strict=True):
+        ratio = float(row[name]) / value
+        said = ([] if np.isnan(ratio) else [f"{ratio:.2f}"]) + regime(summary, row, name)
+        cells.append(f"{value:.3f} ({'; '.join(said)})" if said else f"{value:.3f}")
+    return cells
 
 
 def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> pd.DataFrame:
@@ -151,11 +168,14 @@ def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> 
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
-    swept = kind in NUMBERS
-    like = f" (paper's Table {NUMBERS[kind]})" if swept and asks_for_steps(chosen) else ""
-    title = f"{_with_whom(chosen, kind)}{like}" if swept else f"the suite {kind}"
+    like = f" (paper's Table {NUMBERS[kind]})" if kind in NUMBERS and asks_for_steps(chosen) else ""
+    title = f"{_with_whom(chosen, kind)}{like}" if kind in SWEPT else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
-    aim = " Success here is survival in posture, for the push is infeasible." if kind == "stagnation" else ""
+    aim = (
+        " Success here is survival in posture on feet that stay, with a push that goes on: the crate cannot move."
+        if kind == "stagnation"
+        else ""
+    )
     beside = (
         " Right, what the paper reports for its own commands, in brackets ours divided by it." if with_paper else ""
     )
@@ -176,7 +196,8 @@ def _with_whom(chosen: pd.DataFrame, kind: str) -> str:
     return f"cooperative {kind}" if min(shares) > 0 else kind
 
 
-def _with_half(value: float, half: float) -> str:
+def with_half(value: float, half: float) -> str:
+    """A mean with half its interval; a dash for none."""
     if np.isnan(value):
-        return FAILS
+        return ABSENT
     return f"{value:.3f}" if np.isnan(half) else f"{value:.3f} ± {half:.3f}"

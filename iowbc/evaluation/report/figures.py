@@ -6,6 +6,7 @@ Beside them what the paper does not show: success under harder conditions, and p
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_lowercase
 
 import numpy as np
 import pandas as pd
@@ -33,7 +34,7 @@ LABELS = {
 }
 MARKS = "means over the trials survived; at the upper edge: how many where not all survived, × none"
 STILL_NOTE = "grey: a robot that stands still"
-PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands"
+PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
 STILL_COLOUR = "0.55"
 DPI = 150
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
@@ -89,10 +90,10 @@ def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
             _mark_survivors(axes, rows, variant, variants_of(summary))
         _still_line(axes, float(summary.loc[summary["suite"] == suite, f"still_{name}"].mean()))
         axes.set_ylabel(LABELS[name])
-        _tidy(axes)
+        tidy(axes)
     for axes in figure.axes[2:]:
         axes.set_xlabel(f"{kind} mass [kg]")
-    _legend(figure, figure.axes[0])
+    legend(figure, figure.axes[0])
     heading = f"Tracking errors against {kind} mass, bars: 95 % intervals. {conditions(chosen)}"
     figure.suptitle(f"{heading}\n{_note(with_paper)}", fontsize=9)
     return figure
@@ -115,11 +116,11 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     if sweeps:
         _capacity_panel(panels[-2], summary, sweeps, capacity_rate)
     _success_panel(panels[-1], _heaviest(summary))
-    _letter(panels)
+    letter(panels)
     if sweeps:
         walked = any(asks_for_steps(summary[summary["suite"] == suite]) for suite in sweeps)
         figure.suptitle(_note(walked), fontsize=9)
-    _legend(figure, panels[0])
+    legend(figure, panels[0])
     return figure
 
 
@@ -137,8 +138,8 @@ def robustness(summary: pd.DataFrame, rate: float) -> Figure:
         axes.set_title(f"success, {suite}")
     if pushes:
         _push_panel(panels[-1], summary[summary["kind"] == "pushes"], rate)
-    _letter(panels)
-    _legend(figure, panels[0])
+    letter(panels)
+    legend(figure, panels[0])
     return figure
 
 
@@ -166,7 +167,7 @@ def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
         _mark_survivors(axes, rows, variant, variants_of(summary))
     axes.set_xlabel("mass [kg]")
     axes.set_ylabel("norm of the four errors [SI units]")
-    _tidy(axes)
+    tidy(axes)
 
 
 def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: float) -> None:
@@ -203,7 +204,7 @@ def _success_panel(axes: Axes, chosen: pd.DataFrame) -> None:
         counts = zip(rows["succeeded"], rows["trials"], strict=True)
         texts = ["" if np.isnan(trials) else f"{succeeded:.0f}/{trials:.0f}" for succeeded, trials in counts]
         groups[variant] = Bars(rate, texts, np.clip([rate - low, high - rate], 0.0, None))
-    _bars(axes, groups, [f"{_broken(case)}\n{mass:g} kg" for case, mass in names])
+    draw_bars(axes, groups, [f"{broken(case)}\n{mass:g} kg" for case, mass in names])
     axes.set_ylabel("successful trials [%], 95 % interval")
     axes.set_ylim(0, 110)
 
@@ -213,10 +214,11 @@ def _capacity_bars(axes: Axes, found: dict[str, list[Capacity | None]], names: l
     for variant, row in found.items():
         heights = np.array([np.nan if one is None else one.value or 0.0 for one in row])
         groups[variant] = Bars(heights, ["" if one is None else one.text("").strip() for one in row])
-    _bars(axes, groups, [_broken(name) for name in names])
+    draw_bars(axes, groups, [broken(name) for name in names])
 
 
-def _bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:
+def draw_bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:
+    """Bars of each variant, side by side over each name."""
     width = 0.8 / max(len(groups), 3)
     for place, (variant, bars) in enumerate(groups.items()):
         positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
@@ -272,22 +274,25 @@ def _still_line(axes: Axes, value: float) -> None:
     axes.update_datalim([(0.0, value)], updatex=False)
 
 
-def _letter(panels: list[Axes]) -> None:
-    for axes, letter in zip(panels, "abcdef", strict=False):
+def letter(panels: list[Axes]) -> None:
+    """Letters before the titles of panels."""
+    for axes, letter in zip(panels, ascii_lowercase, strict=False):
         axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
 
 
-def _broken(text: str) -> str:
+def broken(text: str) -> str:
     """A long name on several lines."""
     return textwrap.fill(text, LABEL_WIDTH)
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
+def legend(figure: Figure, axes: Axes) -> None:
+    """One legend below all panels, with what a panel shows."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=9, ncols=len(labels), loc="outside lower center", frameon=False)
 
 
-def _tidy(axes: Axes) -> None:
+def tidy(axes: Axes) -> None:
+    """From zero, with a grid, without a frame."""
     _from_zero(axes)
     axes.grid(True, color="0.9")
     axes.spines[["top", "right"]].set_visible(False)

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL, asks_for_transport
+from iowbc.evaluation.report.error_tables import HEADS, LATEX_HEADS, STANDS_STILL, SWEPT, asks_for_transport
 from iowbc.evaluation.report.statistics import RESAMPLES, interquartile_mean, percentile_interval
 from iowbc.evaluation.report.tables import ABSENT, FAILS, Table
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 
-KINDS = ("lifting", "pushing", "heavy", "robustness")
+KINDS = (*SWEPT, "heavy", "robustness")
 """Kinds of suites in which errors tell how good a controller is."""
 SUCCESS, NORM = "success", "norm"
 FIGURES = (SUCCESS, *ERRORS, NORM)

@@ -6,13 +6,27 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import TYRE_SUCCESS
-from iowbc.evaluation.report.aggregate import suites_of, variants_of
+from iowbc.evaluation.report.aggregate import GROUP, TORQUE, suites_of, variants_of
 from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
 from iowbc.evaluation.report.captions import conditions
-from iowbc.evaluation.report.error_tables import NO_LABELS, STANDS_STILL
+from iowbc.evaluation.report.error_tables import NO_LABELS, STANDS_STILL, SWEPT
 from iowbc.evaluation.report.tables import ABSENT, Table
 
 TYRE_MASS = 18.0
+PROBING = ("pushes", "impedance", "map")
+"""Kinds of trials that look for a limit or a response, not for how a task is done."""
+CONTACT = {
+    "Touchdown [m/s]": ("touchdown_speed", 1.0, 2),
+    "Peak force [N]": ("foot_force_peak", 1.0, 0),
+    "Pressure margin [mm]": ("pressure_margin", 1e3, 0),
+    "Friction": ("friction_use_high", 1.0, 2),
+    "Action [mrad]": ("action_second_difference", 1e3, 0),
+}
+"""Columns of the table of contact: name in the summary, factor, decimals."""
+CONTACT_COLUMNS = [
+    *("touchdown_speed", "touchdown_speed_peak", "foot_force_peak", "pressure_margin", "pressure_margin_low"),
+    *("friction_use", "friction_use_high", "action_second_difference"),
+]
 JOINTS_SHOWN = 5
 """Joints in the table of torques, those most often at their limit first; the CSV has all."""
 
@@ -45,7 +59,7 @@ def success_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) 
 
 def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
     """The largest mass that each variant carries and pushes with the success rate asked for."""
-    suites = suites_of(summary, "lifting", "pushing")
+    suites = suites_of(summary, *SWEPT)
     found = {
         variant: [load_capacity(summary, suite, variant, rate) for suite in suites] for variant in variants_of(summary)
     }
@@ -77,15 +91,9 @@ def joint_table(summary: pd.DataFrame) -> Table:
     """Peak torque of the joints and how long they are at their limit, at the heaviest mass of each suite survived."""
     joints = [name.removeprefix("saturated/") for name in summary.columns if name.startswith("saturated/")]
     rows, numbers = [], []
-    survived = summary[(summary["survived"] > 0) & (summary["kind"] != "pushes")]
-    heaviest = survived.sort_values("mass").groupby(["suite", "variant"], sort=False).tail(1)
-    for _, row in heaviest.sort_index().iterrows():
+    for _, row in heaviest(summary).iterrows():
         by_joint = [(float(row[f"saturated/{joint}"]), float(row[f"peak_torque/{joint}"]), joint) for joint in joints]
-        load = (
-            f"{row['suite']}, {row['case']}, {row['mass']:g} kg"
-            if row["case"] != row["suite"]
-            else (f"{row['suite']}, {row['mass']:g} kg")
-        )
+        load = _load(row)
         keys = {name: row[name] for name in ("variant", "suite", "case", "mass")}
         numbers += [{**keys, "joint": j, "saturated": s, "peak_torque": t} for s, t, j in by_joint]
         worst = sorted(by_joint, key=lambda entry: (-entry[0], entry[2]))[:JOINTS_SHOWN]
@@ -96,6 +104,50 @@ def joint_table(summary: pd.DataFrame) -> Table:
         "peak torque, and the share of the time at the limit. In simulation."
     )
     return Table("joints", caption, head, head, tuple(rows), pd.DataFrame(numbers))
+
+
+def contact_table(summary: pd.DataFrame) -> Table:
+    """How gently each variant meets the ground, how near it is to tipping and slipping, how smooth and how strenuous
+    its action is, at the heaviest mass of each suite survived."""
+    rows = [
+        (
+            _load(row),
+            str(row["variant"]),
+            *(_told(row[name], scale, places) for name, scale, places in CONTACT.values()),
+            f"{100 * row[TORQUE]:.0f} % ({row[f'{TORQUE}_joint']})" if np.isfinite(row[TORQUE]) else ABSENT,
+        )
+        for _, row in heaviest(summary).iterrows()
+    ]
+    head = ("Load", "Algorithm", *CONTACT, "Torque, worst joint")
+    caption = (
+        "Contact with the ground and effort at the heaviest load survived: means over surviving trials. Touchdown: "
+        "speed of the lowest corner of a sole before it touches. Peak force: of the ground on a foot, in any physics "
+        "step. Pressure margin: distance of a loaded foot's centre of pressure from the edge of its sole, mean by its "
+        "load. Friction: horizontal force as a part of what friction allows, 95th percentile. Action: root mean "
+        "square of its second difference over a control period. Torque: root mean square as a part of the limit, of "
+        "the joint with the most. In simulation."
+    )
+    return Table("contact", caption, head, head, tuple(rows), summary[[*GROUP, *CONTACT_COLUMNS, *_efforts(summary)]])
+
+
+def heaviest(summary: pd.DataFrame) -> pd.DataFrame:
+    """The row of the heaviest mass that each variant survived in each suite of tasks."""
+    survived = summary[(summary["survived"] > 0) & ~summary["kind"].isin(PROBING)]
+    rows: pd.DataFrame = survived.sort_values("mass").groupby(["suite", "variant"], sort=False).tail(1)
+    return rows.sort_index()
+
+
+def _load(row: pd.Series) -> str:
+    case = "" if row["case"] == row["suite"] else f", {row['case']}"
+    return f"{row['suite']}{case}, {row['mass']:g} kg"
+
+
+def _told(value: float, scale: float, places: int) -> str:
+    return ABSENT if np.isnan(value) else f"{scale * value:.{places}f}"
+
+
+def _efforts(summary: pd.DataFrame) -> list[str]:
+    return [name for name in summary.columns if name.startswith(TORQUE)]
 
 
 def _cell(found: Capacity | None, unit: str) -> str:

@@ -1,5 +1,6 @@
 """From the signals of a trial to its row of figures."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +16,16 @@ from iowbc.evaluation.trials.errors import (
     velocity_deviation,
 )
 from iowbc.evaluation.trials.feet import foot_metrics
+from iowbc.evaluation.trials.ground import ground_metrics
+from iowbc.evaluation.trials.impedance import impedance_metrics
+from iowbc.evaluation.trials.interaction import Push, interaction_metrics, push_metrics
 from iowbc.evaluation.trials.load import load_metrics
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.task.commands.script import CommandScript
+from iowbc.task.episodes import PlannedPull
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,10 @@ class Measure:
     commands: Commands
     foot_load: float
     """Vertical force from which a foot counts as loaded [N]."""
-    joints: tuple[str, ...]
-    """Names of the joints, in the order of the signals."""
+    push_part: float
+    """Part of the largest possible force that counts as pushing."""
+    efforts: Mapping[str, float]
+    """Torque limit of each joint by name, in the order of the signals [N·m]."""
 
     @property
     def window(self) -> int:
@@ -42,12 +49,27 @@ class Measure:
         return round(self.control_frequency / self.gait.frequency)
 
 
-def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_weight: float) -> dict[str, float]:
-    """Everything that is measured in a trial; `held_weight`: of the object in the hands [N], 0 without.
+@dataclass(frozen=True)
+class Met:
+    """What a trial met, as far as its metrics depend on it."""
+
+    held_weight: float = 0.0
+    """Of the object in the hands [N]; 0 without."""
+    ground_friction: float = 1.0
+    """Coefficient between feet and ground."""
+    rolling_resistance: float = np.inf
+    """Of a pushed object [N]."""
+    pull: PlannedPull | None = None
+    """Sinusoidal force on the object."""
+
+
+def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Met) -> dict[str, float]:
+    """Everything that is measured in a trial.
 
     The paper's errors are told against the command as given: over the whole trial (`E_v`), over the part in which
     steps are asked for (`E_v_moving`), against the command as clamped to what is feasible (`E_v_clamped`), and, from
-    the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`). `E_v_raw` is without averaging.
+    the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`). `E_v_raw` is without averaging,
+    `E_v_raw_moving` over the part in which steps are asked for.
     """
     if len(trace) == 0:
         raise ValueError("a trial without a single step has no metrics")
@@ -56,6 +78,9 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_we
     steps_asked = moving(given, measure.gait)
     deviations = deviations_from_given(trace, given, measure.window)
     still = deviations_standing_still(whole, measure.commands, trace.dt)
+    raw = velocity_deviation(trace.system_velocity, given, 1)
+    directions, length = commanded_path(whole, start_heading(trace), trace.dt)
+    push = Push(met.ground_friction, met.rolling_resistance, measure.push_part)
     walked = float(np.sum(np.linalg.norm(np.diff(trace.base_position[:, :2], axis=0), axis=1)))
     still_errors = still.means() | still.means("_moving", moving(whole, measure.gait))
     return {
@@ -63,19 +88,23 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, held_we
         **deviations.means("_moving", steps_asked),
         **deviations_from_clamped(trace, measure.window).means("_clamped"),
         **{f"still_{name}": value for name, value in still_errors.items()},
-        "E_v_raw": float(np.mean(velocity_deviation(trace.system_velocity, given, 1))),
-        **transport_metrics(trace, whole, steps_asked),
+        "E_v_raw": float(np.mean(raw)),
+        "E_v_raw_moving": float(np.mean(raw[steps_asked])) if steps_asked.any() else np.nan,
+        **transport_metrics(trace, directions, length, steps_asked),
         "distance": walked,
         **foot_metrics(trace, measure.foot_load, walked),
-        **load_metrics(trace, held_weight),
-        **effort_metrics(trace, measure.joints),
+        **ground_metrics(trace, measure.foot_load, met.ground_friction),
+        **load_metrics(trace, met.held_weight),
+        **interaction_metrics(trace, measure.window),
+        **push_metrics(trace, directions, measure.window, push),
+        **impedance_metrics(trace, met.pull),
+        **effort_metrics(trace, measure.efforts),
     }
 
 
-def transport_metrics(trace: Trace, whole: Array, moving: Mask) -> dict[str, float]:
+def transport_metrics(trace: Trace, directions: Array, length: float, moving: Mask) -> dict[str, float]:
     """The parts of the commanded way that robot and object cover, and how far the object comes to be at the robot's
-    side [m]; `whole`: commands of the whole trial (T, 11); `moving`: where steps are asked for, (T,)."""
-    directions, length = commanded_path(whole, start_heading(trace), trace.dt)
+    side [m]; `directions`, `length`: of the whole trial's commanded path; `moving`: where steps are asked for, (T,)."""
     has_object = bool(np.any(trace.object_position))
     aside = beside(trace.base_position, trace.heading, trace.object_position, moving)
     return {
@@ -86,10 +115,16 @@ def transport_metrics(trace: Trace, whole: Array, moving: Mask) -> dict[str, flo
     }
 
 
-def effort_metrics(trace: Trace, joints: tuple[str, ...]) -> dict[str, float]:
-    """What the trial cost: torques, energy, forces at hands and partner, jerk of torso and object."""
+def effort_metrics(trace: Trace, efforts: Mapping[str, float]) -> dict[str, float]:
+    """What the trial cost: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
+    root mean square of its second difference over a control period and the support joints [rad].
+
+    efforts: torque limits by joint [N·m]. `torque_rms/<joint>`: root mean square of a joint's torque as a part of its
+    limit, and `torque_rms`, the largest of them.
+    """
     grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
     peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
+    effort = np.sqrt(np.mean(np.square(trace.joint_torque), axis=0)) / np.array([*efforts.values()])
     return {
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
@@ -100,9 +135,19 @@ def effort_metrics(trace: Trace, joints: tuple[str, ...]) -> dict[str, float]:
         "energy": float(np.sum(trace.power) * trace.dt),
         "torso_jerk": jerk(trace.torso_position, trace.dt),
         "object_jerk": jerk(trace.object_position, trace.dt) if np.any(trace.object_position) else np.nan,
-        **{f"peak_torque/{joint}": float(value) for joint, value in zip(joints, peak, strict=True)},
-        **{f"saturated/{joint}": float(value) for joint, value in zip(joints, saturated, strict=True)},
+        "action_second_difference": second_difference(trace.action),
+        "torque_rms": float(np.max(effort)),
+        **{
+            f"{name}/{joint}": float(value)
+            for name, values in (("peak_torque", peak), ("saturated", saturated), ("torque_rms", effort))
+            for joint, value in zip(efforts, values, strict=True)
+        },
     }
+
+
+def second_difference(values: Array) -> float:
+    """Root mean square of a_{t+1} - 2 a_t + a_{t-1} over (T, k), in their unit; NaN for fewer than three rows."""
+    return float(np.sqrt(np.mean(np.square(np.diff(values, 2, axis=0))))) if len(values) > 2 else np.nan
 
 
 def jerk(position: Array, dt: float) -> float:

@@ -10,10 +10,21 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.trials.batch_policy import PolicyInBatch
-from iowbc.evaluation.trials.plan import PlannedSweep, Trial, case_trials, planned_sweeps, push_trials
+from iowbc.evaluation.trials.plan import (
+    PlannedSweep,
+    Trial,
+    case_trials,
+    compliance_trials,
+    map_trials,
+    planned_sweeps,
+    push_trials,
+)
 from iowbc.evaluation.trials.rollout import Acting, play_episodes
 from iowbc.evaluation.trials.table import measure_of, trial_row
 from iowbc.files import newest_checked, write_checked
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.scene_names import with_scenes
+from iowbc.recipe.task.joint_references import Grasps, Loads
 from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import shares
@@ -21,12 +32,30 @@ from iowbc.task.vector.setup import shares
 
 def evaluated_world(specification: Specification) -> Specification:
     """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's.
-    A student's has no part of s_priv that is in a user's file."""
+    Where the policy does not see s_priv, that has no part that is in a user's file."""
     recipe = specification.recipe
-    world = specification.deployed if recipe.eval.policy == "student" else specification
-    if recipe.eval.simulation is None:
-        return world
-    return replace(world, recipe=world.recipe.model_copy(update={"simulation": recipe.eval.simulation}))
+    world = specification if recipe.eval.policy == "teacher" else specification.deployed
+    if recipe.eval.simulation is not None:
+        world = replace(world, recipe=world.recipe.model_copy(update={"simulation": recipe.eval.simulation}))
+    return replace(world, recipe=_with_trial_scenes(world.recipe)) if recipe.eval.scenes else world
+
+
+def _with_trial_scenes(recipe: Recipe) -> Recipe:
+    """The recipe with the scenes of `eval.scenes` and what the arms have to know of them."""
+    further, simulation, task = recipe.eval.scenes, recipe.simulation, recipe.task
+    references = task.references
+    grasps = {**dict(references.grasps), **{name: own.wrists for name, own in further.items()}}
+    usual = references.loads.lift
+    expected = {name: usual if own.load is None else own.load for name, own in further.items()}
+    loads = {**dict(references.loads), **expected}
+    own = {"grasps": Grasps.model_validate(grasps), "loads": Loads.model_validate(loads)}
+    scenes = {"scenes": with_scenes(simulation.scenes, further)}
+    return recipe.model_copy(
+        update={
+            "simulation": simulation.model_copy(update=scenes),
+            "task": task.model_copy(update={"references": references.model_copy(update=own)}),
+        }
+    )
 
 
 Batches = Mapping[str, Sequence[Trial]]
@@ -56,17 +85,18 @@ class Protocol:
         self.work, self.workers = work, workers
         self.interrupted, self.progress = interrupted, progress
         self.elsewhere = elsewhere
-        self.measure = measure_of(world.recipe, load_robot(world.robot).joints)
+        self.measure = measure_of(world.recipe, load_robot(world.robot))
         self.done, self.total = 0, 0
 
     def run(self) -> pd.DataFrame:
         """All trials, one row each: the table of `trials.parquet`. Raises Interrupted when interrupted."""
         recipe = self.world.recipe
         sweeps = planned_sweeps(recipe)
-        named = [trial for sweep in sweeps for trial in sweep.trials(sweep.sweep.masses)]
-        named += [*case_trials(recipe), *push_trials(recipe)]
+        named = [trial for sweep in sweeps for trial in sweep.named()]
+        for planned in (case_trials, push_trials, compliance_trials, map_trials):
+            named += planned(recipe)
         tables = [self._round(0, named)]
-        heaviest = {sweep.suite: sweep.sweep.masses[-1] for sweep in sweeps}
+        heaviest = {sweep.suite: sweep.masses[-1] for sweep in sweeps}
         going: Sequence[PlannedSweep] = sweeps
         while going := [sweep for sweep in going if _succeeds(tables[-1], sweep.suite, heaviest[sweep.suite])]:
             further = {sweep.suite: sweep.heavier(heaviest[sweep.suite]) for sweep in going}
@@ -141,8 +171,9 @@ class Protocol:
 
 def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Trial]]:
     """Trials of one duration in nearly equal batches of at most `size`, so that none waits long for another to end."""
-    for duration in sorted({trial.episode.duration for trial in trials}):
-        alike = [trial for trial in trials if trial.episode.duration == duration]
+    durations = [round(trial.episode.duration, 3) for trial in trials]
+    for duration in sorted(set(durations)):
+        alike = [trial for trial, own in zip(trials, durations, strict=True) if own == duration]
         for first, last in shares(len(alike), math.ceil(len(alike) / size)):
             yield alike[first:last]
 

@@ -7,28 +7,41 @@ import numpy as np
 import pandas as pd
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.metrics import Measure, trial_metrics
+from iowbc.evaluation.trials.metrics import Measure, Met, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.recipe.evaluation.success import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import GRAVITY
+from iowbc.robot.description import GRAVITY, Robot
 from iowbc.task.episodes import Episode
 
-STAGNATION = "stagnation"
+COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
-def measure_of(recipe: Recipe, joints: tuple[str, ...]) -> Measure:
-    """How the trials of a recipe are measured; `joints`: their names."""
+def measure_of(recipe: Recipe, robot: Robot) -> Measure:
+    """How the trials of a recipe are measured."""
     task = recipe.task
-    return Measure(task.control_frequency, task.references.gait, task.commands, recipe.eval.foot_load, joints)
+    return Measure(
+        control_frequency=task.control_frequency,
+        gait=task.references.gait,
+        commands=task.commands,
+        foot_load=recipe.eval.foot_load,
+        push_part=recipe.eval.success.push_force,
+        efforts=dict(zip(robot.joints, robot.effort.tolist(), strict=True)),
+    )
 
 
-def held_weight(recipe: Recipe, episode: Episode, outcome: Outcome) -> float:
-    """Weight of the object in the hands [N]; 0 without one."""
-    held = getattr(recipe.simulation.scenes, episode.scene).kind == "lift"
-    return GRAVITY * float(outcome.drawn["object_mass"][0]) if held else 0.0
+def met(recipe: Recipe, episode: Episode, outcome: Outcome) -> Met:
+    """What a trial met."""
+    kind = getattr(recipe.simulation.scenes, episode.scene).kind
+    drawn = {name: float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")}
+    return Met(
+        held_weight=GRAVITY * drawn["object_mass"] if kind == "lift" else 0.0,
+        ground_friction=drawn["ground_friction"],
+        rolling_resistance=drawn["rolling_resistance"] if kind == "push" else np.inf,
+        pull=episode.pull,
+    )
 
 
 def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) -> dict[str, Any]:
@@ -36,7 +49,8 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
     episode, fixed = trial.episode, trial.episode.fixed
     if episode.script is None:
         raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
-    metrics = trial_metrics(outcome.trace, episode.script, measure, held_weight(recipe, episode, outcome))
+    metrics = trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
+    metrics["seconds"] = outcome.seconds
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
@@ -48,18 +62,20 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "mass": trial.mass,
         "impulse": trial.impulse,
         "trial": trial.number,
+        "split": recipe.eval.split,
         "seed": episode.seed,
         "duration": episode.duration,
         "height": recipe.rg.height,
         "gait_period": 1.0 / measure.gait.frequency,
         "partner_share": fixed.get("partner_share", np.nan),
+        "pull_frequency": np.nan if episode.pull is None else episode.pull.frequency,
+        "pull_direction": "" if episode.pull is None else episode.pull.direction,
         "rolling_resistance": fixed.get("object_ground_friction", np.nan),
         "survived": alive,
-        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics),
+        "succeeded": alive and succeeded(recipe.eval.success, trial.kind, metrics, blocked=_blocked(outcome)),
         "carried": metrics["weight_in_hands"] >= recipe.eval.success.weight_in_hands,
         "kept": metrics["object_beside"] <= recipe.eval.success.object_beside,
         "end": outcome.ending,
-        "seconds": outcome.seconds,
         **metrics,
         **{f"drawn_{name}": _plain(values) for name, values in outcome.drawn.items()},
         "episode": json.dumps(episode.as_json()),
@@ -72,19 +88,35 @@ def survived(success: Success, outcome: Outcome) -> bool:
     return outcome.survived and not slipped
 
 
-def succeeded(success: Success, kind: str, metrics: dict[str, float]) -> bool:
-    """Whether a trial that was survived is a success: transport of what the hands carry or do not lose, or in a
-    push that is infeasible posture."""
+def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked: bool = False) -> bool:
+    """Whether a trial that was survived is a success: transport of what the hands carry or do not lose, with bounded
+    force in trials of compliance; where a push is infeasible posture and a push that goes on, in the one kind with at
+    least a force and on feet that stay, in the other with at most one.
+
+    blocked: whether what is pushed cannot be moved.
+    """
+    posture = metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
     if kind == STAGNATION:
-        return metrics["E_alpha"] <= success.posture_pitch and metrics["E_h"] <= success.posture_height
+        pushes = metrics["push_force_share"] >= success.push_time
+        return posture and pushes and metrics["foot_slip"] <= success.foot_slide * metrics["seconds"]
+    if kind == COMPLIANCE and blocked:
+        pushes = metrics["push_force"] >= success.least_push
+        return posture and pushes and metrics["hand_force_p95"] <= success.hand_force
+    if kind == COMPLIANCE:
+        bounded = not metrics["handle_force_p95"] > success.handle_force
+        return bounded and carried_along(success, metrics, success.compliance_transport)
     return carried_along(success, metrics)
 
 
-def carried_along(asked: Success | Acceptance, metrics: dict[str, float]) -> bool:
-    """Whether robot and object cover enough of the way, with enough of the weight in the hands, and stay together."""
+def carried_along(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
+    """Whether robot and object cover enough of the way, with enough of the weight in the hands, and stay together.
+
+    transport: part of the way that is enough, by default that of `asked`.
+    """
+    least = asked.transport if transport is None else transport
     shares = (
-        (metrics["transport_robot"], asked.transport),
-        (metrics["transport_object"], asked.transport),
+        (metrics["transport_robot"], least),
+        (metrics["transport_object"], least),
         (metrics["weight_in_hands"], asked.weight_in_hands),
     )
     kept = not metrics["object_beside"] > asked.object_beside
@@ -94,6 +126,13 @@ def carried_along(asked: Success | Acceptance, metrics: dict[str, float]) -> boo
 def replayed(row: "pd.Series[Any]") -> Episode:
     """The episode of a row of the long table, to be played again."""
     return Episode.from_json(json.loads(row["episode"]))
+
+
+def _blocked(outcome: Outcome) -> bool:
+    """Whether a crate resists with more than the greatest force that the feet could push with."""
+    drawn, trace = outcome.drawn, outcome.trace
+    hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
+    return float(drawn["rolling_resistance"][0]) > hold
 
 
 def _plain(values: Array) -> float | list[float]:

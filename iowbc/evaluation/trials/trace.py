@@ -37,6 +37,12 @@ class Trace:
     """Size of the net force of links other than the hands on the object, shape (T,) [N]."""
     grip_force: Array
     """Force of the object on each hand, left then right, shape (T, 6) [N]."""
+    external_force: Array
+    """Force of partner, impulses and pulls on the object, shape (T, 3) [N]."""
+    handle_velocity: Array
+    """Velocity of the object's far handle, shape (T, 3) [m/s]."""
+    partner_velocity: Array
+    """Velocity that the partner intends for that handle, zero without a partner, shape (T, 3) [m/s]."""
     power: Array
     """Sum over the joints of |torque x speed|, shape (T,) [W]."""
     base_position: Array
@@ -49,10 +55,20 @@ class Trace:
     """Sole centres, left then right, shape (T, 6) [m]."""
     foot_slide: Array
     """Horizontal speed of the soles at their centres of pressure, shape (T, 2) [m/s]."""
+    foot_margin: Array
+    """Distance of each foot's centre of pressure from the edge of its sole, zero in the air, shape (T, 2) [m]."""
+    foot_sink: Array
+    """Downward speed of the lowest corner of each sole, shape (T, 2) [m/s]."""
+    foot_peak: Array
+    """Largest force of the ground on each foot in any physics step of the period, shape (T, 2) [N]."""
     foot_load: Array
     """Vertical force of the ground on each foot, shape (T, 2) [N]."""
+    foot_shear: Array
+    """Size of its horizontal force, shape (T, 2) [N]."""
     foot_contact: Array
     """1 while a foot touches the ground, shape (T, 2)."""
+    action: Array
+    """What the action adds to the reference of the support joints, shape (T, support) [rad]."""
     joint_torque: Array
     """Shape (T, joints) [N·m]."""
     joint_saturation: Array

@@ -11,10 +11,10 @@ from typing import Any
 
 from iowbc.errors import Interrupted, StageFailed, UsageError
 from iowbc.pipeline.cluster import loopback
-from iowbc.pipeline.cluster.desk import Desk, Event
 from iowbc.pipeline.cluster.folders import Folder, files_of, write_files
 from iowbc.pipeline.cluster.identity import identity
-from iowbc.pipeline.cluster.remote import TOKEN, Order, Outcome, execute
+from iowbc.pipeline.cluster.mailbox import Event, Mailbox
+from iowbc.pipeline.cluster.remote import TOKEN, Order, StageOutcome, execute
 from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
@@ -50,7 +50,7 @@ class Cluster:
         self._begun: dict[str, bool] = {}
         self._ray = _initialised(address)
         remote = self._ray.remote
-        self._desk = remote(num_cpus=0, resources={HEAD: 0.001}, max_concurrency=1)(Desk).remote()
+        self._mailbox = remote(num_cpus=0, resources={HEAD: 0.001}, max_concurrency=1)(Mailbox).remote()
         self._execute = remote(max_retries=0, scheduling_strategy="SPREAD")(execute)
         self._require_alike()
 
@@ -116,7 +116,7 @@ class Cluster:
         """End all tasks and the connection."""
         self._ray.shutdown()
 
-    def _tried(self, stage: Stage, job: Job, token: str) -> Outcome | None:
+    def _tried(self, stage: Stage, job: Job, token: str) -> StageOutcome | None:
         """One attempt; None where its node or worker was lost."""
         ray = self._ray
         order = Order(
@@ -137,16 +137,16 @@ class Cluster:
         scratch = (ray.put({name: content for name, content in files_of(job.work).items() if name != TOKEN}),)
         # One that only waits for its pieces must not keep them waiting.
         cores = 0 if stage.spreads(job.recipe) else order.workers
-        task = self._execute.options(num_cpus=cores, name=stage.name).remote(order, scratch, self._desk)
+        task = self._execute.options(num_cpus=cores, name=stage.name).remote(order, scratch, self._mailbox)
         self._begun[order.task] = told = False
         try:
             while True:
                 ready, _ = ray.wait([task], timeout=POLL)
-                for event in ray.get(self._desk.collect.remote(order.task)):
+                for event in ray.get(self._mailbox.collect.remote(order.task)):
                     self._begun[order.task] = True
                     _tell(job, event)
                 if ready:
-                    outcome: Outcome = ray.get(task)
+                    outcome: StageOutcome = ray.get(task)
                     return outcome
                 if self.aborted:
                     raise KeyboardInterrupt
@@ -154,7 +154,7 @@ class Cluster:
                     raise Interrupted("waited for a node")
                 if job.interrupted() and not told:
                     told = True
-                    ray.get(self._desk.stop.remote(order.task))
+                    ray.get(self._mailbox.stop.remote(order.task))
         except ray.exceptions.RayTaskError:
             raise
         except ray.exceptions.RayError:
@@ -166,7 +166,7 @@ class Cluster:
         finally:
             del self._begun[order.task]
 
-    def _conclude(self, stage: Stage, job: Job, outcome: Outcome) -> None:
+    def _conclude(self, stage: Stage, job: Job, outcome: StageOutcome) -> None:
         if outcome.state == "mismatch":
             raise StageFailed(f"a node is not as this machine: {outcome.text}; install the same on both")
         if outcome.state == "stopped":

@@ -11,9 +11,9 @@ from typing import Any, Literal, Protocol
 
 from iowbc.errors import Interrupted, IowbcError
 from iowbc.files import previous
-from iowbc.pipeline.cluster.desk import Event
 from iowbc.pipeline.cluster.folders import Files, Folder, files_of, placed, write_files
 from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.cluster.mailbox import Event
 from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.recipe import Recipe
@@ -32,7 +32,7 @@ class Order:
     """One execution of a stage on a node."""
 
     task: str
-    """Identifier at the desk."""
+    """Identifier at the mailbox."""
     identity: Identity
     """The driver's."""
     run: Callable[[Job], None]
@@ -52,7 +52,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StageOutcome:
     """How an execution has ended."""
 
     state: Literal["done", "stopped", "failed", "error", "mismatch"]
@@ -61,13 +61,13 @@ class Outcome:
     """What the stage left; None where the driver sees it."""
 
 
-def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
-    """Run a stage. `scratch`: Ray's reference to what earlier attempts have left; `desk`: Ray's handle of the desk."""
+def execute(order: Order, scratch: tuple[Any, ...], mailbox: Any) -> StageOutcome:
+    """Run a stage. `scratch`: Ray's reference to what earlier attempts have left; `mailbox`: Ray's handle."""
     import ray
 
     own = identity()
     if different := order.identity.mismatch(own):
-        return Outcome("mismatch", different)
+        return StageOutcome("mismatch", different)
     shared = not order.copy and _read(Path(order.work, TOKEN)) == order.token
     with tempfile.TemporaryDirectory(prefix="iowbc-stage-") as folder:
         out, work = (Path(order.out), Path(order.work)) if shared else (Path(folder, OUT), Path(folder, SCRATCH))
@@ -75,7 +75,7 @@ def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
         if not shared:
             work.mkdir()
             write_files(work, ray.get(scratch[0]))
-        report = NodeReport(DeskLine(desk, order.task), work, sends=not shared)
+        report = NodeReport(MailboxChannel(mailbox, order.task), work, sends=not shared)
         report.say(f"runs on {own.host}")
         report.flush()
         here = partial(placed, fetch=ray.get, copy=order.copy)
@@ -98,19 +98,19 @@ def execute(order: Order, scratch: tuple[Any, ...], desk: Any) -> Outcome:
             order.run(job)
         except Interrupted as stopped:
             report.end(files=True)
-            return Outcome("stopped", str(stopped))
+            return StageOutcome("stopped", str(stopped))
         except IowbcError as failed:
             report.end(files=True)
-            return Outcome("failed", str(failed))
+            return StageOutcome("failed", str(failed))
         except Exception:
             report.end(files=True)
-            return Outcome("error", traceback.format_exc())
+            return StageOutcome("error", traceback.format_exc())
         report.end()
-        return Outcome("done", "", None if shared else files_of(out))
+        return StageOutcome("done", "", None if shared else files_of(out))
 
 
-class Line(Protocol):
-    """The way to the desk."""
+class Channel(Protocol):
+    """The way to the mailbox."""
 
     def tell(self, events: list[Event]) -> bool:
         """Tell what happened; whether the stage is to stop, as far as was heard."""
@@ -119,11 +119,11 @@ class Line(Protocol):
         """Return once all has arrived that was told."""
 
 
-class DeskLine:
+class MailboxChannel:
     """Tells without waiting: a task that waits for Ray gives its cores away to another one meanwhile."""
 
-    def __init__(self, desk: Any, task: str) -> None:
-        self._desk, self._task = desk, task
+    def __init__(self, mailbox: Any, task: str) -> None:
+        self._mailbox, self._task = mailbox, task
         self._answer: Any = None
         self._stop = False
 
@@ -133,7 +133,7 @@ class DeskLine:
 
         if self._answer is not None and ray.wait([self._answer], timeout=0)[0]:
             self._stop = bool(ray.get(self._answer))
-        self._answer = self._desk.tell.remote(self._task, events)
+        self._answer = self._mailbox.tell.remote(self._task, events)
         return self._stop
 
     def wait(self) -> None:
@@ -147,9 +147,9 @@ class DeskLine:
 class NodeReport:
     """A stage's report on a node: gathered, and told to the driver a few times a second."""
 
-    def __init__(self, line: Line, work: Path, *, sends: bool) -> None:
+    def __init__(self, channel: Channel, work: Path, *, sends: bool) -> None:
         """work: the stage's scratch. sends: whether the driver does not see it, and is sent its files."""
-        self._line = line
+        self._channel = channel
         self._work = work
         self._sends = sends
         self._events: list[Event] = []
@@ -187,12 +187,12 @@ class NodeReport:
             self._gather()
         self._told = time.monotonic()
         events, self._events = self._events, []
-        self._stop = self._line.tell(events)
+        self._stop = self._channel.tell(events)
 
     def end(self, *, files: bool = False) -> None:
         """Tell the rest, and return once it has arrived."""
         self.flush(files=files)
-        self._line.wait()
+        self._channel.wait()
 
     def _add(self, *event: Any) -> None:
         self._events.append(event)

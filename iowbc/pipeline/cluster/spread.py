@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from iowbc.errors import Damaged, Interrupted
-from iowbc.pipeline.cluster.crew import NodeCrew, Origin
+from iowbc.pipeline.cluster.actor_pool import NodeActorPool, Origin
 from iowbc.pipeline.cluster.folders import Folder, placed
 from iowbc.pipeline.cluster.identity import Identity, identity
 from iowbc.pipeline.cluster.stragglers import straggler
@@ -74,12 +74,12 @@ class NodeSpread:
             for task in waiting:
                 ray.cancel(task, force=True)
 
-    def crew(
+    def actor_pool(
         self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> NodeCrew:
+    ) -> NodeActorPool:
         """Members of one core each on the nodes; see `Spread`."""
         own = {name: self._folders[path] for name, path in folders.items()}
-        return NodeCrew(called, Origin(self._driver, make, own, self._copy), calls, self._interrupted, self._say)
+        return NodeActorPool(called, Origin(self._driver, make, own, self._copy), calls, self._interrupted, self._say)
 
 
 def _called(

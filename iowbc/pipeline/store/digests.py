@@ -4,7 +4,7 @@ import ast
 import functools
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -48,27 +48,13 @@ def folder_digest(folder: Path) -> str:
     return content_digest({path.relative_to(folder).as_posix(): file_digest(path) for path in folder_files(folder)})
 
 
-def code_digests(package: Path, names: Iterable[str]) -> dict[str, str]:
-    """Digest of the syntax trees of each named part of a package: a subpackage (`task`) or a module (`stages.eval`)."""
-    return {name: _part_digest(package, name) for name in sorted(names)}
-
-
-def _part_digest(package: Path, name: str) -> str:
-    path = package.joinpath(*name.split("."))
-    module = path.with_name(f"{path.name}.py")
-    sources = [module] if module.is_file() else sorted(path.rglob("*.py"))
-    if not sources:
-        raise ValueError(f"{package.name} has no subpackage or module '{name}'")
-    return content_digest({source.relative_to(package).as_posix(): _syntax_digest(source) for source in sources})
-
-
 @functools.cache
-def _syntax_digest(source: Path) -> str:
+def syntax_digest(source: Path) -> str:
+    """Digest of a module's syntax tree, without comments and docstrings."""
     tree = ast.parse(source.read_bytes(), filename=str(source))
     for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [statement for statement in body if not _is_text(statement)]  # type: ignore[attr-defined]
+        if isinstance(body := getattr(node, "body", None), list):
+            body[:] = [statement for statement in body if not _is_text(statement)]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 

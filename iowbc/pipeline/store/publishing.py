@@ -1,15 +1,17 @@
 """Artifacts that go into the repository: `runs/published/`, a copy of what the store has, of safe and small files."""
 
-import os
 import shutil
 from collections.abc import Collection
 from pathlib import Path
 
 from iowbc.errors import UsageError
-from iowbc.files import synchronise
+from iowbc.files import OLD, replace_folder, restore_folder, synchronise
 from iowbc.pipeline.store.artifact import BESIDE, MANIFEST, Artifact, read_artifact, write_manifest
+from iowbc.pipeline.store.locks import lock_path, named_lock
 from iowbc.pipeline.store.runs import Runs
 
+PUBLISHING = "publish"
+"""Lock of whoever publishes."""
 KINDS = frozenset(
     [".safetensors", ".json", ".jsonl", ".npz", ".parquet", ".onnx", ".csv", ".md", ".tex", ".png", ".xml", ".yaml"]
 )
@@ -21,14 +23,21 @@ LARGEST_REPOSITORY = 60_000_000
 
 
 def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Artifact:
-    """Copy an artifact to `runs/published/` and verify the copy.
+    """Copy an artifact to `runs/published/` and verify the copy; one process at a time.
 
-    Files of other kinds, large ones, and those named in `without` are left out and named in the copy's manifest.
+    Files of other kinds, large ones, and those named in `without` are left out and named in the copy's manifest. What a
+    process left that died here is brought back or removed.
     """
+    with named_lock(lock_path(runs, PUBLISHING)):
+        for leftover in runs.published.glob("*/.*"):
+            restore_folder(leftover) if leftover.suffix == OLD else shutil.rmtree(leftover)
+        return _publish(runs, artifact, without)
+
+
+def _publish(runs: Runs, artifact: Artifact, without: Collection[str]) -> Artifact:
     made = artifact.manifest
     target = runs.published / made.stage / made.key
-    unfinished = target.with_name(f".{made.key}.{os.getpid()}")
-    shutil.rmtree(unfinished, ignore_errors=True)
+    unfinished = target.with_name(f".{made.key}.new")
     omitted = tuple(
         name
         for name, record in made.files.items()
@@ -40,9 +49,7 @@ def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Ar
             shutil.copyfile(artifact.folder / name, unfinished / name)
             synchronise(unfinished / name)
     write_manifest(unfinished, made.model_copy(update={"omitted": omitted}))
-    if target.is_dir():
-        shutil.rmtree(target)
-    unfinished.rename(target)
+    replace_folder(unfinished, target)
     copy = read_artifact(target, made.stage, made.key, published=True)
     copy.verify()
     return copy

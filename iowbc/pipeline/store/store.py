@@ -1,12 +1,11 @@
 """The artifact store: `runs/store/<stage>/<key>/`, and behind it `runs/published/`, which came with the repository."""
 
 import os
-import shutil
 import time
 from pathlib import Path
 
 from iowbc.errors import Damaged
-from iowbc.files import synchronise
+from iowbc.files import move_folder, replace_folder
 from iowbc.pipeline.store.artifact import Artifact, read_artifact
 from iowbc.pipeline.store.runs import Runs
 
@@ -58,15 +57,10 @@ class Store:
         return sorted(found.values(), key=lambda artifact: artifact.manifest.made)
 
     def add(self, out: Path, stage: str, key: str) -> Artifact:
-        """Rename sealed output into the store; an artifact that stands there already goes with the work folder."""
+        """Move sealed output into the store, in place of an artifact that stands there already."""
         folder = self.folder(stage, key)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        if folder.exists():
-            replaced = out.with_name("replaced")
-            shutil.rmtree(replaced, ignore_errors=True)
-            os.rename(folder, replaced)
-        os.rename(out, folder)
-        synchronise(folder.parent)
+        replace_folder(out, folder)
         artifact = self.find(stage, key)
         assert artifact is not None
         return artifact
@@ -76,5 +70,5 @@ class Store:
         stamp = time.strftime("%Y%m%d-%H%M%S")
         target = self.runs.damaged / f"{stage}-{key[:12]}-{stamp}-{os.getpid()}"
         target.parent.mkdir(parents=True, exist_ok=True)
-        os.rename(self.folder(stage, key), target)
+        move_folder(self.folder(stage, key), target)
         return target

@@ -6,7 +6,6 @@ A line that is damaged is put aside in `runs/damaged/` and named; the others go 
 import contextlib
 import os
 import shutil
-import sqlite3
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -102,8 +101,6 @@ class Delivery:
             self._embedded = uri in ("", own)
             name = first.get("experiment") or Execution.model_fields["experiment"].default
             with set_up(self.runs):
-                if self._embedded:
-                    let_files_move(self.runs)
                 self._experiment = experiment(made, str(name), self.runs)
             self._client = made
 
@@ -293,24 +290,6 @@ def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
 def embedded_uri(runs: Runs) -> str:
     """The database in `runs`, as MLflow names it."""
     return f"sqlite:///{runs.database.absolute()}"
-
-
-def let_files_move(runs: Runs) -> None:
-    """Let an embedded database that holds absolute places of files name them as its server finds them, wherever it is.
-
-    The files lie in `mlartifacts/<run>/artifacts` either way.
-    """
-    if not runs.database.is_file():
-        return
-    with contextlib.closing(sqlite3.connect(runs.database)) as database, database:
-        if not database.execute("SELECT name FROM sqlite_master WHERE name = 'experiments'").fetchall():
-            return
-        here = f"file:%/{runs.tracked_files.name}"
-        database.execute("UPDATE experiments SET artifact_location = ? WHERE artifact_location LIKE ?", (SERVED, here))
-        database.execute(
-            "UPDATE runs SET artifact_uri = ? || run_uuid || '/artifacts' WHERE artifact_uri LIKE ?",
-            (SERVED, f"{here}/%"),
-        )
 
 
 def _fits(gathered: list[dict[str, Any]], event: Mapping[str, Any] | None) -> bool:

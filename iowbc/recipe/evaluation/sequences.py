@@ -1,4 +1,4 @@
-"""Command sequences of trials. They ask for motion: who stands still misses every one of the paper's errors.
+"""Fixed command sequences of trials. All ask for steps: a robot that stands still fails every one.
 
 Each changes no faster than `task.commands.rates` allow and asks for no posture outside of the feasible map.
 """
@@ -41,8 +41,17 @@ STAGNATION = (
 )
 """Push against what does not give way, and stop: 10 s."""
 
-STANDING = (Segment(duration=6.0, ramp=0.0),)
-"""Stand: 6 s."""
+WALKING_ON = (Segment(duration=3.0, velocity=(0.4, 0.0, 0.0)),)
+"""Walk: 3 s."""
+
+STANDING = (Segment(duration=5.0, ramp=0.0), *WALKING_ON)
+"""Stand, which is when the robot is pushed, and walk on: 8 s."""
+
+WALKING = (Segment(duration=1.0, ramp=0.0), Segment(duration=7.0, velocity=(0.4, 0.0, 0.0)))
+"""Walk, which is when the robot is pushed: 8 s."""
+
+BOWING = (Segment(duration=2.0, ramp=0.0), Segment(duration=7.0, height=0.68, pitch=1.4, ramp=3.0))
+"""Bow while standing, to where the paper's range nearly ends, and hold it."""
 
 PROBED = (
     Segment(duration=2.0, ramp=0.0),

@@ -1,11 +1,11 @@
 """Groups of trials: sweeps over mass, single cases, and pushes on the base that grow until the robot falls."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.sequences import STAGNATION, STANDING
+from iowbc.recipe.evaluation.sequences import BOWING, STAGNATION, STANDING, WALKING, WALKING_ON
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 
@@ -21,13 +21,28 @@ class Beyond(Section):
     """No mass above this is tried [kg]."""
 
 
+class WithShare(Section):
+    """What a sweep does otherwise where the partner has a certain share."""
+
+    partner_share: float = Field(ge=-1, le=1)
+    """The share, one of the sweep's."""
+    masses: tuple[float, ...] | None = Field(default=None, min_length=1)
+    """Object masses [kg], ascending; empty takes the sweep's."""
+    rolling_resistance: float | None = Field(default=None, ge=0, le=1)
+    """Rolling resistance μ; empty takes the sweep's."""
+
+
 class Sweep(Section):
     """Trials over a range of object masses in one scene."""
 
     scene: ObjectScene = "lift"
-    """Scene of `simulation.scenes` in which the object is met; a mass of 0 is played in the scene without an object."""
-    masses: tuple[float, ...] = Field(default=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
-    """Object masses [kg], ascending."""
+    """Scene of `simulation.scenes` or `eval.scenes` in which the object is met."""
+    masses: tuple[float, ...] = Field(default=(0.05, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
+    """Object masses [kg], ascending; none is lighter than the object's `smallest_mass`."""
+    no_object: bool = True
+    """Also play the commands once in the scene without an object, without a partner: the row "no object"."""
+    undisturbed: tuple[float, ...] = ()
+    """Masses of a second suite without impulses and pushes [kg], where `eval.disturbances` are on; empty has none."""
     beyond: Beyond | None = None
     """Heavier masses, tried as long as one trial survives; empty stops at the last mass."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
@@ -35,26 +50,39 @@ class Sweep(Section):
     partner_shares: tuple[PartnerShare, ...] = Field(default=(0.0, 0.5), min_length=1)
     """The sweep is made once with each: part of the weight, or in pushing of the rolling resistance, that the partner
     bears; negative resists, 0 leaves all of it to the robot, empty draws it as in training."""
+    with_share: tuple[WithShare, ...] = ()
+    """Other masses, or another rolling resistance, for some of these shares."""
     fixed: Held = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
-    """Command sequence of this sweep; empty takes `eval.sequence`, or else that of lifting or pushing."""
+    """Command sequence of this sweep; empty takes `eval.sequence`, or else `eval.scripts`, or else that of lifting or
+    pushing."""
+
+    def at(self, share: float | None) -> "Sweep":
+        """The sweep as it is with one share of the partner's."""
+        own = [one for one in self.with_share if one.partner_share == share]
+        given = {name: value for one in own for name, value in one if value is not None and name != "partner_share"}
+        return self.model_copy(update={**given, "partner_shares": (share,), "with_share": ()})
 
     @model_validator(mode="after")
     def _masses_ascend(self) -> Self:
-        if any(mass < 0 for mass in self.masses):
-            raise ValueError(f"masses must not be negative, got {list(self.masses)}")
-        if list(self.masses) != sorted(set(self.masses)):
-            raise ValueError(f"masses must ascend without repetition, got {list(self.masses)}")
+        for masses in (self.masses, self.undisturbed, *(one.masses or () for one in self.with_share)):
+            if any(mass < 0 for mass in masses):
+                raise ValueError(f"masses must not be negative, got {list(masses)}")
+            if list(masses) != sorted(set(masses)):
+                raise ValueError(f"masses must ascend without repetition, got {list(masses)}")
         if len(set(self.partner_shares)) != len(self.partner_shares):
             raise ValueError(f"partner_shares must differ, got {list(self.partner_shares)}")
+        named = [one.partner_share for one in self.with_share]
+        if len(set(named)) != len(named) or not set(named) <= set(self.partner_shares):
+            raise ValueError(f"with_share must name each of partner_shares once at most, got {named}")
         return self
 
 
 class Case(Section):
     """Trials of one object under one condition."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.%-]*$")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.,+%-]*$")
     """Name of the case in tables and figures."""
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
@@ -67,9 +95,10 @@ class Case(Section):
     fixed: Held = Field(default_factory=dict)
     """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
     sequence: tuple[Segment, ...] = ()
-    """Command sequence of this case; empty takes `eval.sequence`, or else that of lifting or pushing."""
+    """Command sequence of this case; empty takes `eval.sequence`, or else `eval.scripts`, or else that of lifting or
+    pushing."""
     repetitions: int = Field(default=1, ge=1)
-    """How often the sequence is played in a row."""
+    """How often the sequence is played in a row; drawn scripts differ from one to the next."""
 
 
 class HeavyCase(Case):
@@ -80,28 +109,44 @@ class HeavyCase(Case):
 
 
 class Stagnation(Section):
-    """Pushes that cannot succeed (paper IV-D). Success is to stay upright in posture; E_v is expected to be large."""
+    """Pushes that cannot succeed (paper IV-D). Success is to go on pushing, upright in posture, on feet that do not
+    slide; E_v is expected to be large."""
 
     cases: tuple[Case, ...] = Field(
         default=(
-            Case(name="crate above friction", scene="push", mass=65.0, rolling_resistance=1.0, sequence=STAGNATION),
-            Case(name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION),
+            Case(
+                name="blocked crate",
+                scene="push",
+                mass=65.0,
+                fixed={"resistance_scale": 50.0, "ground_friction": 0.5},
+                sequence=STAGNATION,
+            ),
         ),
         min_length=1,
     )
-    """At μ 1.0 the 65 kg crate resists with 638 N, and foot friction of at most 1.2 allows 392 N; with fifty times its
-    resistance it does not move at all."""
+    """With fifty times its rolling resistance the 65 kg crate resists with 638 N or more, where foot friction of 0.5,
+    the least of training, allows 164 N. On better ground a robot in the commanded posture tips over before it pushes
+    with half of what friction allows."""
+
+
+Direction = Literal[
+    "forward", "forward left", "left", "backward left", "backward", "backward right", "right", "forward right"
+]
+EIGHT: tuple[Direction, ...] = get_args(Direction)
 
 
 class PushLadder(Section):
-    """Pushes on the base that grow until the robot falls: the impulse survived in each direction."""
+    """Pushes on the base that grow until the robot falls: the impulse survived in each direction. The robot has to
+    walk after it."""
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`."""
     mass: float = Field(default=4.0, ge=0)
     """Object mass [kg]."""
-    directions: tuple[Literal["forward", "backward", "left", "right"], ...] = ("forward", "backward", "left", "right")
+    directions: tuple[Direction, ...] = EIGHT
     """Horizontal directions in the frame of the robot's heading."""
+    trials: int | None = Field(default=5, ge=1, le=10_000)
+    """Trials of each size and direction; empty takes `eval.trials`. Few, for neighbours support each other."""
     impulses: tuple[float, ...] = Field(default=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0), min_length=1)
     """Sizes tried [N·s], ascending; 37 N·s would give robot and 4 kg box 1 m/s in the air."""
     time: float = Field(default=2.0, ge=0)
@@ -128,12 +173,26 @@ class Robustness(Section):
         Case(name="gains 80 %", fixed={"kp_scale": 0.8, "kd_scale": 0.8}),
         Case(name="gains 120 %", fixed={"kp_scale": 1.2, "kd_scale": 1.2}),
         Case(name="weak motors", fixed={"motor_strength": 0.7}),
+        Case(name="weak motors and linkages", fixed={"motor_strength": 0.7, "linkage_effort": 35.0}),
+        Case(name="latency 30 + 30 ms", fixed={"action_latency": 1.5, "sensor_latency": 1.5}),
         Case(name="friction 0.4", fixed={"ground_friction": 0.4}),
+        Case(name="crate, rolling resistance 0.02", scene="push", mass=30.0, rolling_resistance=0.02),
+        Case(name="crate, rolling resistance 0.15", scene="push", mass=30.0, rolling_resistance=0.15),
+        Case(name="box 0.2 m wide", scene="narrow_box"),
+        Case(name="box 0.45 m wide", scene="wide_box"),
+        Case(name="load 10 cm ahead", fixed={"object_com_offset_x": 0.1}),
+        Case(name="load 8 cm to the left", fixed={"object_com_offset_y": 0.08}),
         Case(name="held by friction", scene="squeeze"),
+        Case(name="bow 1.4 rad", sequence=(*BOWING, Segment(duration=3.0, ramp=2.5), *WALKING_ON)),
         Case(name="60 s", repetitions=3),
     )
     """Conditions with a 4 kg box: twice the training's largest bias of encoders [rad], inertial unit [rad], gyroscope
-    [rad/s], twice its change of gains and loss of strength, less than its least friction, palms that hold the box by
-    nothing but friction, three sequences in a row."""
+    [rad/s], twice its change of gains and loss of strength, the least that the linkages give in training besides,
+    actions and sensors late by one and a half control periods each, less than training's least friction, 30 kg crates
+    at both ends of the rolling resistance, boxes narrower and wider than training's 0.25 m, loads further from the
+    middle than training's 3 cm, palms that hold the box by nothing but friction, the paper's deepest bow, three
+    sequences in a row."""
     pushes: PushLadder | None = PushLadder()
-    """Pushes on the base; empty leaves them out."""
+    """Pushes on the base while standing; empty leaves them out."""
+    walking_pushes: PushLadder | None = PushLadder(time=4.0, sequence=WALKING)
+    """Pushes on the base while walking; empty leaves them out."""

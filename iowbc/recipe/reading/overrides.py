@@ -1,6 +1,6 @@
 """`--set a.b.c=value`: single values of a recipe changed on the command line."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pydantic import BaseModel
 
@@ -51,7 +51,10 @@ def _default(path: tuple[str, ...], place: str) -> Located:
     """The list that a recipe has at a path when it says nothing there; anything else starts empty."""
     value: object = Recipe(name="default")
     for name in path:
-        value = getattr(value, name) if isinstance(value, Section) and name in type(value).model_fields else None
+        if isinstance(value, Mapping):
+            value = value.get(name)
+        else:
+            value = getattr(value, name) if isinstance(value, Section) and name in type(value).model_fields else None
     if not isinstance(value, (list, tuple)):
         return Located({}, place)
     items = [item.model_dump(mode="json") if isinstance(item, BaseModel) else item for item in value]

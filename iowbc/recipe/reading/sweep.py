@@ -4,7 +4,7 @@ import hashlib
 import itertools
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from iowbc.recipe.reading.document import Located, plain, read_document, read_va
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.reading.validation import descend
-from iowbc.recipe.sweep import MOST_VALUES, Range, SweepFile
+from iowbc.recipe.sweep import MOST_POINTS, MOST_VALUES, Range, SweepFile
 
 INTEGERS = re.compile(r"(-?[0-9]{1,10})\.\.(-?[0-9]{1,10})")
 """`0..4`: the integers 0 to 4."""
@@ -53,10 +53,17 @@ class Sweep:
     points: tuple[Point, ...]
 
 
-def load_sweep(word: str, settings: Sequence[str], file: Path | None = None) -> Sweep:
+def load_sweep(
+    word: str,
+    settings: Sequence[str],
+    file: Path | None = None,
+    most: int = MOST_POINTS,
+    counted: Callable[[int], None] = lambda count: None,
+) -> Sweep:
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
     settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and go before what the file says.
+    most: points at most. counted: is told their number before any is read.
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
@@ -79,8 +86,10 @@ def load_sweep(word: str, settings: Sequence[str], file: Path | None = None) -> 
     count = len(drawn)
     for values in grid.values():
         count *= len(values)
-    if count > MOST_VALUES:
-        raise RecipeError([Problem(str(file or "--set"), f"{count:,} points; a sweep has {MOST_VALUES:,} at most")])
+    if count > most:
+        text = f"{count:,} points, more than {most:,}; vary less, or allow them: `iowbc sweep --points {count}`"
+        raise RecipeError([Problem(str(file or "--set"), text)])
+    counted(count)
     points = []
     for draw in drawn:
         for combination in itertools.product(*grid.values()):

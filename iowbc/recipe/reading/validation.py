@@ -103,7 +103,8 @@ def _told(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str, str]]:
     reason = error.get("ctx", {}).get("error")
     if isinstance(reason, Unfitting):
         for dotted, text in reason.problems:
-            path, found = descend(tree, [int(part) if part.isdecimal() else part for part in dotted.split(".")])
+            below = [int(part) if part.isdecimal() else part for part in dotted.split(".")]
+            path, found = descend(tree, [*error["loc"], *below])
             yield found.place, _head(path, found), text
     else:
         yield _problem(tree, error)

@@ -17,6 +17,8 @@ SWITCHES = ("impulse_scale", "push_scale", "noise_scale", "load_scale", "resista
 """Factors on impulses, pushes and sensor noise, on how far the object's mass may rise above the lower end of its range,
 and on a crate's rolling resistance (fifty times as much blocks it). One unless held at another value; zero switches
 off."""
+BY_AXIS = tuple(f"object_com_offset_{axis}" for axis in "xyz")
+"""The parts of the offset of the object's centre of mass, in its own frame."""
 HOLDABLE = (
     *(name for name, field in Randomization.model_fields.items() if field.annotation is Distribution),
     *(
@@ -31,6 +33,7 @@ HOLDABLE = (
         if field.annotation is Distribution
     ),
     *SWITCHES,
+    *BY_AXIS,
     "object_mass",
     "partner_behaviour",
 )

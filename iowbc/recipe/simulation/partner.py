@@ -2,11 +2,13 @@
 
 from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.distribution import Distribution
 
+LONGEST_DELAY = 10.0
+"""Commands of so long a time are remembered at most [s]."""
 TRAINED = ("path", "follower", "leader", "stopping")
 """Behaviours that training may draw."""
 BEHAVIOURS = (*TRAINED, "tugging", "lagging")
@@ -98,9 +100,17 @@ class Partner(Section):
     damping: Distribution = Distribution(low=20.0, high=100.0, nominal=50.0, shape="log-uniform")
     """Damping at the handle [N·s/m]."""
     delay: Distribution = Distribution(low=0.05, high=0.3, nominal=0.15)
-    """Time by which the partner lags behind the commanded motion [s]; human reaction times."""
+    """Time by which the partner lags behind the commanded motion [s], up to 10; human reaction times."""
     behaviours: Behaviours = Field(default=Behaviours(), json_schema_extra=LATER)
     """Behaviours that are drawn for the episodes."""
+
+    @field_validator("delay")
+    @classmethod
+    def _short(cls, delay: Distribution) -> Distribution:
+        if not all(0.0 <= value <= LONGEST_DELAY for value in (delay.low, delay.high, delay.nominal)):
+            raise ValueError(f"should be 0 to {LONGEST_DELAY:g} s")
+        return delay
+
     leader: Leader = Field(default=Leader(), json_schema_extra=LATER)
     """Motion of a leader."""
     stopping: Stopping = Field(default=Stopping(), json_schema_extra=LATER)

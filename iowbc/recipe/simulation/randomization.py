@@ -1,9 +1,15 @@
 """What is drawn anew for each episode, and the disturbances within one; ranges of the paper's Table I."""
 
-from pydantic import Field
+from typing import Self
 
-from iowbc.recipe.section import LATER, Section
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import LATER, Section, Unfitting
 from iowbc.recipe.simulation.distribution import Distribution
+
+LATENCIES = ("action_latency", "sensor_latency", "object_latency")
+SIGNED = ("object_com_offset", "encoder_bias", "imu_tilt", "heading_drift", "gyro_bias", "start_yaw")
+"""Quantities that may be negative."""
 
 
 class Randomization(Section):
@@ -68,6 +74,21 @@ class Randomization(Section):
     """Delay of the measured pose and rates of the object [control periods]."""
     longest_latency: int = Field(default=4, ge=1, le=100)
     """Length of the delay lines [control periods]; no latency may pass it."""
+
+    @model_validator(mode="after")
+    def _can_be_simulated(self) -> Self:
+        problems = []
+        for name, values in self:
+            if isinstance(values, Distribution) and name not in SIGNED:
+                most = float(self.longest_latency) if name in LATENCIES else float("inf")
+                text = (
+                    f"should be 0 to longest_latency, {most:g} periods" if name in LATENCIES else "should be 0 or more"
+                )
+                ends = ((end, getattr(values, end)) for end in ("low", "high", "nominal"))
+                problems += [(f"{name}.{end}", text) for end, value in ends if not 0 <= value <= most]
+        if problems:
+            raise Unfitting(problems)
+        return self
 
 
 class Impulses(Section):

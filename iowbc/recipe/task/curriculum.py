@@ -98,6 +98,9 @@ class Curriculum(Section):
     the robot stood: a stepping statue."""
     least_walk: float = Field(default=2.0, ge=0.0)
     """Time with a commanded velocity from which on an episode says something about locomotion [s]."""
+    replay: float = Field(default=0.0, ge=0.0, le=1.0, json_schema_extra=LATER)
+    """Chance that an environment whose last new episode failed plays it again, with everything that was drawn: loads,
+    partner, latencies, commands, disturbances. It is forgotten when it succeeds. 0 always draws anew."""
     blame: float = Field(default=1.0, ge=0.0)
     """Time after an impulse or a push within which a fall is put down to it [s]."""
     limit: float = Field(default=2.0, ge=0.0, le=2.0)

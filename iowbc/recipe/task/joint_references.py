@@ -1,6 +1,6 @@
 """How a command becomes joint references."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -84,6 +84,9 @@ class GaitPrior(Section):
     walks as commanded and the policy only corrects it, at 0 it steps in place."""
     swing_clearance: float = Field(default=0.08, gt=0.0)
     """Height of the sole at mid-swing [m]; the reward's profile is this one, too."""
+    profile: Literal["sine", "rest"] = Field(default="sine", json_schema_extra=LATER)
+    """Height over the swing: clearance·sin(π·progress), which lands at 0.81 m/s, or clearance·sin²(π·progress), which
+    lifts off and lands at rest."""
     sway: float = Field(default=0.02, ge=0.0)
     """Amplitude of the pelvis' motion over the standing foot [m]. A pendulum of 0.7 m that steps every 0.37 s from side
     to side between feet 0.24 m apart sways by 0.022 m."""

@@ -1,8 +1,8 @@
 """Terms and weights of the reward."""
 
-from typing import Annotated
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from iowbc.recipe.section import LATER, OWN_NAME, Section
 from iowbc.recipe.task.own_function import OwnFunction
@@ -74,6 +74,12 @@ class Smoothness(Section):
     """Weight of Σ q̈² over all joints [rad²/s⁴]."""
     action_rate: float = -0.02
     """Weight of ‖a_t − a_{t−1}‖²."""
+    action_curvature: float = Field(default=0.0, json_schema_extra=LATER)
+    """Weight of ‖a_t − 2a_{t−1} + a_{t−2}‖²: what a policy makes of sensor noise."""
+    effort: float = Field(default=0.0, json_schema_extra=LATER)
+    """Weight of Σ max(|τ|/τ_max − `comfortable_effort`, 0)² over all joints: motors near their limit overheat."""
+    comfortable_effort: float = Field(default=0.5, ge=0.0, le=1.0, json_schema_extra=LATER)
+    """Part of the torque limit up to which `effort` costs nothing."""
     power: float = -1.0e-3
     """Weight of Σ |τ·q̇| [W]."""
     base_rates: float = -0.05
@@ -94,6 +100,11 @@ class GaitConstraint(Section):
     foot_slip: float = -1.0
     """Weight of the speed at which the soles slide, averaged by the weight that each bears [m/s]. Squared, a slide of
     0.1 m/s cost next to nothing, and feet that walked slid 0.3 m a metre."""
+    touchdown: float = Field(default=0.0, json_schema_extra=LATER)
+    """Weight of the squared downward velocity of both soles near the ground [m²/s²], which fades with their height over
+    `touchdown_height`."""
+    touchdown_height: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
+    """Height of a sole at which `touchdown` counts 37 % [m]."""
     standing: float = -1.0
     """Weight of the number of feet off the ground while the command is to stand."""
     foot_distance: float = -5.0
@@ -140,6 +151,24 @@ class OwnTerm(OwnFunction):
         return self.weight == 0.0
 
 
+class Later(Section):
+    """Weights that take over as an environment's level of locomotion rises."""
+
+    begin: float = Field(default=0.5, ge=0.0, le=2.0)
+    """Level of locomotion up to which the terms' own weights count."""
+    end: float = Field(default=0.9, ge=0.0, le=2.0)
+    """Level from which on these count; between the two they are interpolated."""
+    weights: dict[str, float] = Field(default_factory=dict)
+    """Weight by the dotted path of a term in this section, as `sync.progress`: it teaches to walk, and once a robot
+    walks makes it hurry."""
+
+    @model_validator(mode="after")
+    def _levels_ascend(self) -> Self:
+        if self.begin >= self.end:
+            raise ValueError(f"begin {self.begin:g} must be below end {self.end:g}")
+        return self
+
+
 class Reward(Section):
     """Sum of the terms, per second; a step's reward is the sum times the control period, plus the cost of a fall."""
 
@@ -153,14 +182,32 @@ class Reward(Section):
     """Gait constraint."""
     yielding: Yielding = Field(default=Yielding(), json_schema_extra=LATER)
     """Compliance of hands and velocity."""
+    without: tuple[Literal["sync", "object", "smooth", "gait"], ...] = Field(default=(), json_schema_extra=LATER)
+    """Groups of terms that count nothing, whatever their weights: ablations of r_sync, r_obj, r_smooth, r_gait."""
     alive: float = 0.5
     """Reward a second for not having fallen."""
     termination: float = -3.0
     """Added once when an episode ends in a fall or a drop, not scaled by the control period."""
+    later: Later | None = Field(default=None, json_schema_extra=LATER)
+    """Weights of a robot that walks; empty keeps them as they are."""
     own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnTerm] = Field(
         default_factory=dict, json_schema_extra=LATER
     )
     """Terms of one's own, by a name for their curve; training alone executes them."""
+
+    @model_validator(mode="after")
+    def _later_weights_are_of_terms(self) -> Self:
+        groups = {name: value for name, value in self if isinstance(value, Section) and name != "later"}
+        terms = {"alive", "termination"} | {
+            f"{group}.{name}"
+            for group, section in groups.items()
+            for name, value in section
+            if isinstance(value, float | Kernel)
+        }
+        unknown = sorted(set(self.later.weights if self.later else ()) - terms)
+        if unknown:
+            raise ValueError(f"later.weights: no term {unknown[0]!r}; valid: {', '.join(sorted(terms))}")
+        return self
 
     @property
     def own_terms(self) -> dict[str, OwnTerm]:

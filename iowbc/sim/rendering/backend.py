@@ -13,12 +13,15 @@ CARDS = ("/dev/nvidia0", "/dev/dri/renderD128")
 
 
 def backend() -> str:
-    """The backend that `MUJOCO_GL` asks for; without it EGL where there is a graphics card, else software."""
-    asked = os.environ.get("MUJOCO_GL", "").strip().lower()
+    """The backend that `MUJOCO_GL` asks for, which commands pass on as `IOWBC_GL`; without it EGL where there is a
+    graphics card, else software."""
+    asked = os.environ.get("IOWBC_GL", os.environ.get("MUJOCO_GL", "")).strip().lower()
     if asked in BACKENDS:
+        if not ctypes.util.find_library(BACKENDS[asked]):
+            raise NoRenderer(f"MUJOCO_GL={asked}, but lib{BACKENDS[asked]} is not installed: install or unset it")
         return asked
     if asked not in ("", "glfw", "glx", "enable", "enabled", "on", "true", "1"):
-        raise NoRenderer(f"MUJOCO_GL={asked} switches drawing off; unset it or set it to one of {', '.join(BACKENDS)}")
+        raise NoRenderer(f"MUJOCO_GL={asked} draws nothing; unset it or set it to one of {', '.join(BACKENDS)}")
     installed = [name for name, library in BACKENDS.items() if ctypes.util.find_library(library)]
     if not installed:
         raise NoRenderer(

@@ -5,12 +5,13 @@ from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
+from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import SimulationState
 from iowbc.task.endings import Ending
 from iowbc.task.judge import Judgement
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
-from iowbc.task.record.signals import COUNTERS, ERRORS, KINDS, REASONS
+from iowbc.task.record.signals import ACTION_SIGNAL, COUNTERS, ERRORS, KINDS, REASONS
 from iowbc.task.rewards import smooth
 from iowbc.task.vector.shared import Buffers
 
@@ -54,18 +55,25 @@ def write_signals(
     buffers["signal/foot_contact"][:] = state.foot_contact
 
 
-def write_trial_signals(buffers: Buffers, state: SimulationState, foot_slide: Array) -> None:
-    """The signals that only planned episodes have; see `iowbc.task.record.signals.TRIAL_SIGNALS`."""
-    n = len(state.base_position)
-    values = {
+def write_trial_signals(buffers: Buffers, simulation: Simulation, correction: Array) -> None:
+    """The signals that only planned episodes have; see `iowbc.task.record.signals.TRIAL_SIGNALS`.
+
+    correction: what the action adds to the reference, (n, support) [rad].
+    """
+    state, n = simulation.state, simulation.n
+    values = simulation.soles | {
         "torso_position": state.base_position + TORSO_CENTRE * state.torso_rotation[:, :, 2],
         "object_position": state.object_position,
         "foot_position": state.foot_position.reshape(n, -1),
-        "foot_slide": foot_slide,
         "foot_load": state.foot_force[:, :, 2],
+        "foot_shear": np.hypot(state.foot_force[:, :, 0], state.foot_force[:, :, 1]),
         "link_object_force": state.link_object_force[:, None],
+        "external_force": state.external_force[:, :3],
+        "handle_velocity": state.handle_velocity,
+        "partner_velocity": state.partner_velocity,
         "joint_torque": state.joint_torque,
         "joint_saturation": state.saturation,
+        ACTION_SIGNAL: correction,
     }
     for name, columns in values.items():
         buffers[f"signal/{name}"][:] = columns

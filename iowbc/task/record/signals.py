@@ -42,14 +42,26 @@ TRIAL_SIGNALS = {
     "object_position": 3,
     "foot_position": 6,
     "foot_slide": 2,
+    "foot_margin": 2,
+    "foot_sink": 2,
+    "foot_peak": 2,
     "foot_load": 2,
+    "foot_shear": 2,
     "link_object_force": 1,
+    "external_force": 3,
+    "handle_velocity": 3,
+    "partner_velocity": 3,
 }
 """Further signals of planned episodes, world frame: a point in the torso, the object (zero without one), left and right
-sole centre [m], their velocities [m/s], the ground's vertical force on each foot [N], the size of the net force of
-thighs, torso and arms on the object [N]."""
+sole centre [m]; of each foot the speed at its centre of pressure [m/s], that centre's distance from the edge of the
+sole [m], the downward speed of its lowest corner [m/s], the ground's largest force in any physics step, its vertical
+and its horizontal force in the last one [N]; the size of the net force of thighs, torso and arms on the object, the
+force of partner, impulses and pulls on it [N]; the velocity of its far handle, and the one that the partner intends for
+it [m/s]."""
 JOINT_SIGNALS = ("joint_torque", "joint_saturation")
 """Signals of planned episodes with a value a joint: torque [N·m], whether it is at its limit."""
+ACTION_SIGNAL = "action"
+"""Signal of planned episodes with a value a support joint: what the action adds to the reference [rad]."""
 
 REASONS = ("fallen", "dropped", "lagging", "time_limit", "diverged")
 """Why an episode ended."""
@@ -68,9 +80,9 @@ COUNTERS = (
 """Columns of the statistics: sums since they were last read. Length in steps, errors absolute."""
 
 
-def trial_signals(joints: int) -> dict[str, int]:
-    """The signals that only planned episodes have, with their sizes."""
-    return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints)
+def trial_signals(joints: int, support: int) -> dict[str, int]:
+    """The signals that only planned episodes have, with their sizes; so many joints, and support joints among them."""
+    return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints) | {ACTION_SIGNAL: support}
 
 
 def buffer_fields(observation: int, action: int, terms: int, extra: Mapping[str, int] = NO_SIGNALS) -> Fields:

@@ -28,6 +28,13 @@ def foot_slip(foot_velocity: Array, foot_force: Array) -> Array:
     return slip
 
 
+def touchdown(sole_height: Array, vertical_velocity: Array, fading: float) -> Array:
+    """Σ min(ż, 0)²·exp(−z/fading) over the feet, (n,) [m²/s²]; height z [m] and vertical velocity ż [m/s], (n, 2)."""
+    sinking = np.square(np.minimum(vertical_velocity, 0.0))
+    near: Array = (sinking * np.exp(-np.maximum(sole_height, 0.0) / fading)).sum(axis=1)
+    return near
+
+
 def standing(contact: Mask, stepping: Mask) -> Array:
     """Feet off the ground while the clock rests, (n,); feet (n, 2), clock (n,)."""
     lifted: Array = (~contact).sum(axis=1) * ~stepping

@@ -7,7 +7,7 @@ from operator import attrgetter
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.reward import Kernel, Reward
+from iowbc.recipe.task.reward import Kernel, Later, Reward
 from iowbc.task.rewards.kernel import kernel
 from iowbc.task.rewards.own import load_terms
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
@@ -60,8 +60,10 @@ class RewardFunction:
         execute the recipe's own terms, which else count nothing. Raises StageFailed for one that cannot be used."""
         table = TERMS if terms is None else terms
         self._columns = len(table) + len(recipe.own_terms)
+        seconds = {path: 1.0 if path in ONCE else period for path in table}
+        seconds |= {path: 0.0 for path in table if path.partition(".")[0] in recipe.without}
         weighted = {
-            path: _weighted(column, function, attrgetter(path)(recipe), 1.0 if path in ONCE else period)
+            path: _weighted(column, function, attrgetter(path)(recipe), seconds[path])
             for column, (path, function) in enumerate(table.items())
         }
         if own:
@@ -72,11 +74,18 @@ class RewardFunction:
         self._terms = [term for path, term in weighted.items() if term.weight != 0.0 or path in TRACKED]
         self._tracked = [weighted[path].column for path in TRACKED]
         self._once = [weighted[path].column for path in ONCE]
-        self._weights = np.zeros(self._columns)
+        self._weights, self._change = np.zeros(self._columns), np.zeros(self._columns)
         self._weights[[term.column for term in weighted.values()]] = [term.weight for term in weighted.values()]
+        self._later = recipe.later
+        for path, weight in (recipe.later.weights if recipe.later else {}).items():
+            changed = weighted[path]
+            self._change[changed.column] = weight * seconds[path] - changed.weight
+            if changed not in self._terms:
+                self._terms.append(changed)
 
-    def __call__(self, step: Step, diverged: Mask) -> Scored:
-        """Reward of one control step. What diverged, (n,), cannot be judged: it costs like a fall, and no more."""
+    def __call__(self, step: Step, diverged: Mask, level: Array) -> Scored:
+        """Reward of one control step at levels of locomotion (n,). What diverged, (n,), cannot be judged: it costs like
+        a fall, and no more."""
         terms = np.zeros((len(step.command), self._columns))
         for term in self._terms:
             terms[:, term.column] = term.value(step)
@@ -84,8 +93,14 @@ class RewardFunction:
             terms[diverged] = 0.0
             terms[diverged, self._once] = 1.0
         tracking = terms[:, self._tracked]
-        terms *= self._weights
+        terms *= self._weights if self._later is None else self._weights + self._taken_over(self._later, level)
         return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
+
+    def _taken_over(self, later: Later, level: Array) -> Array:
+        """Change of the weights at levels (n,), (n, terms)."""
+        part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
+        change: Array = part[:, None] * self._change
+        return change
 
 
 def _weighted(column: int, function: Term, setting: float | Kernel, seconds: float) -> WeightedTerm:

@@ -5,6 +5,9 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.task.rewards.kernel import squared_norm
 
+LEAST_LIMIT = 1.0
+"""Torque limit that a motor at its no-load speed counts as having [N·m]; there it has none."""
+
 
 def joint_acceleration(acceleration: Array) -> Array:
     """Σ q̈², (n,) [rad²/s⁴]; joints (n, 29)."""
@@ -14,6 +17,16 @@ def joint_acceleration(acceleration: Array) -> Array:
 def action_rate(action: Array, previous: Array) -> Array:
     """‖a_t − a_{t−1}‖², (n,); actions (n, 15)."""
     return squared_norm(action - previous)
+
+
+def action_curvature(action: Array, previous: Array, before: Array) -> Array:
+    """‖a_t − 2a_{t−1} + a_{t−2}‖², (n,); actions (n, 15)."""
+    return squared_norm(action - 2.0 * previous + before)
+
+
+def effort(torque: Array, limit: Array, comfortable: float) -> Array:
+    """Σ max(|τ|/τ_max − comfortable, 0)², (n,); joints (n, 29) [N·m]."""
+    return squared_norm(np.maximum(np.abs(torque) / np.maximum(limit, LEAST_LIMIT) - comfortable, 0.0))
 
 
 def power(torque: Array, velocity: Array) -> Array:

@@ -48,6 +48,8 @@ class Step:
     """a_t, (n, 15)."""
     previous_action: Array
     """a_{t−1}, (n, 15)."""
+    earlier_action: Array
+    """a_{t−2}, (n, 15)."""
     swing_profile: Array
     """Height at which the gait prior has the soles, (n, 2) [m]."""
     stepping: Mask
@@ -94,6 +96,10 @@ TERMS: dict[str, Term] = {
     ),
     "smooth.joint_acceleration": lambda s: smooth.joint_acceleration(s.state.joint_acceleration),
     "smooth.action_rate": lambda s: smooth.action_rate(s.action, s.previous_action),
+    "smooth.action_curvature": lambda s: smooth.action_curvature(s.action, s.previous_action, s.earlier_action),
+    "smooth.effort": lambda s: smooth.effort(
+        s.state.joint_torque, s.state.torque_limit, s.recipe.smooth.comfortable_effort
+    ),
     "smooth.power": lambda s: smooth.power(s.state.joint_torque, s.state.joint_velocity),
     "smooth.base_rates": lambda s: smooth.base_rates(s.state.base_angular_velocity),
     "smooth.vertical_velocity": lambda s: smooth.vertical_velocity(s.motion.base_velocity, s.height_rate),
@@ -101,6 +107,9 @@ TERMS: dict[str, Term] = {
     "gait.contact_timing": lambda s: gait.contact_timing(s.state.foot_contact, s.stance),
     "gait.swing_height": lambda s: gait.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
     "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_force),
+    "gait.touchdown": lambda s: gait.touchdown(
+        s.state.foot_position[:, :, 2], s.state.foot_velocity[:, :, 2], s.recipe.gait.touchdown_height
+    ),
     "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
     "yielding.force": lambda s: s.unyielded_force,

@@ -48,7 +48,7 @@ class Setup:
     def buffer_fields(self) -> Fields:
         """What passes between the environments and the learner."""
         robot = load_robot(self.specification.robot)
-        extra = {} if self.episodes is None else trial_signals(len(robot.joints))
+        extra = {} if self.episodes is None else trial_signals(len(robot.joints), len(robot.support))
         recipe = self.specification.recipe
         terms = len(term_names(recipe.task.reward))
         return buffer_fields(full_layout(recipe, robot).size, len(robot.support), terms, extra)

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.pilots import Pilot
+from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, side_by_side
 from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
@@ -25,6 +25,17 @@ from iowbc.task.record.statistics import Statistics
 from iowbc.task.rewards.own import load_terms
 from iowbc.task.rewards.reward import term_names
 from iowbc.task.specification import Specification
+from iowbc.task.vector.messages import (
+    GetDrawn,
+    GetLevels,
+    GetSnapshot,
+    MakeStep,
+    Message,
+    Reset,
+    Restore,
+    Roll,
+    SetLevels,
+)
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.snapshots import join, split
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
@@ -95,7 +106,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def reset(self) -> NDArray[np.float32]:
         """Begins an episode everywhere; after `seed` with those seeds."""
         seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
-        self._call("reset", [(None if seeds is None else seeds[first:last],) for first, last in self.workers.groups])
+        self._call([Reset(None if seeds is None else seeds[first:last]) for first, last in self.workers.groups])
         self._reset_seeds()
         self._reset_options()
         return self._buffers["observation"].copy()
@@ -109,7 +120,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             rows = np.flatnonzero(~np.isfinite(given).all(axis=1))
             raise ValueError(f"actions of environments {rows.tolist()} are not finite, the first is {given[rows[0]]}")
         self._buffers["action"][:] = given
-        self.workers.ask("step")
+        self.workers.ask([MakeStep() for _ in self.workers.groups])
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Results of the step: observations, rewards, dones, infos; ended environments have begun anew."""
@@ -121,10 +132,10 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             infos[index] = self._ending(index)
         return buffers["observation"].copy(), buffers["reward"].copy(), done, infos
 
-    def roll(self, pilot: Pilot, steps: int) -> Trajectories:
-        """Lets a pilot drive for some control steps, each group of environments where it is: one message to each worker
+    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
+        """Make a rollout of some control steps, each group of environments where it is: one message to each worker
         and one back. What comes of it does not depend on the workers."""
-        return side_by_side(self._call("roll", [(pilot.part(*group), steps) for group in self.workers.groups]))
+        return side_by_side(self._call([Roll(rollout_policy.part(*group), steps) for group in self.workers.groups]))
 
     def _ending(self, index: int) -> dict[str, Any]:
         """What stable-baselines3 wants to know of an episode's end, and why it ended."""
@@ -147,7 +158,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (num_envs,) or (num_envs, k)."""
-        return join(self._call("drawn"))
+        return join(self._call_all(GetDrawn()))
 
     def curriculum(self) -> dict[str, Any]:
         """How far the curriculum is, for JSON: the levels of each axis in each scene, ascending."""
@@ -169,18 +180,18 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             for place, axis in enumerate(AXES):
                 quantiles = (np.arange(len(rows)) + 0.5) / len(rows)
                 levels[rows, place] = np.quantile(known.get(name, every)[axis], quantiles)
-        self._call("set_levels", [(levels[first:last],) for first, last in self.workers.groups])
+        self._call([SetLevels(levels[first:last]) for first, last in self.workers.groups])
 
     def state(self) -> dict[str, Array]:
         """Everything that the future depends on; the same however many workers there are."""
-        return join(self._call("snapshot")) | {"statistics": self._statistics.carried.copy()}
+        return join(self._call_all(GetSnapshot())) | {"statistics": self._statistics.carried.copy()}
 
     def restore(self, state: Mapping[str, Array]) -> None:
         """Inverse of `state`: the environments then take bit for bit the same course."""
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
-        self._call("restore", [(part,) for part in parts])
+        self._call([Restore(part) for part in parts])
         self._reset_seeds()
 
     def close(self) -> None:
@@ -213,7 +224,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         axes = value if isinstance(value, Mapping) else dict.fromkeys(AXES, value)
         for axis, level in axes.items():
             levels[rows, AXES.index(axis)] = level
-        self._call("set_levels", [(levels[first:last],) for first, last in self.workers.groups])
+        self._call([SetLevels(levels[first:last]) for first, last in self.workers.groups])
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
@@ -231,10 +242,13 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         return [False for _ in self._get_indices(indices)]
 
     def _levels(self) -> Array:
-        return np.concatenate(self._call("levels"))
+        return np.concatenate(self._call_all(GetLevels()))
 
-    def _call(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
-        self.workers.ask(request, arguments)
+    def _call_all(self, message: Message) -> list[Any]:
+        return self._call([message for _ in self.workers.groups])
+
+    def _call(self, messages: Sequence[Message]) -> list[Any]:
+        self.workers.ask(messages)
         return self.workers.answers()
 
 

@@ -9,10 +9,13 @@ import signal
 import sys
 import traceback
 from multiprocessing.connection import Connection
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
+
+if TYPE_CHECKING:
+    from iowbc.task.vector.messages import Message
 
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
 """With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
@@ -40,7 +43,7 @@ def main() -> None:
 
 
 def _serve(connection: Connection, memory: int) -> None:
-    """Answers requests: a method of the batch by name, with its arguments."""
+    """Answers messages."""
     try:
         from iowbc.task.vector.setup import Setup
         from iowbc.task.vector.shared import attach_shared
@@ -51,8 +54,8 @@ def _serve(connection: Connection, memory: int) -> None:
         gc.freeze()  # what lives as long as the process need not be looked through at every collection
         connection.send((True, None))
         while True:
-            request, arguments = connection.recv()
-            connection.send_bytes(pickle.dumps((True, getattr(batch, request)(*arguments))))
+            message: Message = connection.recv()
+            connection.send_bytes(pickle.dumps((True, message.carry_out(batch))))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
     except IowbcError as error:

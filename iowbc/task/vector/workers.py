@@ -22,6 +22,7 @@ from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.batch import Batch
 from iowbc.task.record.signals import COUNTERS
 from iowbc.task.vector import worker
+from iowbc.task.vector.messages import Message
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import Buffers, create_shared, private_buffers
 
@@ -45,11 +46,11 @@ class Workers(Protocol):
     buffers: Buffers
     """What all environments read and write."""
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
-        """Begins a method of every group's batch, each with its own arguments."""
+    def ask(self, messages: Sequence[Message]) -> None:
+        """Sends each group its message, in their order."""
 
     def answers(self) -> list[Any]:
-        """What the methods returned, in the order of the groups."""
+        """What the groups answered, in their order."""
 
     def close(self) -> None:
         """Ends it all."""
@@ -64,9 +65,10 @@ class InProcess:
         self.batch: Batch = setup.batch(0, setup.count, self.buffers)
         self._answer: Any = None
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+    def ask(self, messages: Sequence[Message]) -> None:
         """See `Workers`."""
-        self._answer = getattr(self.batch, request)(*(arguments[0] if arguments else ()))
+        (message,) = messages
+        self._answer = message.carry_out(self.batch)
 
     def answers(self) -> list[Any]:
         """See `Workers`."""
@@ -122,14 +124,13 @@ class WorkerProcesses:
         """Process numbers of the workers."""
         return [process.popen.pid for process in self._processes]
 
-    def ask(self, request: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> None:
+    def ask(self, messages: Sequence[Message]) -> None:
         """See `Workers`. Answers that an interruption left lying are thrown away first."""
         if not self._ended.alive:
             raise WorkerFailed("the worker processes have ended; make a new vector environment")
         self._wait(self._patience)
-        given = arguments or [()] * len(self._processes)
-        messages = [pickle.dumps((request, own)) for own in given]
-        for index, (process, message) in enumerate(zip(self._processes, messages, strict=True)):
+        pickled = [pickle.dumps(message) for message in messages]
+        for index, (process, message) in enumerate(zip(self._processes, pickled, strict=True)):
             try:
                 process.connection.send_bytes(message)
             except (BrokenPipeError, ConnectionResetError):

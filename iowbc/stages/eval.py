@@ -1,27 +1,36 @@
 """Stage `eval`: mass sweeps, heavy cases and a probe of the trained policy, their tables, figures and films."""
 
 import math
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Spread, Stage, always
+from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.inputs import ENVIRONMENTS, generator_stage, leaves_student, policy_stage
-from iowbc.stages.spreading import play_everywhere
+from iowbc.recipe.section import deciding
+from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from iowbc.learning.acting import Policy
+    from iowbc.evaluation.trials.plan import Trial
+    from iowbc.evaluation.trials.protocol import Batches
+    from iowbc.evaluation.trials.rollout import Acting
     from iowbc.task.specification import Specification
 
 
-def acting_stage(recipe: Recipe) -> str:
-    """The stage whose artifact holds the policy to evaluate."""
-    return policy_stage(recipe) if recipe.eval.policy == "student" else "teacher"
+FORCES = ("handle_force_p95", "hand_force_p95")
+"""Shown of each behaviour of the partner."""
+
+
+def acting_stage(recipe: Recipe) -> tuple[str, ...]:
+    """The stage whose artifact holds the policy to evaluate; none for the quadratic program."""
+    stages = {"student": (policy_stage(recipe),), "teacher": ("teacher",), "model": ()}
+    return stages[recipe.eval.policy]
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -29,20 +38,32 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
     if recipe.eval.policy == "student" and not leaves_student(recipe):
         text = "asks for the student, and no stage of the recipe trains one: add `distill` to its stages, or evaluate "
         yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
+    if recipe.eval.policy == "model" and recipe.eval.probe is not None:
+        yield "eval.probe", "reads what a trained policy knows of its load: leave it out, or evaluate the student"
+
+
+def defaults(recipe: Recipe) -> dict[str, object]:
+    """The command sequences of sweeps and cases that have none in the recipe."""
+    if recipe.eval.sequence:
+        return {}
+    return {
+        f"defaults.{name}_sequence": [deciding(segment) for segment in sequence]
+        for name, sequence in (("lifting", LIFTING), ("pushing", PUSHING))
+    }
 
 
 def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
     import torch
 
+    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.trials.protocol import evaluated_world
-    from iowbc.learning.acting import load_policy
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
     recipe = job.recipe
-    policy = load_policy(job.inputs[acting_stage(recipe)])
     world = evaluated_world(Specification(recipe, job.robot, job.inputs.get("rg-fit")))
+    policy = evaluated_policy(world, read_by_trials(job).get("policy"))
     metrics: dict[str, float] = {}
     try:
         if recipe.eval.measured:
@@ -55,10 +76,11 @@ def run(job: Job) -> None:
     job.summarize(metrics)
 
 
-def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import Film, film_trial, filmed
+    from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
 
@@ -83,13 +105,13 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
             film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
-    for suite, rows in summary[summary["kind"] != "pushes"].groupby("suite", sort=False):
+    for suite, rows in summary[~summary["kind"].isin(PROBING)].groupby("suite", sort=False):
         counts = ", ".join(f"{_load(row)} {row['succeeded']}/{row['trials']}" for _, row in rows.iterrows())
         job.report.say(f"{suite}: succeeded {counts}")
     return headline(summary)
 
 
-def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
+def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
     from iowbc.evaluation.probe.readings import read
     from iowbc.evaluation.probe.regression import inferred_masses
@@ -120,16 +142,49 @@ def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float
 
 def read_by_trials(job: Job) -> dict[str, Path]:
     """Folders from which a batch of trials can be played on another machine; see `play_batch`."""
-    generator = {"generator": job.inputs["rg-fit"]} if "rg-fit" in job.inputs else {}
-    return {"robot": job.robot, "policy": job.inputs[acting_stage(job.recipe)], **generator}
+    read = [("generator", "rg-fit"), *(("policy", stage) for stage in acting_stage(job.recipe))]
+    return {"robot": job.robot} | {name: job.inputs[stage] for name, stage in read if stage in job.inputs}
+
+
+def play_everywhere(
+    spread: Spread, recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
+) -> "Iterator[tuple[str, bytes]]":
+    """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
+    names = list(batches)
+    for place, content in spread(play_batch, [(recipe, name, batches[name]) for name in names], folders):
+        yield names[place], content
+
+
+def play_batch(
+    recipe: Recipe,
+    name: str,
+    trials: "Sequence[Trial]",
+    *,
+    robot: Path,
+    policy: Path | None = None,
+    generator: Path | None = None,
+) -> bytes:
+    """The file of one batch."""
+    import torch
+
+    from iowbc.evaluation.acting import evaluated_policy
+    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.task.specification import Specification
+
+    torch.set_num_threads(1)  # as in the stage
+    world = evaluated_world(Specification(recipe, robot, generator))
+    with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
+        return Protocol(world, evaluated_policy(world, policy), work=Path(folder), workers=0).play(name, trials)
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:
-    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite."""
+    """The figures to show at the end of a run: success and errors at the lightest and heaviest mass of each suite, and
+    forces where a partner is met."""
+    from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.trials.errors import ERRORS
 
     metrics = {name: float(summary[name].sum()) for name in ("trials", "survived", "succeeded")}
-    for _, row in summary[summary["kind"] != "pushes"].iterrows():
+    for _, row in summary[~summary["kind"].isin(PROBING)].iterrows():
         rows = summary[summary["suite"] == row["suite"]]
         if row["case"] == row["suite"] and row["mass"] not in (rows["mass"].min(), rows["mass"].max()):
             continue
@@ -139,6 +194,8 @@ def headline(summary: "pd.DataFrame") -> dict[str, float]:
             metrics[f"{name}/transport"] = float(row["transport_robot"])
         if row["survived"]:
             metrics |= {f"{name}/{error}": float(row[error]) for error in ERRORS}
+        forces = FORCES if row["kind"] == "compliance" else ()
+        metrics |= {f"{name}/{force}": float(row[force]) for force in forces if not math.isnan(row[force])}
     return metrics
 
 
@@ -150,13 +207,18 @@ def _load(row: "pd.Series[Any]") -> str:
 
 STAGE = Stage(
     name="eval",
-    version=5,
+    version=6,
     slice=("rg.height", "simulation", "task", "eval"),
-    reads=lambda recipe: (*generator_stage(recipe), acting_stage(recipe)),
+    reads=lambda recipe: (*generator_stage(recipe), *acting_stage(recipe)),
     run=run,
     problems=problems,
+    defaults=defaults,
     results=("*.parquet",),
-    packages=("stages.evaluate", "evaluation", "deploy", "learning", "rollouts", *ENVIRONMENTS),
     counts=("eval.trials",),
+    presentation=Presentation(
+        headline=("trials", "survived", "succeeded"),
+        columns=("succeeded", "trials"),
+        pictures=("comparison.png", "compliance.png", "push_map.png"),
+    ),
     spreads=always,
 )

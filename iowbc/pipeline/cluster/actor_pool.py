@@ -17,13 +17,13 @@ TRIES = 5
 POLL = 0.2
 """Seconds between two looks at the members."""
 CORE_PATIENCE = 30.0
-"""Seconds after which a member that waits for a core shares one: those that are there may be held by crews that wait
+"""Seconds after which a member that waits for a core shares one: those that are there may be held by pools that wait
 for this one's, or may have gone for good."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """How the members of a crew are made."""
+    """How the members of an actor pool are made."""
 
     driver: Identity
     make: Callable[..., Member]
@@ -31,7 +31,7 @@ class Origin:
     copy: bool
 
 
-class Holder:
+class ActorHost:
     """What Ray holds on a node: one member, made from these arguments."""
 
     def __init__(self, origin: Origin, arguments: tuple[Any, ...]) -> None:
@@ -42,7 +42,7 @@ class Holder:
         """Name of the node, once it runs there."""
         return identity().host
 
-    def ask(self, state: Any, request: str, arguments: tuple[Any, ...], changes: bool) -> tuple[bool, Any, Any]:
+    def ask(self, state: Any, message: Any, changes: bool) -> tuple[bool, Any, Any]:
         """Whether the request went well; the answer, or what was wrong; and the state after it, where it changes any.
 
         `state`: from which a member that is not made yet goes on. Raises what Ray raises where inputs are lost.
@@ -54,7 +54,7 @@ class Holder:
                 self._member = self._made()
                 if state is not None:
                     self._member.restore(state)
-            answer = self._member.ask(request, arguments)
+            answer = self._member.ask(message)
             return True, answer, self._member.state() if changes else None
         except ray.exceptions.RayError:
             raise
@@ -100,8 +100,8 @@ class Place:
     """Ray's references to what it has not answered yet."""
 
 
-class NodeCrew:
-    """Members on the nodes of the cluster. See `Crew`."""
+class NodeActorPool:
+    """Members on the nodes of the cluster. See `ActorPool`."""
 
     def __init__(
         self,
@@ -117,28 +117,26 @@ class NodeCrew:
 
         self._called = called
         self._origin, self._interrupted, self._say = origin, interrupted, say
-        self._request: tuple[str, Sequence[tuple[Any, ...]], bool] = ("", (), False)
+        self._request: tuple[Sequence[Any], bool] = ((), False)
         self._patience = 0.0
-        self._holder = ray.remote(Holder)
+        self._holder = ray.remote(ActorHost)
         self._places = [Place(arguments) for arguments in calls]
         for place in self._places:
             self._send(place)
 
     @property
     def states(self) -> list[Any]:
-        """See `Crew`."""
+        """See `ActorPool`."""
         return [place.state for place in self._places]
 
-    def ask(
-        self, request: str, arguments: Sequence[tuple[Any, ...]], *, changes: bool = True, patience: float = 600.0
-    ) -> None:
-        """See `Crew`."""
-        self._request, self._patience = (request, arguments, changes), patience
+    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
+        """See `ActorPool`."""
+        self._request, self._patience = (messages, changes), patience
         for index in range(len(self._places)):
             self._begin(index)
 
     def answers(self) -> list[Any]:
-        """See `Crew`."""
+        """See `ActorPool`."""
         import ray
 
         while waiting := {one: place for place in self._places for one in place.waiting}:
@@ -153,7 +151,7 @@ class NodeCrew:
         return [place.answer for place in self._places]
 
     def close(self) -> None:
-        """See `Crew`."""
+        """See `ActorPool`."""
         import ray
 
         for place in self._places:
@@ -169,9 +167,9 @@ class NodeCrew:
 
     def _begin(self, index: int) -> None:
         """Asks a member; one that is remade goes on from its last state."""
-        request, arguments, changes = self._request
+        messages, changes = self._request
         place = self._places[index]
-        asked = place.actor.ask.remote(None if place.host else place.state, request, arguments[index], changes)
+        asked = place.actor.ask.remote(None if place.host else place.state, messages[index], changes)
         place.waiting[asked] = "answer"
         place.since, place.took = time.monotonic(), None
 
@@ -200,7 +198,7 @@ class NodeCrew:
         place.losses = 0
         place.took = time.monotonic() - place.since if place.made else None
         place.made = True
-        if self._request[2]:
+        if self._request[1]:
             place.state = state
 
     def _look(self) -> None:

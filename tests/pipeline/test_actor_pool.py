@@ -12,10 +12,12 @@ import ray
 from ray import exceptions
 
 from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
-from iowbc.pipeline.cluster import crew as module
+from iowbc.pipeline.cluster import actor_pool as module
 from iowbc.pipeline.cluster import stragglers
-from iowbc.pipeline.cluster.crew import CORE_PATIENCE, TRIES, Holder, NodeCrew, Origin
+from iowbc.pipeline.cluster.actor_pool import CORE_PATIENCE, TRIES, ActorHost, NodeActorPool, Origin
 from iowbc.pipeline.cluster.identity import identity
+
+pytestmark = pytest.mark.unit
 
 
 class Adder:
@@ -24,12 +26,12 @@ class Adder:
     def __init__(self, start: int) -> None:
         self.total = start
 
-    def ask(self, request: str, arguments: tuple[Any, ...]) -> int:
-        if request == "refuse":
+    def ask(self, message: int | str) -> int:
+        if message == "refuse":
             raise Damaged("no such thing")
-        if request == "break":
+        if message == "break":
             raise ZeroDivisionError("nobody foresaw this")
-        self.total += arguments[0]
+        self.total += message
         return self.total
 
     def state(self) -> int:
@@ -53,7 +55,7 @@ class Call:
 class Actor:
     """A holder, on a core of its own unless it asks for none."""
 
-    holder: Holder
+    holder: ActorHost
     cores: int
     placed: bool = False
     killed: bool = False
@@ -80,7 +82,7 @@ class Nodes:
     lost: set[int] = field(default_factory=set)
     """Actors whose node is lost while they are asked."""
 
-    def remote(self, holder: type[Holder]) -> Any:
+    def remote(self, holder: type[ActorHost]) -> Any:
         nodes = self
 
         class Options:
@@ -130,19 +132,19 @@ class Nodes:
 
 @dataclass
 class Watch:
-    """A crew on some nodes, and what it says."""
+    """An actor pool on some nodes, and what it says."""
 
     nodes: Nodes
     origin: Origin
     said: list[str] = field(default_factory=list)
     stop: bool = False
 
-    def crew(self, *starts: int) -> NodeCrew:
-        return NodeCrew("helper", self.origin, [(start,) for start in starts], lambda: self.stop, self.said.append)
+    def pool(self, *starts: int) -> NodeActorPool:
+        return NodeActorPool("helper", self.origin, [(start,) for start in starts], lambda: self.stop, self.said.append)
 
-    def added(self, crew: NodeCrew, *values: int, request: str = "add", patience: float = 60.0) -> list[int]:
-        crew.ask(request, [(value,) for value in values], patience=patience)
-        return crew.answers()
+    def added(self, pool: NodeActorPool, *values: int | str, patience: float = 60.0) -> list[int]:
+        pool.ask(values, patience=patience)
+        return pool.answers()
 
 
 @pytest.fixture
@@ -156,37 +158,37 @@ def watch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watch]:
 
 
 def test_members_answer_in_order_and_go_on_from_what_they_were(watch: Watch) -> None:
-    crew = watch.crew(10, 20)
-    assert watch.added(crew, 1, 2) == [11, 22]
-    assert watch.added(crew, 1, 2) == [12, 24]
-    assert crew.states == [12, 24]
+    pool = watch.pool(10, 20)
+    assert watch.added(pool, 1, 2) == [11, 22]
+    assert watch.added(pool, 1, 2) == [12, 24]
+    assert pool.states == [12, 24]
     assert watch.said == []
-    crew.close()
+    pool.close()
     assert all(actor.killed for actor in watch.nodes.actors)
 
 
 def test_who_finds_no_core_shares_one_after_a_while(watch: Watch) -> None:
-    crew = watch.crew(10, 20, 30)
-    assert watch.added(crew, 1, 2, 3) == [11, 22, 33]
+    pool = watch.pool(10, 20, 30)
+    assert watch.added(pool, 1, 2, 3) == [11, 22, 33]
     assert watch.nodes.clock == pytest.approx(CORE_PATIENCE, abs=1.0)
     assert watch.said == ["1 of 3 helpers find no core of their own, and share one"]
     assert [actor.cores for actor in watch.nodes.actors if not actor.killed] == [1, 1, 0]
 
 
 def test_a_lost_member_goes_on_elsewhere_from_its_last_state(watch: Watch) -> None:
-    crew = watch.crew(10, 20)
-    watch.added(crew, 1, 2)
+    pool = watch.pool(10, 20)
+    watch.added(pool, 1, 2)
     watch.nodes.lost = {1}
-    assert watch.added(crew, 1, 2) == [12, 24]
+    assert watch.added(pool, 1, 2) == [12, 24]
     assert watch.said == ["a helper was lost on node1; another one takes its place"]
 
 
 def test_a_member_that_hangs_is_lost_once_its_patience_is_over(watch: Watch) -> None:
-    crew = watch.crew(10, 20)
-    watch.added(crew, 1, 2)
+    pool = watch.pool(10, 20)
+    watch.added(pool, 1, 2)
     before = watch.nodes.clock
     watch.nodes.seconds = {0: float("inf")}
-    assert watch.added(crew, 1, 2, patience=7.0) == [12, 24]
+    assert watch.added(pool, 1, 2, patience=7.0) == [12, 24]
     assert watch.nodes.clock - before == pytest.approx(7.0, abs=1.0)
     assert watch.said == ["a helper was lost on node0; another one takes its place"]
 
@@ -194,17 +196,17 @@ def test_a_member_that_hangs_is_lost_once_its_patience_is_over(watch: Watch) -> 
 def test_one_that_shares_a_core_and_hangs_is_lost_too(watch: Watch) -> None:
     watch.nodes.cores = 0
     watch.nodes.seconds = {1: float("inf")}
-    assert watch.added(watch.crew(10), 1, patience=7.0) == [11]
+    assert watch.added(watch.pool(10), 1, patience=7.0) == [11]
     assert watch.said[1].startswith("a helper was lost on node1")
 
 
 def test_losses_in_a_row_are_counted_and_the_last_reason_told(watch: Watch) -> None:
-    crew = watch.crew(10)
+    pool = watch.pool(10)
     watch.nodes.lost = set(range(TRIES))
-    assert watch.added(crew, 1) == [11], "as often is still well"
+    assert watch.added(pool, 1) == [11], "as often is still well"
     watch.nodes.lost = set(range(100))
     with pytest.raises(StageFailed, match=rf"lost a helper {TRIES + 1} times in a row, the last time: The actor died"):
-        watch.added(crew, 1)
+        watch.added(pool, 1)
 
 
 @pytest.mark.parametrize(
@@ -212,48 +214,48 @@ def test_losses_in_a_row_are_counted_and_the_last_reason_told(watch: Watch) -> N
 )
 def test_what_a_member_raises_is_told_with_its_place(watch: Watch, request_: str, told: str) -> None:
     with pytest.raises(WorkerFailed, match=rf"(?s)^helper 1 of 2, on node0:.*{told}"):
-        watch.added(watch.crew(10, 20), 1, 2, request=request_)
+        watch.added(watch.pool(10, 20), request_, request_)
 
 
 def test_a_node_with_another_version_is_refused_with_both(watch: Watch) -> None:
     own = watch.origin.driver
     watch.origin = replace(watch.origin, driver=replace(own, versions={**own.versions, "mujoco": "3.0"}))
     with pytest.raises(WorkerFailed, match=rf"mujoco 3\.0 here, {own.versions['mujoco']} on .*; install the same"):
-        watch.added(watch.crew(10), 1)
+        watch.added(watch.pool(10), 1)
 
 
 def test_a_stop_ends_the_wait_of_who_has_not_begun(watch: Watch) -> None:
     watch.stop, watch.nodes.cores = True, 1
     with pytest.raises(Interrupted, match="had not begun"):
-        watch.added(watch.crew(10, 20), 1, 2)
+        watch.added(watch.pool(10, 20), 1, 2)
 
 
 def test_a_stop_waits_for_who_was_lost_so_that_a_checkpoint_can_be_written(watch: Watch) -> None:
-    crew = watch.crew(10, 20)
-    watch.added(crew, 1, 2)
+    pool = watch.pool(10, 20)
+    watch.added(pool, 1, 2)
     watch.stop, watch.nodes.cores, watch.nodes.lost = True, 1, {1}
-    assert watch.added(crew, 1, 2) == [12, 24]
+    assert watch.added(pool, 1, 2) == [12, 24]
 
 
 def test_who_is_slow_is_named_once_for_as_long_as_it_lasts(watch: Watch) -> None:
-    crew = watch.crew(10, 20, 30)
+    pool = watch.pool(10, 20, 30)
     watch.nodes.cores = 3
     watch.nodes.seconds = {0: 2.0, 1: 2.0, 2: 9.0}
     for _ in range(3):
-        watch.added(crew, 1, 2, 3)
+        watch.added(pool, 1, 2, 3)
     assert [text.startswith("helper 3 took 9.") for text in watch.said] == [True], watch.said
     assert " s on node2, the others 2." in watch.said[0]
     watch.nodes.seconds = {0: 2.0, 1: 2.0, 2: 2.0}
-    watch.added(crew, 1, 2, 3)
+    watch.added(pool, 1, 2, 3)
     watch.nodes.seconds = {0: 2.0, 1: 9.0, 2: 2.0}
-    watch.added(crew, 1, 2, 3)
+    watch.added(pool, 1, 2, 3)
     assert [text.split(" took")[0] for text in watch.said] == ["helper 3", "helper 2"]
 
 
 def test_being_made_is_not_being_slow(watch: Watch) -> None:
     watch.nodes.seconds = {1: 9.0}
-    crew = watch.crew(10, 20)
-    watch.added(crew, 1, 2)
+    pool = watch.pool(10, 20)
+    watch.added(pool, 1, 2)
     assert watch.said == []
 
 

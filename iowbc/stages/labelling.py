@@ -1,17 +1,14 @@
-"""Pieces of stages that other machines carry out, with the same results as here."""
+"""Labelling on other machines, with the same labels as here."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iowbc.pipeline.stage import Spread
-from iowbc.recipe.recipe import Recipe
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.trials.plan import Trial
-    from iowbc.evaluation.trials.protocol import Batches
     from iowbc.reference.labels.labelling import LabelTask
     from iowbc.reference.labels.shards import Shard
 
@@ -77,28 +74,3 @@ def label_share(
             progress=lambda done, total: None,
         )
         return [path.read_bytes() for path in sorted(Path(folder).glob("*.shard"))]
-
-
-def play_everywhere(
-    spread: Spread, recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
-) -> "Iterator[tuple[str, bytes]]":
-    """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
-    names = list(batches)
-    for place, content in spread(play_batch, [(recipe, name, batches[name]) for name in names], folders):
-        yield names[place], content
-
-
-def play_batch(
-    recipe: Recipe, name: str, trials: "Sequence[Trial]", *, robot: Path, policy: Path, generator: Path | None = None
-) -> bytes:
-    """The file of one batch."""
-    import torch
-
-    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-    from iowbc.learning.acting import load_policy
-    from iowbc.task.specification import Specification
-
-    torch.set_num_threads(1)  # as in the stage
-    world = evaluated_world(Specification(recipe, robot, generator))
-    with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
-        return Protocol(world, load_policy(policy), work=Path(folder), workers=0).play(name, trials)

@@ -7,7 +7,7 @@ Event = tuple[Any, ...]
 or `("shown", name)` of one of them that tracking is to have."""
 
 
-class Desk:
+class Mailbox:
     """What each task has told since the driver last asked, and which tasks are to stop."""
 
     def __init__(self) -> None:

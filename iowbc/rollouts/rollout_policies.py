@@ -1,4 +1,4 @@
-"""Who drives environments through a rollout. A pilot is a message: it is sent to where the environments are."""
+"""Policies that make rollouts, with noise or teachers beside them. They are sent to where the environments are."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,14 +16,14 @@ Decision = tuple[Array, Mapping[str, Array]]
 """The action, (n, A), and what is recorded beside it, (n, ...) by name."""
 
 
-class Pilot(Protocol):
+class RolloutPolicy(Protocol):
     """Drives n environments through one rollout."""
 
     @property
     def starts(self) -> Mask:
         """Environments whose episode begins with the first row, (n,)."""
 
-    def part(self, first: int, last: int) -> "Pilot":
+    def part(self, first: int, last: int) -> "RolloutPolicy":
         """Of the environments from `first` to `last`, the latter excluded; `first` begins a block."""
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
@@ -51,7 +51,7 @@ class Past:
 
 
 @dataclass(frozen=True)
-class Explorer:
+class ExploringPolicy:
     """A policy with exploration noise. With a past it sees the history of the first part of the rows."""
 
     policy: RowPolicy | HistoryPolicy
@@ -63,11 +63,11 @@ class Explorer:
 
     @property
     def starts(self) -> Mask:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         return np.zeros(self.noise.shape[1], np.bool_) if self.past is None else self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         past = None if self.past is None else self.past.of(first, last)
         return replace(self, noise=self.noise[:, first:last], past=past)
 
@@ -76,7 +76,7 @@ class Explorer:
         return None if self.past is None else self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         seen = rows
         if self._history is not None:
             seen = self._history.push(rows[:, : self._history.frames.shape[2]], starts)
@@ -84,42 +84,53 @@ class Explorer:
 
 
 @dataclass(frozen=True)
-class Apprentice:
-    """A student, and a teacher that says what it would have done and drives some of the environments."""
+class DaggerPolicy:
+    """A student, and teachers that say what they would have done and drive some of the environments."""
 
     student: HistoryPolicy
-    teacher: RowPolicy
+    teachers: tuple[RowPolicy, ...]
     observation: slice
     """Where in a row is s_t."""
     privileged: slice
     """Where in a row is s_priv."""
-    untold: Indices
-    """Places in a row of what the teacher is not told: it takes each for its mean."""
+    masked: Indices
+    """Places in a row of what is masked for the teachers, which see its mean there."""
+    teacher_of: Indices
+    """Place of each environment's teacher among them, (n,)."""
     taught: Mask
-    """Environments that the teacher drives, (n,)."""
+    """Environments that their teacher drives, (n,)."""
     block: int
     """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
     past: Past
 
     @property
     def starts(self) -> Mask:
-        """See `Pilot`."""
+        """See `RolloutPolicy`."""
         return self.past.starts
 
     def part(self, first: int, last: int) -> Self:
-        """See `Pilot`."""
-        return replace(self, taught=self.taught[first:last], past=self.past.of(first, last))
+        """See `RolloutPolicy`."""
+        own = slice(first, last)
+        return replace(self, teacher_of=self.teacher_of[own], taught=self.taught[own], past=self.past.of(first, last))
 
     @cached_property
     def _history(self) -> History:
         return self.past.history()
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """See `Pilot`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
+        """See `RolloutPolicy`. Recorded are `own`, the student's action, and `answer`, the teacher's, (n, A)."""
         del step
-        told = rows.copy()
-        told[:, self.untold] = self.teacher.normal.mean[self.untold]
-        told = np.concatenate([told[:, self.observation], told[:, self.privileged]], axis=1)
-        answer = in_blocks(self.teacher, self.block, told)
+        answer = self._answer(0, rows)
+        for place in range(1, len(self.teachers)):
+            own = self.teacher_of == place
+            if own.any():
+                answer[own] = self._answer(place, rows)[own]
         own = in_blocks(self.student, self.block, self._history.push(rows[:, self.observation], starts))
         return np.where(self.taught[:, None], answer, own), {"own": own, "answer": answer}
+
+    def _answer(self, place: int, rows: Array) -> Array:
+        """What one teacher would do in every environment, whole blocks at a time, (n, A)."""
+        teacher, seen = self.teachers[place], rows.copy()
+        seen[:, self.masked] = teacher.normal.mean[self.masked]
+        seen = np.concatenate([seen[:, self.observation], seen[:, self.privileged]], axis=1)
+        return in_blocks(teacher, self.block, seen)

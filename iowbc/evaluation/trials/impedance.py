@@ -1,0 +1,74 @@
+"""The mechanical impedance that a robot shows to a sinusoidal pull on the object that it holds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.evaluation.trials.trace import Trace
+from iowbc.task.episodes import PlannedPull
+
+
+@dataclass(frozen=True)
+class Apparent:
+    """A mass on a spring and a damper, m ẍ + c ẋ + k x = F, that answers pulls as the robot with its object does."""
+
+    stiffness: float
+    """k [N/m]."""
+    damping: float
+    """c [N·s/m]."""
+    mass: float
+    """m [kg]."""
+
+
+def impedance(force: Array, position: Array, frequency: float, dt: float) -> complex:
+    """Z = F / v at a frequency [Hz], complex [N·s/m]: i·ω·m of a mass, c of a damper, k / (i·ω) of a spring.
+
+    force: along the pull, held over each control period at its value in the middle; position: at the end of the
+    period; (T,) [N, m]. The amplitudes are a least-squares fit of sine and cosine beside a drift of second order, which
+    the robot has of its own. NaN for what does not move at all.
+    """
+    time = dt * np.arange(len(force))
+    angle = 2.0 * np.pi * frequency * time
+    scaled = time / time[-1]
+    basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(time), scaled, np.square(scaled)], axis=1)
+    fitted = np.linalg.lstsq(basis, np.stack([force, position], axis=1), rcond=None)[0]
+    pulled, moved = (fitted[0] - 1j * fitted[1]) * np.array([1.0, np.exp(-1j * np.pi * frequency * dt)])
+    return complex(pulled / (2j * np.pi * frequency * moved)) if moved else complex(np.nan, np.nan)
+
+
+def impedance_metrics(trace: Trace, pull: PlannedPull | None) -> dict[str, float]:
+    """Of the object's centre to a pull: `impedance_real`, `impedance_imag`, `impedance_magnitude` [N·s/m] and
+    `impedance_phase` [rad], from -π/2 (spring) over 0 (damper) to π/2 (mass).
+
+    The first period, in which the motion builds up, is left out. NaN without a pull, and where the trial ended before.
+    """
+    value = complex(np.nan, np.nan)
+    if pull is not None:
+        first, last = (
+            round(time / trace.dt) for time in (pull.begin + 1.0 / pull.frequency, pull.begin + pull.duration)
+        )
+        if last - first >= round(1.0 / pull.frequency / trace.dt) and len(trace) >= last:
+            yaw, (forward, left) = trace.heading_reference[first], pull.force
+            along = np.array([np.cos(yaw) * forward - np.sin(yaw) * left, np.sin(yaw) * forward + np.cos(yaw) * left])
+            along /= np.linalg.norm(along)
+            force, position = trace.external_force[first:last, :2], trace.object_position[first:last, :2]
+            value = impedance(force @ along, position @ along, pull.frequency, trace.dt)
+    return {
+        "impedance_real": value.real,
+        "impedance_imag": value.imag,
+        "impedance_magnitude": abs(value),
+        "impedance_phase": float(np.angle(value)),
+    }
+
+
+def apparent(frequency: Array, value: Array) -> Apparent:
+    """The mass, spring and damper whose impedances are nearest to `value` (k,), complex, at frequencies (k,) [Hz].
+
+    Least squares in Z = c + i (ω m - k / ω). Of fewer than two frequencies mass and spring cannot be told apart: NaN.
+    """
+    angular = 2.0 * np.pi * frequency
+    if len(np.unique(frequency)) < 2:
+        return Apparent(np.nan, float(np.mean(value.real)), np.nan)
+    mass, stiffness = np.linalg.lstsq(np.stack([angular, -1.0 / angular], axis=1), value.imag, rcond=None)[0]
+    return Apparent(float(stiffness), float(np.mean(value.real)), float(mass))

@@ -1,0 +1,80 @@
+"""What passes between robot, object and partner: horizontal forces, work, and whose motion is followed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.evaluation.trials.errors import moving_average
+from iowbc.evaluation.trials.ground import HIGH
+from iowbc.evaluation.trials.trace import Trace
+
+
+@dataclass(frozen=True)
+class Push:
+    """What limits a push, and what is asked of it."""
+
+    friction: float
+    """Coefficient between feet and ground."""
+    resistance: float
+    """Rolling resistance of the object [N]."""
+    part: float
+    """Of the largest possible force, that counts as pushing."""
+
+
+def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
+    """Horizontal forces at hands and handle, work on the partner, and how far its motion is from being followed.
+
+    window: control steps of a gait period.
+
+    `hand_force_mean`, `_p95`, `_peak`: horizontal force between object and a hand, of the hand with more [N]; NaN
+    without an object. `handle_force_mean`, `_p95`, `_peak`: of the partner at the far handle [N]; `partner_work`:
+    horizontal work done on the partner [J]; `E_v_partner`: mean planar deviation of the handle's velocity, averaged
+    over a gait period, from the one that the partner intends [m/s]; NaN without a partner.
+    """
+    none = np.full(1, np.nan)
+    at_hands = np.linalg.norm(hand_forces(trace), axis=-1) if np.any(trace.object_position) else none
+    helped = np.any(trace.partner_force)
+    handle = trace.partner_force[:, :2]
+    work = -np.sum(handle * trace.handle_velocity[:, :2]) * trace.dt
+    away = moving_average(trace.handle_velocity[:, :2], window) - trace.partner_velocity[:, :2]
+    return {
+        **_spread("hand_force", at_hands),
+        **_spread("handle_force", np.linalg.norm(handle, axis=1) if helped else none),
+        "partner_work": float(work) if helped else np.nan,
+        "E_v_partner": float(np.mean(np.linalg.norm(away, axis=1))) if helped else np.nan,
+    }
+
+
+def push_metrics(trace: Trace, directions: Array, window: int, push: Push) -> dict[str, float]:
+    """How hard the hands push along the command, where one is given; NaN without one, or without an object.
+
+    directions: of the commanded motion in the world, zero while it stands, (T or more, 2); window: control steps of a
+    gait period.
+
+    `push_force`: mean horizontal force of the hands on the object along the command [N]. `push_force_share`: part of
+    the time in which it is at least `push.part` of what can be pushed with: friction times the vertical force of the
+    ground, or the resistance of the object where that is smaller; forces averaged over a gait period.
+    """
+    directions = directions[: len(trace)]
+    commanded = directions.any(axis=1)
+    if not (commanded.any() and np.any(trace.object_position)):
+        return {"push_force": np.nan, "push_force_share": np.nan}
+    along = -np.vecdot(hand_forces(trace).sum(axis=1), directions)
+    most = np.minimum(push.friction * moving_average(trace.foot_load.sum(axis=1), window), push.resistance)
+    enough = moving_average(along, window) >= push.part * most
+    return {"push_force": float(np.mean(along[commanded])), "push_force_share": float(np.mean(enough[commanded]))}
+
+
+def hand_forces(trace: Trace) -> Array:
+    """Horizontal force of the object on each hand, (T, 2, 2) [N]."""
+    return trace.grip_force.reshape(-1, 2, 3)[..., :2]
+
+
+def _spread(name: str, sizes: Array) -> dict[str, float]:
+    """Of the sizes of one force (T,), or of the greater of several (T, k)."""
+    return {
+        f"{name}_mean": float(np.mean(sizes, axis=0).max()),
+        f"{name}_p95": float(np.percentile(sizes, HIGH, axis=0).max()),
+        f"{name}_peak": float(np.max(sizes)),
+    }

@@ -1,0 +1,1 @@
+"""The model-based rival: whole-body control by a quadratic program, without anything learnt."""

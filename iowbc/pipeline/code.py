@@ -1,0 +1,73 @@
+"""The code that decides a stage's result: every module that its own imports lead to."""
+
+import ast
+import functools
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.digests import PACKAGE, content_digest, syntax_digest
+
+CARRYING_OUT = ("pipeline", "errors", "files", "full_disk", "processes")
+"""Rooms that carry stages out and compute nothing of a result; neither they nor what they import count."""
+IN_KEYS = "recipe.recipe"
+"""The module of the recipe as a whole: its values are in keys, and of its sections only those that a stage's code
+names itself count."""
+
+
+def stage_code(stage: Stage) -> Mapping[str, str]:
+    """Digest of the stage's own module and, by room, of the modules of the package that it imports, however deep."""
+    own = stage.run.__module__.removeprefix(f"{PACKAGE.name}.")
+    return _code_of(own) if own != stage.run.__module__ else {}
+
+
+@functools.cache
+def _code_of(own: str) -> Mapping[str, str]:
+    modules = module_closure(own)
+    parts = {name: name if name == own else name.split(".")[0] for name in modules}
+    return {
+        part: content_digest({name: syntax_digest(_source(name)) for name in modules if parts[name] == part})
+        for part in sorted(set(parts.values()))
+    }
+
+
+def changed_code(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
+    """Names of the rooms and modules whose code differs."""
+    return sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
+
+
+@functools.cache
+def module_closure(module: str) -> frozenset[str]:
+    """A module of the package and all that its imports lead to, by their names below the package."""
+    found, open_ones = {module}, [module]
+    while open_ones:
+        new = _imports(_source(open_ones.pop())) - found
+        found |= new
+        open_ones += new
+    return frozenset(found)
+
+
+@functools.cache
+def _imports(source: Path) -> frozenset[str]:
+    """Modules of the package that a module imports when it runs, also within functions, by their names below it."""
+    tree = ast.parse(source.read_bytes(), filename=str(source))
+    names = {name.removeprefix(f"{PACKAGE.name}.") for name in _imported(tree) if name.startswith(f"{PACKAGE.name}.")}
+    counting = {name for name in names if name != IN_KEYS and name.split(".")[0] not in CARRYING_OUT}
+    return frozenset(name for name in counting if _source(name).is_file())
+
+
+def _imported(node: ast.AST) -> Iterator[str]:
+    """Dotted names of what a syntax tree imports, except for the type checker alone."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        yield str(node.module)
+        yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    checked = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    for child in node.orelse if isinstance(node, ast.If) and checked else ast.iter_child_nodes(node):
+        yield from _imported(child)
+
+
+def _source(module: str) -> Path:
+    path = PACKAGE.joinpath(*module.split("."))
+    return path.with_name(f"{path.name}.py")

@@ -1,0 +1,58 @@
+"""How long a stage takes: learnt from its last runs on this machine, else guessed from what is stored."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from iowbc.pipeline.machine import host
+from iowbc.pipeline.nested import MISSING, differences, nested
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.recipe.recipe import SEEDS
+
+LAST_RUNS = 5
+"""Runs that an estimate is learnt from: older ones are of an older program or of another load."""
+UNSEEN = (0.8, 1.25)
+"""How far the next run may lie beyond the fastest and the slowest of them: what other programs on a machine change."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The time that a stage takes [s]."""
+
+    expected: float | None = None
+    """Median of its last runs here that differ in seed and counts alone; None where there are none."""
+    roughly: float | None = None
+    """A guess where there are none: at the rate of the stored artifact that differs least, wherever it was made."""
+    spread: tuple[float, float] = UNSEEN
+    """Ends of the range in which the time will lie, as parts of `expected`."""
+
+
+def estimate(
+    stage: Stage, ingredients: Mapping[str, Any], stored: Iterable[Artifact], closest: Artifact | None
+) -> Estimate:
+    """The time of a stage with these ingredients; `closest`: the stored artifact that differs least."""
+    if closest is None:
+        return Estimate()
+    own = sorted((one for one in stored if one.manifest.host == host()), key=lambda one: -one.manifest.made)
+    reckoned = (_reckoned(stage, one, ingredients) for one in own)
+    times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
+    if not times:
+        return Estimate(roughly=_reckoned(stage, closest, ingredients)[0])
+    middle = median(times)
+    spread = (UNSEEN[0] * min(times) / middle, UNSEEN[1] * max(times) / middle) if middle else UNSEEN
+    return Estimate(expected=middle, spread=spread)
+
+
+def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:
+    """The time that a stage takes at the rate of a stored artifact [s], which is proportional to each of the stage's
+    counts, and whether nothing but seed and counts differs."""
+    old, seconds = former.ingredients, former.manifest.seconds
+    alike = old.get("version") == ingredients["version"]
+    for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
+        if path in stage.counts and MISSING not in (before, after) and before:
+            seconds *= after / before
+        elif path not in SEEDS:
+            alike = False
+    return seconds, alike

@@ -1,0 +1,60 @@
+"""What is to be done for a stage, and how a run was asked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.store.artifact import Artifact
+
+OnCodeChange = Literal["report", "rerun"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a run was asked for."""
+
+    until: str | None = None
+    force: frozenset[str] = frozenset()
+    on_code_change: OnCodeChange = "report"
+    workers: int | None = None
+    engine: Literal["local", "ray"] | None = None
+    address: str | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stage of a recipe: its key, whether its artifact can be used, and why not."""
+
+    stage: Stage
+    key: str | None = None
+    """None while an input's content is not known."""
+    ingredients: Mapping[str, Any] | None = None
+    artifact: Artifact | None = None
+    """The stored artifact with this key, whole; also where it would be replaced."""
+    reasons: tuple[str, ...] = ()
+    """Why it would run; empty where it is cached."""
+    notes: tuple[str, ...] = ()
+    damage: str = ""
+    """What is wrong with the stored artifact with this key."""
+    expected: float | None = None
+    """Time that it takes by its last runs on this machine or by its last attempt [s]; None where there are none."""
+    spread: tuple[float, float] = (1.0, 1.0)
+    """Ends of the range in which that will lie, as parts of it."""
+    roughly: float | None = None
+    """Where there are none: a guess at the rate of the stored artifact that differs least [s]."""
+    rate_of: str = ""
+    """Recipe, and other machine, whose rate that is."""
+    code: Mapping[str, str] = field(default_factory=dict)
+    predecessor: Artifact | None = None
+    """The stored artifact that it would go on from."""
+
+    @property
+    def cached(self) -> bool:
+        """True where the stored artifact is used as it is."""
+        return not self.reasons
+
+    @property
+    def guess(self) -> float | None:
+        """The expected time, or what comes nearest to one [s]."""
+        return self.roughly if self.expected is None else self.expected

@@ -1,0 +1,16 @@
+"""A request that makes the steps of a group's batch fail, hang or dawdle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+
+@dataclass(frozen=True)
+class StepBy:
+    """Let each step of the batch be a call of this function."""
+
+    function: Callable[[], Any]
+    changes: ClassVar[bool] = False
+
+    def carry_out(self, batch: Any) -> None:
+        batch.step = self.function
