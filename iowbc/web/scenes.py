@@ -31,6 +31,9 @@ FIELDS = (
 """What of the model is written in full precision."""
 STILL = ("partner_share", "impulse_scale", "push_scale", "noise_scale")
 """Quantities of an episode that are zero on the page: nobody helps or pushes, and sensors tell the truth."""
+ABOVE = 1e-6
+"""How far the robot begins above the ground [m]: which corners of soles touch that lie exactly on it is a matter of the
+last bit, and the browser's differs."""
 HEAVIEST = 1.5
 """Mass to which the page's slider goes, as a part of the object's nominal one (Table I: to 150 %)."""
 
@@ -135,6 +138,8 @@ def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -
     joints = np.empty((1, len(robot.joints)))
     joints[:, robot.support], joints[:, robot.interaction] = posture, arms
     simulation.reset(np.zeros(1, np.int64), joints, references.start_pitch(posture, command), np.zeros(1))
+    simulation.worlds[0].qpos[:, 2] += ABOVE
+    simulation.worlds[0].batch.forward()
     return simulation
 
 
