@@ -57,7 +57,10 @@ VARIANTS = {
     "blind": {"distill.observe_object"},
 }
 """What each variant changes, beside its name, description and label."""
-NAMES = {"name", "description", "eval.label"}
+SUITES = {"eval.robustness", "eval.map"}
+FEWER = {"eval.trials", *SUITES}
+"""How much less is played with controllers that are to be trained again."""
+NAMES = {"name", "description", "eval.label", *FEWER}
 
 
 def recipe(name: str) -> Recipe:
@@ -75,7 +78,7 @@ def differences(one: Recipe, other: Recipe) -> set[str]:
     as one."""
     a, b = leaves(one.model_dump()), leaves(other.model_dump())
     found = {name.removeprefix(".") for name in a.keys() | b.keys() if a.get(name) != b.get(name)}
-    whole = ["eval.simulation", *(f"simulation.scenes.{name}" for name in one.simulation.scenes.own)]
+    whole = ["eval.simulation", *SUITES, *(f"simulation.scenes.{name}" for name in one.simulation.scenes.own)]
     return {next((path for path in whole if name.startswith(f"{path}.")), name) for name in found}
 
 
