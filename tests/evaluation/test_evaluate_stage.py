@@ -343,7 +343,7 @@ def test_a_probe_alone_leaves_its_readings_table_and_figure(recipe: Recipe, stud
     finished = job(probed, student, tmp_path)
     evaluate.run(finished)
     names = {str(path.relative_to(finished.out)) for path in finished.out.rglob("*.*")}
-    written = {f"tables/probe.{kind}" for kind in ("md", "tex", "csv")}
+    written = {f"tables/probe.{kind}" for kind in ("md", "tex", "csv", "json")}
     assert names == written | {"probe.parquet", "figures/probe.png", "summary.json"}
     inferred = pd.read_parquet(finished.out / "probe.parquet")
     assert list(dict.fromkeys(inferred["source"])) == ["latent", "history H_t", "newest s_t", "s_priv"]
