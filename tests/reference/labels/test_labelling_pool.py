@@ -14,7 +14,7 @@ from reference_doubles import DoubleTask
 from stage_jobs import Backwards
 
 from iowbc.errors import Interrupted, WorkerFailed
-from iowbc.reference.labels.pool import CRASHED, _Book, _bury, _Worker, label_all
+from iowbc.reference.labels.pool import CRASHED, _Book, _on_death, _Worker, label_all
 from iowbc.reference.labels.shards import Shard, read_shard
 from iowbc.stages.labelling import label_everywhere
 
@@ -89,7 +89,7 @@ def test_a_native_crash_ends_one_sample(tmp_path: Path, expected: Shard) -> None
 def test_only_what_a_solver_does_to_itself_rejects_a_sample(code: int) -> None:
     book = _Book([])
     process: Any = SimpleNamespace(exitcode=code, join=lambda: None)
-    _bury(_Worker(process, SimpleNamespace(close=lambda: None), SimpleNamespace(value=13), chunk=2), book)  # type: ignore[arg-type]
+    _on_death(_Worker(process, SimpleNamespace(close=lambda: None), SimpleNamespace(value=13), chunk=2), book)  # type: ignore[arg-type]
     own = -code in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL)
     assert (book.crashed, book.killed) == (({2: [13]}, 0) if own else ({}, 1))
     assert book.waiting == [2], "its chunk is made again"
