@@ -54,7 +54,7 @@ def nodes(parent: int) -> list[psutil.Process]:
 
 def holds_an_actor(node: psutil.Process) -> bool:
     """Whether a training's rollouts are made there."""
-    return any(name(process).startswith("ray::Holder") for process in below(node.pid))
+    return any(name(process).startswith("ray::ActorHost") for process in below(node.pid))
 
 
 def kill_a_node(node: psutil.Process) -> None:
