@@ -30,6 +30,7 @@ PUBLISHED_TO = {
     "wo_rg": "eval",
     "wo_distill": "eval",
     "blind": "export",
+    "compliant": "export",
 }
 
 
