@@ -9,7 +9,7 @@ TITLES = {
     "terminations/lagging": "episodes that end for lagging [share]",
     "terminations/time_limit": "episodes that reach their end [share]",
     "tracking": "tracking of the command [share of the best]",
-    "infeasible_pushes": "pushes that nobody could make [share]",
+    "infeasible_pushes": "infeasible pushes [share]",
     "divergences": "simulations that diverged",
     "rollbacks": "returns to the best policy",
     "reward": "reward [1/s]",
@@ -29,7 +29,7 @@ TITLES = {
     "train/policy_loss": "loss of the policy",
     "train/value_loss": "loss of the value",
     "train/clip_share": "samples clipped [share]",
-    "train/learning_rate": "step size",
+    "train/learning_rate": "learning rate",
     "train/std": "standard deviation of the action",
     "train/explained_variance": "variance explained by the value [share]",
     "steps_per_second": "environment steps a second [1/s]",
@@ -59,6 +59,9 @@ def title_of(name: str) -> str:
     if family == "error" and rest.count("/") == 2:
         scene, kind, error = rest.split("/")
         return f"error of {error}, {scene}, {kind} [{ERROR_UNITS.get(error, '?')}]"
+    load, _, figure = rest.rpartition("/")
+    if family == "check" and f"check/{figure}" in TITLES and load:
+        return f"{TITLES[f'check/{figure}']}, {load.replace('_', ' ')}"
     for beginning, title in FAMILIES.items():
         if name.startswith(beginning):
             return title.format(name.removeprefix(beginning))
