@@ -27,7 +27,7 @@ TABLES = (
     *("capacity", "interquartile", "trainings", "probe"),
 )
 """The main tables, in their order."""
-DRAWN = ("lifting", "pushing", "heavy", "compliance", "trainings", "probe")
+DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
 EXPORTED = "step.onnx"
 
