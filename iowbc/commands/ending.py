@@ -1,4 +1,4 @@
-"""How commands end: exit codes, and Ctrl-C before a run has begun or in any other command."""
+"""Endings of commands: exit codes and the handling of Ctrl-C outside of a run."""
 
 import os
 import signal

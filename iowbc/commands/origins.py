@@ -1,4 +1,4 @@
-"""What an artifact was made from, the world that its recipe describes, and what an evaluation left."""
+"""Origins of an artifact: its inputs, the world of its recipe, and the results of its evaluation."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

@@ -103,7 +103,7 @@ def named_source(
 
 
 def _evaluation(store: Store, word: str) -> Evaluation | None:
-    """What the recipe of a name, or of `RECIPE/STAGE`, asks to be played; None for a key."""
+    """The `eval` section of a recipe that is named, also as `RECIPE/STAGE`; None for a key."""
     recipe = recall(store.runs, word.partition("/")[0]).get("recipe", {})
     return Evaluation.model_validate(recipe["eval"]) if "eval" in recipe else None
 

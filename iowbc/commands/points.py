@@ -30,7 +30,7 @@ PATIENCE = 10.0
 LOG_WIDTH = 160
 """Characters in a line of a table in a log."""
 Endings = dict[str, RunEnding | None]
-"""How each run has ended, by its name; None for one that never began."""
+"""Ending of each run by name; None for a run that never began."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class PointProcess:
     said: Connection
 
     def ending(self, task: PointRun) -> RunEnding:
-        """How the run has ended, also where its process could not say it."""
+        """Ending of the run, also if its process died without reporting one."""
         if self.said.poll():
             with contextlib.suppress(EOFError):
                 ending: RunEnding = self.said.recv()

@@ -1,4 +1,4 @@
-"""How commands print: lines as they are, plain tables, paths, and JSON for other programs."""
+"""Output of commands: plain lines, tables, paths, and JSON for other programs."""
 
 import json
 import math

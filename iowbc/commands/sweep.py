@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 LOGS = "logs"
 """Folder of a sweep with what each point prints."""
 MANY = 100
-"""Points whose number is told before they are planned, for that takes a while."""
+"""Number of points from which it is printed before planning, which takes a while."""
 STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
 
 
