@@ -1,6 +1,7 @@
 """The rollout whose inputs become the golden vectors: it stands, walks and turns, and changes height and lean."""
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +36,12 @@ def golden_episode(recipe: Recipe) -> Episode:
 
 
 def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:
-    """What each control step is given, without the state; fewer than asked for where the robot falls.
+    """The inputs of each control step, without the state; fewer than asked for where the robot falls.
 
     Raises Interrupted.
     """
-    environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(golden_episode(world.recipe),))
-    try:
-        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=world.recipe.export.golden_steps)
+    steps, episodes = world.recipe.export.golden_steps, (golden_episode(world.recipe),)
+    with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment:
+        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=steps)
         play_in(environment, policy, interrupted)
-    finally:
-        environment.close()
     return policy.inputs

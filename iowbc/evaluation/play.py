@@ -1,7 +1,7 @@
 """Plays one episode for the eye: in MuJoCo's viewer where there is a display, or into a film."""
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
 from iowbc.errors import require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
-from iowbc.evaluation.films import EpisodeFilm, Film
+from iowbc.evaluation.films import EpisodeFilm, written_film
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
@@ -29,7 +29,7 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 @dataclass(frozen=True)
 class Source:
-    """What is played: a policy, and the world that its recipe describes."""
+    """A policy to play, and the world that its recipe describes."""
 
     world: Specification
     policy: Path
@@ -60,8 +60,8 @@ def exported_source(folder: Path) -> Source:
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What was shown, and how it ended."""
+class PlayedEpisode:
+    """The end of the episode that was shown."""
 
     outcome: Outcome
     duration: float
@@ -75,10 +75,10 @@ def play(
     request: PlayRequest,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float, float], None] = lambda seconds, duration: None,
-) -> Shown:
+) -> PlayedEpisode:
     """Play one episode; in the viewer, or with `request.video` into that mp4 file (no display needed).
 
-    progress: is told how much of a film is drawn, and how long it is to be [s].
+    progress: receives how much of a film is drawn, and how long it is to be [s].
 
     Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
     """
@@ -86,23 +86,23 @@ def play(
     episode = requested_episode(recipe, request)
     if request.video is None:
         require_display()
-    environment = source.environment(episode)
-    try:
+    with closing(source.environment(episode)) as environment:
         policy = open_policy(source, environment)
         if request.video is None:
-            return Shown(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
+            return PlayedEpisode(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
-        with EpisodeFilm(environment, Film(request.video, settings.fps), settings, title) as film:
+        with (
+            written_film(request.video, settings.fps) as add,
+            closing(EpisodeFilm(environment, add, settings, title)) as film,
+        ):
 
             def look(seconds: float) -> None:
                 film.look(seconds)
                 progress(seconds, episode.duration)
 
             outcome = play_in(environment, policy, interrupted, look=look)[0]
-        return Shown(outcome, episode.duration, film.frames)
-    finally:
-        environment.close()
+        return PlayedEpisode(outcome, episode.duration, film.frames)
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:

@@ -1,4 +1,4 @@
-"""What passes between robot, object and partner: horizontal forces, work, and whose motion is followed."""
+"""Interaction of robot, object and partner: shares of the weight, horizontal forces, work, velocity of the handle."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,11 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.errors import moving_average
-from iowbc.evaluation.trials.ground import HIGH
+from iowbc.evaluation.trials.feet import HIGH
 from iowbc.evaluation.trials.trace import Trace
+
+SETTLING = 1.0
+"""The first second, in which the weight comes to bear, is left out [s]."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,26 @@ class Push:
     """Rolling resistance of the object [N]."""
     part: float
     """Of the largest possible force, that counts as pushing."""
+
+
+def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
+    """Shares of a held object's weight [N], means over the trial without its first second; NaN where nothing is held.
+
+    `hand_weight_share`: the hands' vertical force over the weight. `partner_weight_share`: the partner's.
+    `weight_in_hands`: the hands' part of what the robot carries at all, links included; NaN where that is less than
+    `least` [N], and a touch of the torso would be several times as much.
+    """
+    begin = round(SETTLING / trace.dt)
+    if not weight > 0 or len(trace) <= begin:
+        return dict.fromkeys(("hand_weight_share", "partner_weight_share", "weight_in_hands"), np.nan)
+    hands = float(np.mean(-trace.grip_force[begin:, [2, 5]].sum(axis=1))) / weight
+    partner = float(np.mean(trace.partner_force[begin:, 2])) / weight
+    left = 1.0 - partner
+    return {
+        "hand_weight_share": hands,
+        "partner_weight_share": partner,
+        "weight_in_hands": hands / left if left * weight > least else np.nan,
+    }
 
 
 def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:

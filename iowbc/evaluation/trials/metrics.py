@@ -15,11 +15,9 @@ from iowbc.evaluation.trials.errors import (
     start_heading,
     velocity_deviation,
 )
-from iowbc.evaluation.trials.feet import foot_metrics
-from iowbc.evaluation.trials.ground import ground_metrics
+from iowbc.evaluation.trials.feet import foot_metrics, ground_metrics
 from iowbc.evaluation.trials.impedance import impedance_metrics
-from iowbc.evaluation.trials.interaction import Push, interaction_metrics, push_metrics
-from iowbc.evaluation.trials.load import load_metrics
+from iowbc.evaluation.trials.interaction import Push, interaction_metrics, load_metrics, push_metrics
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.task.commands import Commands

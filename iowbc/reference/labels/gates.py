@@ -27,7 +27,7 @@ class Evidence:
     """Height reached [m]."""
 
 
-class Judge:
+class LabelJudge:
     """Holds the limits and buffers; one judge serves many labels."""
 
     def __init__(self, support: SupportModel, gates: LabelGates, height: Literal["pelvis", "com"]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.gates import LabelJudge
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.support_model import SupportModel
@@ -54,7 +54,7 @@ class Labeller:
         robot, recipe = load_robot(task.robot), task.recipe
         self.plan = SamplePlan(robot, recipe, task.seed)
         self.support = SupportModel(robot, recipe.problem)
-        self.judge = Judge(self.support, recipe.gates, recipe.height)
+        self.judge = LabelJudge(self.support, recipe.gates, recipe.height)
         self.method = make_method(task.method, self.support, recipe)
 
     def draw(self, indices: Indices) -> list[Sample]:
