@@ -51,17 +51,25 @@ class StaticMethod:
                 return Posture(q, wrench)
         raise Rejected("not converged")
 
-    def _step(self, q: Array, wrench: Array, sample: Sample, rest: Array) -> Array:
-        """One Gauss-Newton step at (q, wrench): tangent (21,) and change of the wrenches (12,)."""
-        support, nv, largest = self.support, self.velocities, self.problem.largest_step
+    def equilibrium(
+        self, q: Array, wrench: Array, sample: Sample, rest: Array
+    ) -> tuple[PostureCost, Array, Array, Array, Array]:
+        """At (q, wrench): cost without torques, joint torques and their rows, equality rows and error."""
+        support, nv = self.support, self.velocities
         by_position = pinocchio.computeStaticTorqueDerivatives(support.model, support.data, q, support.external(wrench))
         static = support.data.tau.copy()
         cost = PostureCost.at(support, self.height, q, sample, rest)
         soles = cost.equality
         by_wrench = np.concatenate([-soles[:6].T, -soles[6:].T], axis=1)  # of base and joint torques, (21, 12)
-        torque, torque_rows = static[6:], np.concatenate([by_position[6:], by_wrench[6:]], axis=1)
         equality = np.zeros((18, self.size))
         equality[:12, :nv], equality[12:, :nv], equality[12:, nv:] = soles, by_position[:6], by_wrench[:6]
+        torque_rows = np.concatenate([by_position[6:], by_wrench[6:]], axis=1)
+        return cost, static[6:], torque_rows, equality, np.concatenate([cost.error, static[:6]])
+
+    def _step(self, q: Array, wrench: Array, sample: Sample, rest: Array) -> Array:
+        """One Gauss-Newton step at (q, wrench): tangent (21,) and change of the wrenches (12,)."""
+        support, nv, largest = self.support, self.velocities, self.problem.largest_step
+        cost, torque, torque_rows, equality, error = self.equilibrium(q, wrench, sample, rest)
         gradient = np.zeros((6 + 2 * self.joints, self.size))
         gradient[:6, :nv], gradient[6 + self.joints :, :nv] = cost.gradient[:6], cost.gradient[6:]
         gradient[6 : 6 + self.joints] = torque_rows
@@ -76,12 +84,6 @@ class StaticMethod:
                 self.cone_bound - self.cone @ wrench.ravel(),
             ]
         )
-        return constrained_step(
-            self.root_weight[:, None] * gradient,
-            self.root_weight * residual,
-            equality,
-            np.concatenate([cost.error, static[:6]]),
-            np.concatenate([self.angle_rows, torque_rows, self.cone_rows]),
-            lower,
-            upper,
-        )
+        rows = np.concatenate([self.angle_rows, torque_rows, self.cone_rows])
+        gradient, residual = self.root_weight[:, None] * gradient, self.root_weight * residual
+        return constrained_step(gradient, residual, equality, error, rows, lower, upper)
