@@ -18,7 +18,7 @@ from iowbc.evaluation.trials.rollout import Acting
 from iowbc.task.specification import Specification
 
 TRIAL = ["suite", "case", "mass", "impulse", "trial"]
-"""What tells one trial of a variant from another."""
+"""Columns that tell one trial of a variant from another."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Actor:
     """A variant on the stage."""
 
     world: Specification
-    """Where its trials took place."""
+    """World of its trials."""
     policy: Acting
     trials: pd.DataFrame
     """Its long table."""
@@ -53,7 +53,7 @@ def film_side_by_side(
 ) -> None:
     """Play the trial in each actor's row again, and film them as tiles; who falls stays as he lay.
 
-    progress: told how much of all trials was played, and how long they may last together [s].
+    progress: receives the time of all trials that was played, and how long they may last together [s].
     Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
     """
     video = actors[0].world.recipe.eval.video

@@ -1,4 +1,4 @@
-"""Which (height, pitch) can be held: by labels on a grid and around it, and where the fitted network moves gently."""
+"""The feasible (height, pitch): by labels on a grid and around it, and by gentle motion of the fitted network."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class LabelledRegion:
 
     map: FeasibleMap
     held: Mask
-    """Whether one of the grid's two arm postures has a label."""
+    """True where one of the grid's two arm postures has a label."""
     share: Array
     """Share of the samples around a command that have a label; -1 where there were too few."""
 

@@ -59,7 +59,7 @@ class Curve:
 
     @property
     def banded(self) -> NDArray[np.bool_]:
-        """Where there is a band: nowhere if it has no width."""
+        """Points with a band: none if it has no width."""
         known = np.isfinite(self.low) & np.isfinite(self.high)
         return known & (not np.array_equal(self.low[known], self.high[known]))
 
@@ -87,9 +87,9 @@ class CurvePanel:
     curves: list[Curve] = field(default_factory=list)
     across: str = "million environment steps"
     mode: str = "lines"
-    """How plotly draws its curves."""
+    """Mode of plotly for its curves."""
     from_zero: bool = False
-    """Whether the upright axis begins at 0, so that heights compare."""
+    """True where the upright axis begins at 0, so that heights compare."""
 
     @property
     def figure(self) -> dict[str, Any]:

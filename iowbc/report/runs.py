@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
-from iowbc.results.table import Cell, Column, Measured, Table, heads
+from iowbc.results.table import Cell, Column, MeanCell, Table, heads
 
 EVAL = "eval"
 NAMING = ("name", "description", "execution")
@@ -106,7 +106,7 @@ def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
 
 def _cell(values: NDArray[np.float64]) -> Cell:
     mean = figure(values.mean()) if len(values) else ""
-    return Measured(mean, f"{np.ptp(values) / 2:.2g}") if len(values) > 1 else mean
+    return MeanCell(mean, f"{np.ptp(values) / 2:.2g}") if len(values) > 1 else mean
 
 
 def _of_one_variant(first: Run, second: Run) -> bool:

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.probe.readings import HISTORY, LATENT, NEWEST, PRIVILEGED, Listener, Readings, gathered
+from iowbc.evaluation.probe.readings import HISTORY, LATENT, NEWEST, PRIVILEGED, Listener, ProbeReadings, gathered
 from iowbc.evaluation.probe.regression import inferred_masses
 from iowbc.evaluation.report.probe import figures_of, probe_figure, probe_table, write_probe
 from iowbc.evaluation.report.statistics import determination, determination_interval
@@ -22,7 +22,7 @@ KINDS = ("md", "tex", "csv", "json", "png")
 TRIALS, MOMENTS = 60, 6
 
 
-def readings() -> Readings:
+def readings() -> ProbeReadings:
     """Trials of 1 to 10 kg in which a sensor shows the mass with an error of 0.5 kg, and others name the trial."""
     trial = np.repeat(np.arange(TRIALS), MOMENTS)
     mass = np.linspace(1.0, 10.0, TRIALS)[trial]
@@ -30,7 +30,7 @@ def readings() -> Readings:
     shown = mass + RANDOM.normal(scale=0.5, size=len(mass))
     features = {"sensor": np.column_stack([0.3 * shown - 2.0, names]), "names": names}
     seconds = np.tile(np.arange(MOMENTS) * 0.5, TRIALS)
-    return Readings(
+    return ProbeReadings(
         {name: values.astype(np.float32) for name, values in features.items()}, trial, mass, seconds, seconds > 0
     )
 

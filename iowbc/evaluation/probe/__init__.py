@@ -1,1 +1,1 @@
-"""What a policy's history knows of the load: a linear probe of its latent."""
+"""Linear probe of the load in a policy's history."""

@@ -21,12 +21,12 @@ EXACT = 1e-6
 """Times nearer than this are the same [s]."""
 
 LATENT, HISTORY, NEWEST, PRIVILEGED = "latent", "history H_t", "newest s_t", "s_priv"
-"""What the mass is read from."""
+"""Sources from which the mass is inferred."""
 
 
 @dataclass(frozen=True)
-class Readings:
-    """What was seen in the trials, one row a reading."""
+class ProbeReadings:
+    """Features observed in the trials, one row a reading."""
 
     features: dict[str, Features]
     """By what they are of, each of shape (readings, k)."""
@@ -37,7 +37,7 @@ class Readings:
     seconds: NDArray[np.float64]
     """Time since the trial began, with the object in the hands, (readings,) [s]."""
     settled: NDArray[np.bool_]
-    """Whether the history holds nothing but what was observed: it begins as copies of the first, (readings,)."""
+    """True once the history holds nothing but observations: it begins as copies of the first, (readings,)."""
 
 
 class Listener:
@@ -101,7 +101,7 @@ def read(
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
-) -> Readings:
+) -> ProbeReadings:
     """Play the trials of `eval.probe` and keep what is seen while they last. Raises Interrupted when interrupted."""
     recipe = world.recipe
     episodes, probe = probe_episodes(recipe), recipe.eval.probe
@@ -121,7 +121,7 @@ def gathered(
     times: NDArray[np.float64],
     masses: NDArray[np.float64],
     span: float,
-) -> Readings:
+) -> ProbeReadings:
     """Readings of all trials in one table, without those after a trial's end.
 
     kept: of each time, rows by trial; going: (times, trials); times: (times,) [s]; masses: (trials,) [kg]; span: of a
@@ -129,4 +129,4 @@ def gathered(
     """
     moment, trial = np.nonzero(going)
     features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
-    return Readings(features, trial, masses[trial], times[moment], times[moment] >= span - EXACT)
+    return ProbeReadings(features, trial, masses[trial], times[moment], times[moment] >= span - EXACT)

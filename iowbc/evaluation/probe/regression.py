@@ -8,14 +8,14 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import StandardScaler
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.probe.readings import Readings
+from iowbc.evaluation.probe.readings import ProbeReadings
 
 PENALTIES = tuple(10.0**power for power in range(6))
 """Of the ridge, on standardised features; the best in cross-validation over the trials that are fitted."""
 FOLDS = 4
 
 
-def inferred_masses(readings: Readings) -> pd.DataFrame:
+def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
     """The mass as it is read in the trials that were not fitted, one row a reading and source.
 
     Columns: `source` and its `size`, `trial`, `seconds`, `settled` (whether the history was full), `mass` and

@@ -20,7 +20,7 @@ class Capacity:
     smallest: float
     """That was tried."""
     open_ended: bool
-    """Whether it is also the largest that was tried, so that the true one may be larger."""
+    """True where it is also the largest that was tried, so that the true one may be larger."""
 
     def text(self, unit: str) -> str:
         """As it stands in a table."""

@@ -86,7 +86,7 @@ def error_entry(name: str, part: str = "") -> Entry:
 
 
 def asks_for_transport(rows: pd.DataFrame) -> bool:
-    """Whether any of these trials commands a way that has to be covered."""
+    """True where any of these trials commands a way that has to be covered."""
     return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
 
 

@@ -49,7 +49,7 @@ FITTED = (Column("Stiffness [N/m]"), Column("Damping [N·s/m]"), Column("Mass [k
 
 
 def compliance_table(summary: pd.DataFrame) -> Table:
-    """How each variant gets on with each behaviour of the partner, and before a crate that is blocked."""
+    """Forces, work and errors of each variant with each behaviour of the partner, and before a blocked crate."""
     chosen = summary[summary["kind"] == "compliance"]
     before = ", ".join(f"{variant} {low} to {high} N" for variant, (low, high) in BLOCKED_BEFORE.items())
     caption = (

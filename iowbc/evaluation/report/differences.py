@@ -11,7 +11,7 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.results.table import ABSENT, Column, Table, heads, measured
 
 PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
-"""What two trials have in common that meet the same world and commands; the first training of a variant is compared
+"""Columns that two trials share that meet the same world and commands; the first training of a variant is compared
 with the first of the other, and so on."""
 
 
@@ -41,7 +41,7 @@ def success_p(pairs: pd.DataFrame) -> float:
 
 
 def difference_table(trials: pd.DataFrame) -> Table | None:
-    """How each variant differs from the first, over all masses of each suite; None for a single variant."""
+    """Differences of each variant to the first, over all masses of each suite; None for a single variant."""
     reference, *others = variants_of(trials)
     rows, numbers = [], []
 

@@ -45,7 +45,7 @@ HEADROOM = 0.15
 FAILURE_SPACING = 0.035
 """Distance of two variants' crosses and counts of survivors, in heights of the panel."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
-"""How intervals are drawn on bars."""
+"""Style of intervals on bars."""
 
 
 def style_of(variant: str, variants: Sequence[str]) -> dict[str, Any]:

@@ -82,8 +82,8 @@ CONTACT_NUMBERS = (
 
 
 def contact_table(summary: pd.DataFrame) -> Table:
-    """How gently each variant meets the ground, how near it is to tipping and slipping, how smooth and how strenuous
-    its action is, at the heaviest mass of each suite survived."""
+    """Impacts on the ground, margins to tipping and slipping, smoothness of the action and effort of each variant, at
+    the heaviest mass of each suite survived."""
     rows = variant_rows(CONTACT, [(_load(row), row.to_frame().T) for _, row in heaviest(summary).iterrows()])
     caption = (
         "Contact with the ground and effort at the heaviest load survived: means over surviving trials. Touchdown: "

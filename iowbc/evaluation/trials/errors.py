@@ -18,7 +18,7 @@ ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 
 @dataclass(frozen=True)
 class Deviations:
-    """How far a trial was from a command, one row a control step, each of shape (T,)."""
+    """Deviations of a trial from a command, one row a control step, each of shape (T,)."""
 
     pitch: Array
     """[rad]."""
@@ -44,7 +44,7 @@ def given_commands(script: CommandScript, steps: int, dt: float) -> Array:
 
 
 def moving(given: Array, settings: GaitPrior) -> Mask:
-    """Where a command (T, 11) asks for steps, (T,)."""
+    """The steps in which a command (T, 11) asks for steps of the feet, (T,)."""
     return gait.wants_to_move(given, settings)
 
 
@@ -80,7 +80,7 @@ def deviations_from_clamped(trace: Trace, window: int) -> Deviations:
 
 
 def deviations_standing_still(given: Array, commands: Commands, dt: float) -> Deviations:
-    """What a robot that stands still in the nominal posture would be off, from the commands (T, 11) alone."""
+    """Deviations of a robot that stands still in the nominal posture, from the commands (T, 11) alone."""
     return Deviations(
         pitch=np.abs(given[:, PITCH] - commands.nominal_pitch),
         height=np.abs(given[:, HEIGHT] - commands.nominal_height),

@@ -70,7 +70,7 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
 
 
 def push_metrics(trace: Trace, directions: Array, window: int, push: Push) -> dict[str, float]:
-    """How hard the hands push along the command, where one is given; NaN without one, or without an object.
+    """Force of the hands along the command, where one is given; NaN without one, or without an object.
 
     directions: of the commanded motion in the world, zero while it stands, (T or more, 2); window: control steps of a
     gait period.

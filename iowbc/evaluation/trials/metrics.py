@@ -28,7 +28,7 @@ from iowbc.task.episodes import PlannedPull
 
 @dataclass(frozen=True)
 class Measure:
-    """What is the same for all trials of an evaluation."""
+    """Settings of the measurement, the same for all trials of an evaluation."""
 
     control_frequency: float
     """[Hz]."""
@@ -51,7 +51,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class Met:
-    """What a trial met, as far as its metrics depend on it."""
+    """Drawn conditions of a trial on which its metrics depend."""
 
     held_weight: float = 0.0
     """Of the object in the hands [N]; 0 without."""
@@ -116,7 +116,7 @@ def transport_metrics(trace: Trace, directions: Array, length: float, moving: Ma
 
 
 def effort_metrics(trace: Trace, efforts: Mapping[str, float]) -> dict[str, float]:
-    """What the trial cost: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
+    """Costs of the trial: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
     root mean square of its second difference over a control period and the support joints [rad].
 
     efforts: torque limits by joint [N·m]. `torque_rms/<joint>`: root mean square of a joint's torque as a part of its

@@ -21,7 +21,7 @@ from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
 NO_OBJECT = "no object"
 """Case of a sweep in the scene without an object."""
 SPLITS = {"development": 0, "test": 2**33}
-"""What is added to the seeds of each split: no seed of a recipe is as great, so that the two never meet."""
+"""Offset of the seeds of each split: no seed of a recipe is as great, so that the two never meet."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """Factors on the impulses on the object and the pushes on the base."""
 DIRECTIONS: dict[str, tuple[float, float]] = {

@@ -62,7 +62,7 @@ class Trace:
     foot_contact: Array
     """1 while a foot touches the ground, (T, 2)."""
     action: Array
-    """What the action adds to the reference of the support joints, (T, support) [rad]."""
+    """Correction that the action adds to the reference of the support joints, (T, support) [rad]."""
     joint_torque: Array
     joint_saturation: Array
     """Torque [N·m], and 1 while a joint is at its limit, (T, joints)."""

@@ -17,7 +17,7 @@ from iowbc.reference.labels.support_model import SupportModel
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a label was found to be."""
+    """Findings of the gates about a label."""
 
     torque: Array
     """Torques of the support joints in equilibrium, shape (15,) [N·m]."""

@@ -31,7 +31,7 @@ class Solver(Protocol):
 
 @dataclass(frozen=True)
 class LabelTask:
-    """How to make a labeller in a worker process."""
+    """Description of a labeller, from which a worker process makes it."""
 
     robot: Path
     """The robot's folder."""

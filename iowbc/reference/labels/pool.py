@@ -54,7 +54,7 @@ class _Worker:
 
 @dataclass
 class _Book:
-    """Which chunks remain, and which samples brought a worker down."""
+    """The chunks that remain, and the samples that brought a worker down."""
 
     waiting: list[int]
     crashed: dict[int, list[int]] = field(default_factory=dict)
