@@ -1,4 +1,4 @@
-"""Writes the exported folder: the graph, its contract, and all else that a controller loads."""
+"""The exported folder: the graph, its contract, and all else that a controller loads."""
 
 import shutil
 from collections.abc import Mapping
@@ -16,6 +16,8 @@ from iowbc.robot.description import DESCRIPTION
 
 PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "torch")
 """Packages whose versions the contract records."""
+ROBOT_FIELDS = ("support", "interaction", "kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position")
+"""Arrays of the robot that the contract holds by the same name."""
 
 
 def write_folder(
@@ -45,15 +47,7 @@ def write_folder(
         settle=tuple(port.name for port in graph.settle.inputs),
         state=graph.state,
         joints=robot.joints,
-        support=tuple(robot.support.tolist()),
-        interaction=tuple(robot.interaction.tolist()),
-        kp=tuple(robot.kp.tolist()),
-        kd=tuple(robot.kd.tolist()),
-        effort=tuple(robot.effort.tolist()),
-        velocity_limit=tuple(robot.velocity_limit.tolist()),
-        lower=tuple(robot.lower.tolist()),
-        upper=tuple(robot.upper.tolist()),
-        default_position=tuple(robot.default_position.tolist()),
+        **{name: tuple(getattr(robot, name).tolist()) for name in ROBOT_FIELDS},
         action_scale=tuple(graph.equations.scale.tolist()),
         action_bound=graph.equations.bound,
         history=graph.history,

@@ -1,7 +1,5 @@
 """Interaction of robot, object and partner: shares of the weight, horizontal forces, work, velocity of the handle."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from iowbc.arrays import Array
@@ -11,18 +9,6 @@ from iowbc.evaluation.trials.trace import Trace
 
 SETTLING = 1.0
 """The first second, in which the weight comes to bear, is left out [s]."""
-
-
-@dataclass(frozen=True)
-class Push:
-    """What limits a push, and what is asked of it."""
-
-    friction: float
-    """Coefficient between feet and ground."""
-    resistance: float
-    """Rolling resistance of the object [N]."""
-    part: float
-    """Of the largest possible force, that counts as pushing."""
 
 
 def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
@@ -69,14 +55,17 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
     }
 
 
-def push_metrics(trace: Trace, directions: Array, window: int, push: Push) -> dict[str, float]:
+def push_metrics(
+    trace: Trace, directions: Array, window: int, friction: float, resistance: float, part: float
+) -> dict[str, float]:
     """Force of the hands along the command, where one is given; NaN without one, or without an object.
 
     directions: of the commanded motion in the world, zero while it stands, (T or more, 2); window: control steps of a
-    gait period.
+    gait period; friction: coefficient between feet and ground; resistance: of the rolling object [N]; part: of the
+    largest possible force, that counts as pushing.
 
     `push_force`: mean horizontal force of the hands on the object along the command [N]. `push_force_share`: part of
-    the time in which it is at least `push.part` of what can be pushed with: friction times the vertical force of the
+    the time in which it is at least `part` of what can be pushed with: friction times the vertical force of the
     ground, or the resistance of the object where that is smaller; forces averaged over a gait period.
     """
     directions = directions[: len(trace)]
@@ -84,8 +73,8 @@ def push_metrics(trace: Trace, directions: Array, window: int, push: Push) -> di
     if not (commanded.any() and np.any(trace.object_position)):
         return {"push_force": np.nan, "push_force_share": np.nan}
     along = -np.vecdot(hand_forces(trace).sum(axis=1), directions)
-    most = np.minimum(push.friction * moving_average(trace.foot_load.sum(axis=1), window), push.resistance)
-    enough = moving_average(along, window) >= push.part * most
+    most = np.minimum(friction * moving_average(trace.foot_load.sum(axis=1), window), resistance)
+    enough = moving_average(along, window) >= part * most
     return {"push_force": float(np.mean(along[commanded])), "push_force_share": float(np.mean(enough[commanded]))}
 
 
