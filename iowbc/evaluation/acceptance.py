@@ -1,15 +1,17 @@
-"""The trials that accept an exported controller: it, not the torch student, carries the load in the simulation."""
+"""Rollouts of an exported controller in place of the torch student: acceptance trials, golden vectors."""
 
 import itertools
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.deploy.controller import Controller
+from iowbc.deploy.session import Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import Measure, trial_metrics
@@ -28,6 +30,16 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 TINY = 1e-9
 """No error is smaller, in its unit, where errors are compared in parts of each other."""
+
+GOLDEN_PARTS: tuple[dict[str, Any], ...] = (
+    {},
+    {"velocity": (0.3, 0.1, 0.3)},
+    {"velocity": (-0.2, 0.0, 0.0), "height": 0.66},
+    {"height": 0.66, "pitch": 0.3, "wrists": (0.03, 0.02, 0.02, 0.03, -0.02, 0.02)},
+)
+"""Commands of the equal parts of the rollout whose inputs become the golden vectors, in the terms of a segment."""
+RAMP = 0.5
+"""Part of each over which the command moves."""
 
 
 @dataclass(frozen=True)
@@ -134,3 +146,24 @@ def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tup
         transport=float(np.mean([one["transport_robot"] for one in metrics])),
         errors=np.mean([[one[name] for name in ERRORS] for one in metrics], axis=0),
     )
+
+
+def golden_episode(recipe: Recipe) -> Episode:
+    """An undisturbed episode without an object that lasts `export.golden_steps`."""
+    duration = recipe.export.golden_steps / recipe.task.control_frequency / len(GOLDEN_PARTS)
+    sequence = [
+        Segment.model_validate({"duration": duration, "ramp": RAMP * duration, **part}) for part in GOLDEN_PARTS
+    ]
+    return Condition(FREE, command_script(sequence, recipe.task.commands), UNDISTURBED).episode(0.0, recipe.seed)
+
+
+def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:
+    """The inputs of each control step, without the state; fewer than asked for where the robot falls.
+
+    Raises Interrupted.
+    """
+    steps, episodes = world.recipe.export.golden_steps, (golden_episode(world.recipe),)
+    with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment:
+        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=steps)
+        play_in(environment, policy, interrupted)
+    return policy.inputs

@@ -113,8 +113,7 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
 
 def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
-    from iowbc.evaluation.probe.readings import read
-    from iowbc.evaluation.probe.regression import inferred_masses
+    from iowbc.evaluation.probe import inferred_masses, read
     from iowbc.evaluation.report.probe import write_probe
 
     asked = job.recipe.eval.probe

@@ -10,8 +10,16 @@ import torch
 from numpy.typing import NDArray
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.probe.readings import HISTORY, LATENT, NEWEST, PRIVILEGED, Listener, ProbeReadings, gathered
-from iowbc.evaluation.probe.regression import inferred_masses
+from iowbc.evaluation.probe import (
+    HISTORY,
+    LATENT,
+    NEWEST,
+    PRIVILEGED,
+    Listener,
+    ProbeReadings,
+    gathered,
+    inferred_masses,
+)
 from iowbc.evaluation.report.probe import figures_of, probe_figure, probe_table, write_probe
 from iowbc.evaluation.report.statistics import determination, determination_interval
 from iowbc.learning.acting import StudentPolicy, TeacherPolicy

@@ -20,9 +20,8 @@ from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, SETTLE, STEP
 from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.acceptance import try_out_network
-from iowbc.evaluation.play import exported_source, play
+from iowbc.evaluation.play import exported_source, play, require_display
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.viewer import require_display
 from iowbc.export import golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import TeacherNetwork

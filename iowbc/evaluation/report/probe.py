@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from iowbc.evaluation.probe.readings import PRIVILEGED
+from iowbc.evaluation.probe import PRIVILEGED
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner
 from iowbc.evaluation.report.figures import finish, style_of

@@ -1,1 +1,0 @@
-"""Linear probe of the load in a policy's history."""
