@@ -45,11 +45,11 @@ def error_table(
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
     known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
-    with_paper = kind in NUMBERS and known and asks_for_steps(chosen)
+    beside = kind in NUMBERS and known and asks_for_steps(chosen)
     entries = [*map(error_entry, ERROR_HEADS), *OUTCOME]
-    entries += [_paper_entry(summary, error, labels) for error in ERRORS] if with_paper else []
-    caption, numbers = _caption(chosen, kind, with_paper), _with_papers(chosen, labels) if with_paper else chosen
-    return _by_mass_or_case(name or slug(suite), caption, entries, chosen, numbers)
+    entries += [_paper_entry(summary, error, labels) for error in ERRORS] if beside else []
+    rows = with_paper(chosen, labels) if beside else chosen
+    return _by_mass_or_case(name or slug(suite), _caption(chosen, kind, beside), entries, rows)
 
 
 def moving_table(summary: pd.DataFrame, suite: str) -> Table:
@@ -60,7 +60,7 @@ def moving_table(summary: pd.DataFrame, suite: str) -> Table:
         f"95 % interval. {conditions(chosen)} {measures(chosen)}"
     )
     entries = [error_entry(name, "_moving") for name in ERROR_HEADS]
-    return _by_mass_or_case(f"{slug(suite)}_moving", caption, entries, chosen, chosen)
+    return _by_mass_or_case(f"{slug(suite)}_moving", caption, entries, chosen)
 
 
 def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
@@ -71,27 +71,25 @@ def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) ->
     entries = (
         Entry(Column("Mass"), lambda row: f"{row['mass']:g} kg", lambda rows: "any"),
         SURVIVED,
-        *(_ratio_entry(summary, name, labels) for name in ERROR_HEADS),
+        *(_ratio_entry(summary, name) for name in ERROR_HEADS),
     )
     rows: list[tuple[Cell, ...]] = []
     numbers: list[dict[str, object]] = []
     for suite in suites_of(summary, *NUMBERS):
-        chosen = summary[summary["suite"] == suite]
-        kind = str(chosen["kind"].iloc[0])
-        known = chosen["variant"].map(lambda variant: labels.get(variant, variant)).isin(VARIANTS)
+        chosen = with_paper(summary[summary["suite"] == suite], labels)
         if not asks_for_steps(chosen):
             continue
-        of_paper = [
-            own[own["mass"] == mass] for _, own in chosen[known].groupby("variant", sort=False) for mass in TABLES[kind]
-        ]
-        found = variant_rows(entries, [(f"{NUMBERS[kind]}, {suite}", own) for own in of_paper])
-        rows += [*found, still_row(entries, chosen, f"{NUMBERS[kind]}, {suite}")] if found else []
+        kind, name = chosen["kind"].iloc[0], f"{NUMBERS[chosen['kind'].iloc[0]]}, {suite}"
+        known = chosen[chosen["variant"].map(lambda variant: labels.get(variant, variant)).isin(VARIANTS)]
+        of_paper = known[known["mass"].isin(TABLES[kind])]
+        of_paper = pd.concat([own for _, own in of_paper.groupby("variant", sort=False)] or [of_paper])
+        found = variant_rows(entries, [(name, of_paper)])
+        rows += [*found, still_row(entries, chosen, name)] if found else []
         numbers += [
-            {"suite": suite, "variant": row["variant"], "mass": row["mass"], "error": name, "ours": row[name]}
-            | {"paper": theirs, "ratio": row[name] / theirs}
-            for own in of_paper
-            for _, row in own.iterrows()
-            for name, theirs in zip(ERRORS, _papers(row, labels), strict=True)
+            {"suite": suite, "variant": row["variant"], "mass": row["mass"], "error": error, "ours": row[error]}
+            | {"paper": row[f"paper_{error}"], "ratio": row[f"ratio_{error}"]}
+            for _, row in of_paper.iterrows()
+            for error in ERRORS
         ]
     if not rows:
         return None
@@ -114,36 +112,38 @@ def slug(suite: str) -> str:
     return suite.replace(" ", "_")
 
 
-def _by_mass_or_case(
-    name: str, caption: str, entries: list[Entry], chosen: pd.DataFrame, numbers: pd.DataFrame
-) -> Table:
+def with_paper(rows: pd.DataFrame, labels: Mapping[str, str]) -> pd.DataFrame:
+    """The numbers with the paper's, `paper_<error>`, and ours in parts of them, `ratio_<error>`; NaN without any."""
+    found = [
+        reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) for _, row in rows.iterrows()
+    ]
+    paper = np.array([[np.nan] * len(ERRORS) if one is None or one == "absent" else one for one in found], np.float64)
+    columns = {f"paper_{name}": paper[:, place] for place, name in enumerate(ERRORS)}
+    ratios = {f"ratio_{name}": rows[name].to_numpy(np.float64) / columns[f"paper_{name}"] for name in ERRORS}
+    return rows.assign(**columns, **ratios)
+
+
+def _by_mass_or_case(name: str, caption: str, entries: list[Entry], chosen: pd.DataFrame) -> Table:
     """A table of a suite: by mass with one row of standing still, or by case with one in each."""
     if str(chosen["kind"].iloc[0]) not in SWEPT:
         rows = variant_rows(entries, by_case(chosen), still=True)
-        return variant_table(name, caption, "Case", entries, rows, numbers)
+        return variant_table(name, caption, "Case", entries, rows, chosen)
     groups = [
         (f"{mass:g} kg" if case in set(chosen["suite"]) else str(case), group)
         for (case, mass), group in chosen.groupby(["case", "mass"], sort=False)
     ]
     rows = [*variant_rows(entries, groups), still_row(entries, chosen)]
-    return variant_table(name, caption, "Mass", entries, rows, numbers)
-
-
-def _papers(row: pd.Series, labels: Mapping[str, str]) -> list[float]:
-    """The paper's errors at the mass and for the variant of a row; NaN where it has none."""
-    paper = reported(str(row["kind"]), float(row["mass"]), labels.get(row["variant"], row["variant"]))
-    return [np.nan] * len(ERRORS) if paper is None or paper == "absent" else list(paper)
+    return variant_table(name, caption, "Mass", entries, rows, chosen)
 
 
 def _paper_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -> Entry:
     """The paper's error, and in brackets ours in parts of it; of pushes with what it does not say."""
 
     def cell(row: pd.Series) -> str:
-        paper = reported(str(row["kind"]), float(row["mass"]), labels.get(row["variant"], row["variant"]))
-        if paper is None or paper == "absent":
-            return FAILS if paper is None else ABSENT
-        value = paper[ERRORS.index(error)]
-        ratio = float(row[error]) / value
+        value, ratio = row[f"paper_{error}"], row[f"ratio_{error}"]
+        if np.isnan(value):
+            failed = reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) is None
+            return FAILS if failed else ABSENT
         said = ([] if np.isnan(ratio) else [f"{ratio:.2f}"]) + regime(summary, row, error)
         return f"{value:.3f} ({'; '.join(said)})" if said else f"{value:.3f}"
 
@@ -151,29 +151,18 @@ def _paper_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -
     return Entry(Column(f"paper {head.name}", latex=f"paper {head.latex}", role="paper"), cell)
 
 
-def _ratio_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -> Entry:
-    """Ours, the paper's, and ours in parts of it; of errors that the paper does not have ours alone."""
+def _ratio_entry(summary: pd.DataFrame, error: str) -> Entry:
+    """Ours, the paper's, and ours in parts of it; of an error that the paper does not have ours alone."""
 
     def cell(row: pd.Series) -> Cell:
-        ours = float(row[error])
         if error == RAW:
-            return measured(ours, none=FAILS)
-        theirs = _papers(row, labels)[ERRORS.index(error)]
-        beside = regime(summary, row, error) if np.isfinite(theirs) else []
-        shown = [measured(one, none=FAILS) for one in (ours, theirs)]
-        return f"{shown[0]} / {shown[1]} = {measured(ours / theirs, form='.2f')}" + (
-            f" ({'; '.join(beside)})" if beside else ""
-        )
+            return measured(row[error], none=FAILS)
+        ours, theirs = (measured(row[name], none=FAILS) for name in (error, f"paper_{error}"))
+        beside = regime(summary, row, error) if np.isfinite(row[f"paper_{error}"]) else []
+        ratio = measured(row[f"ratio_{error}"], form=".2f")
+        return f"{ours} / {theirs} = {ratio}" + (f" ({'; '.join(beside)})" if beside else "")
 
     return Entry(ERROR_HEADS[error], cell, lambda rows: still_error(rows, error))
-
-
-def _with_papers(chosen: pd.DataFrame, labels: Mapping[str, str]) -> pd.DataFrame:
-    """The numbers with the paper's, `paper_<error>`, and ours in parts of them, `ratio_<error>`; NaN without any."""
-    paper = np.array([_papers(row, labels) for _, row in chosen.iterrows()])
-    columns = {f"paper_{name}": paper[:, place] for place, name in enumerate(ERRORS)}
-    ratios = {f"ratio_{name}": chosen[name].to_numpy(np.float64) / columns[f"paper_{name}"] for name in ERRORS}
-    return chosen.assign(**columns, **ratios)
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:

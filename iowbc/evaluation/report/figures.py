@@ -1,7 +1,8 @@
 """The paper's figures (errors against lifting mass, against pushing mass, comparison of variants), and robustness."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from string import ascii_lowercase
 from typing import Any
 
@@ -56,28 +57,14 @@ def style_of(variant: str, variants: Sequence[str]) -> dict[str, Any]:
 
 def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
     """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
-    chosen, variants = summary[summary["suite"] == suite], variants_of(summary)
-    kind, with_paper = str(chosen["kind"].iloc[0]), _with_paper(chosen)
+    chosen = summary[summary["suite"] == suite]
     figure = Figure(figsize=(9.5, 6.6), layout="constrained")
     panels = list(figure.subplots(2, 2, sharex=True).flat)
-    for axes, name in zip(panels, ERRORS, strict=True):
-        for place, variant in enumerate(variants):
-            rows = chosen[chosen["variant"] == variant].sort_values("mass")
-            shift = SHIFT * float(np.ptp(chosen["mass"])) * (place - (len(variants) - 1) / 2)
-            style = style_of(variant, variants)
-            half = rows[f"{name}_half"].fillna(0.0)
-            axes.errorbar(rows["mass"] + shift, rows[name], yerr=half, capsize=3, label=variant, **style)
-            if with_paper:
-                points = {mass: errors[ERRORS.index(name)] for mass, errors in _paper_errors(kind, variant).items()}
-                _paper_curve(axes, points, style)
-            _mark_survivors(axes, rows, place, style["color"])
-        _still_line(axes, float(chosen[f"still_{name}"].mean()))
-        axes.set_ylabel(LABELS[name])
-        tidy(axes)
-    for axes in panels[2:]:
-        axes.set_xlabel(f"{kind} mass [kg]")
-    heading = f"Tracking errors against {kind} mass, bars: 95 % intervals. {conditions(chosen)}"
-    return finish(figure, [], f"{heading}\n{_note(with_paper)}", panels[0])
+    for place, (axes, name) in enumerate(zip(panels, ERRORS, strict=True)):
+        _sweep_panel(axes, chosen, variants_of(summary), name, chosen[f"still_{name}"].mean(), itemgetter(place))
+        axes.set(ylabel=LABELS[name], xlabel="" if place < 2 else f"{chosen['kind'].iloc[0]} mass [kg]")
+    heading = f"Tracking errors against {chosen['kind'].iloc[0]} mass, bars: 95 % intervals. {conditions(chosen)}"
+    return finish(figure, [], f"{heading}\n{_note(_with_paper(chosen))}", panels[0])
 
 
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
@@ -90,7 +77,12 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     widths = [*(1.0 for _ in sweeps), *[bars] * bool(sweeps), bars]
     figure, panels = _row(PANEL_WIDTH, widths, ConstrainedLayoutEngine(wspace=0.06))
     for axes, suite in zip(panels, sweeps, strict=False):
-        _norm_panel(axes, summary[summary["suite"] == suite], variants_of(summary))
+        chosen = summary[summary["suite"] == suite]
+        still = error_norm(chosen[[f"still_{name}" for name in ERRORS]].mean().to_numpy())
+        _sweep_panel(
+            axes, chosen, variants_of(summary), "norm", float(still), lambda row: float(error_norm(np.array(row)))
+        )
+        axes.set(title=f"error norm, {suite}", xlabel="mass [kg]", ylabel="norm of the four errors [SI units]")
     if sweeps:
         found = {variant: {} for variant in variants_of(summary)} | load_capacities(summary, capacity_rate)
         _capacity_bars(panels[-2], found, sweeps)
@@ -170,6 +162,10 @@ def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, li
     return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
 
 
+def _norm(errors: Sequence[float]) -> float:
+    return float(error_norm(np.array(errors)))
+
+
 def _with_paper(rows: pd.DataFrame) -> bool:
     return rows["kind"].iloc[0] in NUMBERS and asks_for_steps(rows)
 
@@ -179,20 +175,32 @@ def _note(with_paper: bool) -> str:
     return f"{MARKS}\n{'; '.join([PAPER_NOTE] * with_paper + [STILL_NOTE])}"
 
 
-def _norm_panel(axes: Axes, chosen: pd.DataFrame, variants: Sequence[str]) -> None:
-    """Norm of the four errors over the mass of one suite."""
-    still = chosen[[f"still_{name}" for name in ERRORS]].mean().to_numpy()
-    _still_line(axes, float(error_norm(still)))
+def _sweep_panel(
+    axes: Axes,
+    chosen: pd.DataFrame,
+    variants: Sequence[str],
+    column: str,
+    still: float,
+    of_paper: Callable[[tuple[float, ...]], float],
+) -> None:
+    """A column over the mass of one suite, with intervals where it has some, for each variant; the score of a robot
+    that stands still, and the paper's numbers: `of_paper` of its four errors."""
     for place, variant in enumerate(variants):
         rows = chosen[chosen["variant"] == variant].sort_values("mass")
         style = style_of(variant, variants)
-        axes.plot(rows["mass"], rows["norm"], label=variant, **style)
-        if asks_for_steps(rows):
-            paper = _paper_errors(str(chosen["kind"].iloc[0]), variant)
-            _paper_curve(axes, {mass: float(error_norm(np.array(errors))) for mass, errors in paper.items()}, style)
+        if f"{column}_half" in rows:
+            shift = SHIFT * float(np.ptp(chosen["mass"])) * (place - (len(variants) - 1) / 2)
+            half = rows[f"{column}_half"].fillna(0.0)
+            axes.errorbar(rows["mass"] + shift, rows[column], yerr=half, capsize=3, label=variant, **style)
+        else:
+            axes.plot(rows["mass"], rows[column], label=variant, **style)
+        if _with_paper(chosen):
+            paper = {mass: row.get(variant) for mass, row in TABLES[chosen["kind"].iloc[0]].items()}
+            points = {mass: of_paper(errors) for mass, errors in paper.items() if errors is not None}
+            axes.plot(list(points), list(points.values()), linestyle=":", markerfacecolor="none", **style)
         _mark_survivors(axes, rows, place, style["color"])
-    title = f"error norm, {chosen['suite'].iloc[0]}"
-    axes.set(title=title, xlabel="mass [kg]", ylabel="norm of the four errors [SI units]")
+    axes.axhline(still, label=STANDS_STILL, zorder=0, color="0.55", linestyle="--", linewidth=1.2)
+    axes.update_datalim([(0.0, still)], updatex=False)
     tidy(axes)
 
 
@@ -226,16 +234,6 @@ def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
     draw_bars(axes, heights, texts, [textwrap.fill(name, LABEL_WIDTH) for name in names], {})
 
 
-def _paper_errors(kind: str, variant: str) -> dict[float, tuple[float, ...]]:
-    """The paper's errors of a variant by mass, where it has any."""
-    return {mass: errors for mass, row in TABLES.get(kind, {}).items() if (errors := row.get(variant)) is not None}
-
-
-def _paper_curve(axes: Axes, points: Mapping[float, float], style: Mapping[str, Any]) -> None:
-    if points:
-        axes.plot(list(points), list(points.values()), linestyle=":", markerfacecolor="none", **style)
-
-
 def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> None:
     """At the panel's upper edge, one line a variant: how many survived a mass where not all did, a cross for none."""
     transform, height = axes.get_xaxis_transform(), 0.98 - FAILURE_SPACING * place
@@ -251,12 +249,6 @@ def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> 
     ]
     for mark in marks:
         mark.set_in_layout(False)
-
-
-def _still_line(axes: Axes, value: float) -> None:
-    """The score of a robot that stands still."""
-    axes.axhline(value, label=STANDS_STILL, zorder=0, color="0.55", linestyle="--", linewidth=1.2)
-    axes.update_datalim([(0.0, value)], updatex=False)
 
 
 def _from_zero(axes: Axes) -> None:
