@@ -157,7 +157,7 @@ def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
             f"probe: only {lasted} of the trials to be fitted last as long as a history, {FOLDS} must; train longer, "
             "or give lighter masses (eval.probe.masses) or a longer sequence (eval.probe.sequence)"
         )
-    told = {
+    common = {
         "trial": readings.trial[tested],
         "seconds": readings.seconds[tested],
         "settled": readings.settled[tested],
@@ -174,5 +174,5 @@ def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
         )
         search.fit(features[fitted], readings.mass[fitted], groups=readings.trial[fitted])
         read = {"size": features.shape[1], "inferred": search.predict(features[tested])}
-        tables.append(pd.DataFrame({"source": source, **told, **read}))
+        tables.append(pd.DataFrame({"source": source, **common, **read}))
     return pd.concat(tables, ignore_index=True)

@@ -41,9 +41,9 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     found = np.zeros(plan.grid_shape, dtype=bool)
     found.ravel()[dataset.index[on_grid] - plan.drawn] = True
     held: Mask = np.any(found, axis=0, keepdims=False)
-    told = dataset.rejected_reason != ARMS_COLLIDE
+    relevant = dataset.rejected_reason != ARMS_COLLIDE
     kept = _around(plan, dataset.command[~on_grid])
-    tried = kept + _around(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])
+    tried = kept + _around(plan, dataset.rejected_command[relevant & (dataset.rejected_index < plan.drawn)])
     enough = tried >= recipe.enough
     share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
     feasible = held & (~enough | (share >= recipe.kept_share))

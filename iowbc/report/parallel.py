@@ -40,7 +40,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Scale:
+class AxisScale:
     """An upright axis from 0 to 1."""
 
     name: str
@@ -86,7 +86,7 @@ def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines
     return figure
 
 
-def _setting(name: str, lines: Sequence[Line]) -> Scale:
+def _setting(name: str, lines: Sequence[Line]) -> AxisScale:
     """The axis of a setting: numbers to scale, other values at equal distances."""
     short, values = name.rpartition(".")[2], [line.settings.get(name) for line in lines]
     numbers = [float(value) for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
@@ -94,10 +94,12 @@ def _setting(name: str, lines: Sequence[Line]) -> Scale:
         return _numbers(short, numbers, named=True)
     texts = list(dict.fromkeys(map(written, values)))
     places = dict(zip(texts, np.linspace(0.0, 1.0, len(texts)) if len(texts) > 1 else [0.5], strict=True))
-    return Scale(short, lambda value: places.get(written(value), math.nan), [(places[text], text) for text in texts])
+    return AxisScale(
+        short, lambda value: places.get(written(value), math.nan), [(places[text], text) for text in texts]
+    )
 
 
-def _outcome(name: str, lines: Sequence[Line]) -> Scale:
+def _outcome(name: str, lines: Sequence[Line]) -> AxisScale:
     """The axis of an outcome, with room for every interval."""
     found = [run.get(name, math.nan) for line in lines for run in line.runs]
     for line in lines:
@@ -108,7 +110,7 @@ def _outcome(name: str, lines: Sequence[Line]) -> Scale:
     )
 
 
-def _numbers(name: str, values: Sequence[float], *, named: bool) -> Scale:
+def _numbers(name: str, values: Sequence[float], *, named: bool) -> AxisScale:
     low, high = min(values), max(values)
     logarithmic = named and low > 0 and high / low > ORDERS
 
@@ -125,7 +127,7 @@ def _numbers(name: str, values: Sequence[float], *, named: bool) -> Scale:
     if not (named and len(marked) <= VALUES_NAMED):
         ticks = [float(tick) for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high]
         marked = sorted({low, high}) if logarithmic else ticks or marked
-    return Scale(name, height, [(height(value), f"{value:.4g}") for value in marked])
+    return AxisScale(name, height, [(height(value), f"{value:.4g}") for value in marked])
 
 
 def _colours(figure: Figure, axes: Axes, lines: Sequence[Line], outcomes: Sequence[str]) -> Sequence[object]:

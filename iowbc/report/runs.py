@@ -37,7 +37,7 @@ class Group:
 
     @property
     def seeds(self) -> tuple[str, ...]:
-        """Of each run's training; where that does not tell them apart, what the runs are called."""
+        """Seed of each run's training; where seeds are equal, the labels of the runs."""
         own = [run.recipe.get("teacher", {}).get("seed") for run in self.runs]
         seeds = [
             str(run.recipe.get("seed", 0) if seed is None else seed) for run, seed in zip(self.runs, own, strict=True)

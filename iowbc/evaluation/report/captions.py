@@ -18,8 +18,8 @@ def conditions(rows: pd.DataFrame) -> str:
 def trainings(rows: pd.DataFrame) -> str:
     """The variants that were trained more than once."""
     several = rows[rows["trainings"] > 1].groupby("variant", sort=False)["trainings"].max()
-    told = ", ".join(f"{variant}: {count} trainings" for variant, count in several.items())
-    return f" Trials of all trainings together ({told})." if told else ""
+    counts = ", ".join(f"{variant}: {count} trainings" for variant, count in several.items())
+    return f" Trials of all trainings together ({counts})." if counts else ""
 
 
 def measures(rows: pd.DataFrame) -> str:

@@ -22,7 +22,7 @@ from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 KINDS = (*SWEPT, "heavy", "robustness")
-"""Kinds of suites in which errors tell how good a controller is."""
+"""Kinds of suites in which errors rank controllers."""
 FIGURES = ("success", *ERRORS, "norm")
 """Figures of a trial."""
 

@@ -28,7 +28,7 @@ class Measure:
     gait: GaitPrior
     commands: Commands
     least_weight: float
-    """Weight on the robot under which the hands' part of it is not told [N]."""
+    """Weight on the robot under which the hands' part of it has no value [N]."""
     foot_load: float
     """Vertical force from which a foot counts as loaded [N]."""
     push_part: float
