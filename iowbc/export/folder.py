@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from iowbc.control.command import COMMAND
 from iowbc.deploy import contract, exported_folder
@@ -28,6 +29,7 @@ def write_folder(
     sources: artifact keys of what went into the graph, by stage.
     """
     robot, drawn = graph.robot, recipe.simulation.randomization
+    arrays: dict[str, Any] = {name: tuple(getattr(robot, name).tolist()) for name in ROBOT_FIELDS}
     (out / exported_folder.ROBOT).mkdir()
     for source in (robot.folder / DESCRIPTION, robot.mjcf):
         shutil.copy(source, out / exported_folder.ROBOT / source.name)
@@ -47,7 +49,7 @@ def write_folder(
         settle=tuple(port.name for port in graph.settle.inputs),
         state=graph.state,
         joints=robot.joints,
-        **{name: tuple(getattr(robot, name).tolist()) for name in ROBOT_FIELDS},
+        **arrays,
         action_scale=tuple(graph.equations.scale.tolist()),
         action_bound=graph.equations.bound,
         history=graph.history,

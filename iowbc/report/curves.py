@@ -194,7 +194,8 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
 
 def _numbers(rows: Sequence[Mapping[str, str]], name: str) -> Values:
     """A column; NaN where a cell holds no number."""
-    return pd.to_numeric(pd.Series([row.get(name) for row in rows]), errors="coerce").to_numpy(np.float64)
+    numbers = pd.to_numeric(pd.Series([row.get(name) for row in rows]), errors="coerce")
+    return np.asarray(numbers, np.float64)
 
 
 def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:

@@ -102,7 +102,8 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
     by_joint = {name: row[name] for name in joints if name.startswith(TORQUE)}
     worst = max(by_joint, key=lambda name: by_joint[name], default="")
     row |= {TORQUE: by_joint.get(worst, np.nan), f"{TORQUE}_joint": worst.removeprefix(f"{TORQUE}/")}
-    return row | group[[*WAYS, *FORCES, *STILL]].mean().to_dict() | group[[*SETTINGS]].iloc[0].to_dict()
+    row |= group[[*WAYS, *FORCES, *STILL]].mean().to_dict() | group[[*SETTINGS]].iloc[0].to_dict()
+    return row
 
 
 def with_trainings(trials: pd.DataFrame) -> pd.DataFrame:

@@ -63,7 +63,8 @@ def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
         "≥ where the heaviest tried did. In simulation."
     )
     still = (STANDS_STILL, *("none" if one else ABSENT for one in asked))
-    found = {variant: {} for variant in variants_of(summary)} | load_capacities(summary, rate)
+    nothing: Capacities = {variant: {} for variant in variants_of(summary)}
+    found = nothing | load_capacities(summary, rate)
     return _table("capacity", caption, found, {suite: suite.capitalize() for suite in suites}, "kg", [still])
 
 

@@ -84,7 +84,8 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
         )
         axes.set(title=f"error norm, {suite}", xlabel="mass [kg]", ylabel="norm of the four errors [SI units]")
     if sweeps:
-        found = {variant: {} for variant in variants_of(summary)} | load_capacities(summary, capacity_rate)
+        nothing: Capacities = {variant: {} for variant in variants_of(summary)}
+        found = nothing | load_capacities(summary, capacity_rate)
         _capacity_bars(panels[-2], found, sweeps)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
     _success_panel(panels[-1], _heaviest(summary), "success rate")
@@ -239,7 +240,7 @@ def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> 
     transform, height = axes.get_xaxis_transform(), 0.98 - FAILURE_SPACING * place
     failed = rows[rows["survived"] == 0]["mass"]
     crosses = axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False)
-    text = {"color": colour, "transform": transform, "ha": "center", "va": "center", "fontsize": 7}
+    text: dict[str, Any] = {"color": colour, "transform": transform, "ha": "center", "va": "center", "fontsize": 7}
     marks: list[Artist] = [
         *crosses,
         *(

@@ -256,7 +256,9 @@ def push_trials(recipe: Recipe) -> Iterator[TrialCell]:
     robustness, fixed = recipe.eval.robustness, UNDISTURBED | {"partner_share": 0.0}
     ladders = {} if robustness is None else {"": robustness.pushes, ", walking": robustness.walking_pushes}
     for words, ladder in ladders.items():
-        for direction in () if ladder is None else ladder.directions:
+        if ladder is None:
+            continue
+        for direction in ladder.directions:
             forward, left = DIRECTIONS[direction]
             place = ("pushes", "pushes", f"{direction}{words}", ladder.scene, ladder.mass)
             for impulse in ladder.impulses:
