@@ -79,7 +79,7 @@ def run(job: Job) -> None:
 def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
-    from iowbc.evaluation.films import Film, film_trial, filmed
+    from iowbc.evaluation.films import film_trial, filmed, written_film
     from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
@@ -101,8 +101,8 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
     try:
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
-            film = Film(job.out / "videos" / f"{name}.mp4", recipe.eval.video.fps)
-            film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
+            with written_film(job.out / "videos" / f"{name}.mp4", recipe.eval.video.fps) as add:
+                film_trial(world, policy, row, add, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
     for suite, rows in summary[~summary["kind"].isin(PROBING)].groupby("suite", sort=False):
@@ -113,8 +113,7 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
 
 def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
-    from iowbc.evaluation.probe.readings import read
-    from iowbc.evaluation.probe.regression import inferred_masses
+    from iowbc.evaluation.probe import inferred_masses, read
     from iowbc.evaluation.report.probe import write_probe
 
     asked = job.recipe.eval.probe

@@ -28,8 +28,7 @@ def run(job: Job) -> None:
     from iowbc.deploy.session import open_session
     from iowbc.deploy.session import run as run_graph
     from iowbc.deploy.timing import step_seconds
-    from iowbc.evaluation.acceptance import try_out, try_out_network
-    from iowbc.evaluation.golden_rollout import golden_inputs
+    from iowbc.evaluation.acceptance import golden_inputs, try_out, try_out_network
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.export.graph import ControllerGraph

@@ -142,7 +142,7 @@ def _world(recipe: Recipe) -> Iterator[Workload]:
     asked = recipe.eval.model_copy(update={"trials": TRIALS, "sequence": (Segment(duration=DURATION, ramp=0.0),)})
     recipe = recipe.model_copy(update={"eval": asked})
     sweep = planned_sweeps(recipe)[0]
-    with generator_of(None, folder, recipe) as generator, tempfile.TemporaryDirectory() as place:
+    with generator_of(folder, recipe) as generator, tempfile.TemporaryDirectory() as place:
         robot = load_robot(folder)
         architecture: dict[str, Any] = {
             "inputs": full_layout(recipe, robot).size,
