@@ -1,14 +1,16 @@
-"""What a stage declares and what it receives."""
+"""A stage: its declaration, and the job that it receives."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 from iowbc.recipe.recipe import Recipe
 
-Result = TypeVar("Result")
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.spread import NodeSpread
+
 SUMMARY = "summary.json"
 """File of an artifact with its metrics."""
 START = "start"
@@ -16,7 +18,7 @@ START = "start"
 
 
 class Report(Protocol):
-    """Where a stage tells how it goes: console and tracking."""
+    """A stage's way to console and tracking."""
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
         """Record named values at a step; one batched tracking call."""
@@ -44,51 +46,6 @@ class Member(Protocol):
         """Inverse of `state`."""
 
 
-class ActorPool(Protocol):
-    """Members that are asked side by side. Who is lost is remade in the state after the last request."""
-
-    @property
-    def states(self) -> list[Any]:
-        """The state of each member after the last request that changed it."""
-
-    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
-        """Send each member its message. `changes`: whether that changes states;
-        `patience`: seconds after which a member that has not answered counts as lost."""
-
-    def answers(self) -> list[Any]:
-        """What the members answered, in order.
-
-        Raises WorkerFailed with what a member raised, StageFailed where one is lost again and again, and `Interrupted`
-        where members have not begun yet when the job is asked to stop.
-        """
-
-    def close(self) -> None:
-        """End the members."""
-
-
-class Spread(Protocol):
-    """Other machines that work for a stage."""
-
-    @property
-    def width(self) -> int:
-        """Calls that can run at the same time."""
-
-    def __call__(
-        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> Iterator[tuple[int, Result]]:
-        """Call a function of a module with each of these arguments, on any machine; place and result of each call, in
-        the order in which they end. `folders`: what the job reads, given to the function by name, wherever it lies.
-
-        Raises `Interrupted` once the job is asked to stop.
-        """
-
-    def actor_pool(
-        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> ActorPool:
-        """Members of one core each on any machines, made by a function of a module from each of these arguments and
-        `folders`, as above. `called`: what users know a member as."""
-
-
 @dataclass(frozen=True)
 class Job:
     """One execution of a stage."""
@@ -111,7 +68,7 @@ class Job:
     """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
     predecessor: Path | None = None
     """Artifact folder of the same stage that this one goes on from; see `Stage.extends`."""
-    spread: Spread | None = None
+    spread: "NodeSpread | None" = None
     """Other machines that may work for the stage; never changes a result."""
 
     def summarize(self, metrics: Mapping[str, float], **details: Any) -> None:

@@ -52,8 +52,6 @@ class Board:
     stopping: Callable[[], str] = lambda: ""
     """What to show once a stop was asked for; empty before."""
     views: dict[str, RunView] = field(default_factory=dict)
-    load: Callable[[], str] = lambda: ""
-    """How much of a cluster is in use; empty without one."""
     _live: Live | None = None
     _shown: float = field(default_factory=time.monotonic)
 
@@ -91,8 +89,6 @@ class Board:
             self._live.refresh()
         elif self._live is None and now - self._shown > self.interval:
             self._shown = now
-            if self.load():
-                self._say(self.load())
             for view in self.views.values():
                 if view.state == "runs":
                     self._say(f"{view.name}: {last_line(view.log)}")
@@ -119,8 +115,7 @@ class Board:
             state = Text(view.state, style=STYLES.get(view.state, ""))
             table.add_row(Text(view.name), state, duration(view.spent), Text(text, style="dim"))
         stopping = self.stopping()
-        counts = ", ".join(filter(None, (self._counts(), self.load())))
-        return Group(table, Text(counts), *([Text(stopping, style="magenta")] if stopping else []))
+        return Group(table, Text(self._counts()), *([Text(stopping, style="magenta")] if stopping else []))
 
 
 def last_line(log: Path) -> str:
