@@ -58,7 +58,7 @@ class TeacherTraining:
     @property
     def steps(self) -> int:
         """Environment steps made so far."""
-        return int(self.model.num_timesteps)
+        return self.model.steps
 
     @property
     def planned(self) -> int:
@@ -75,10 +75,9 @@ class TeacherTraining:
         model.caution = self.best.caution
         model.explore_anew()
         model.collect()
-        model.train()
+        training = model.train()
         if self.average is not None:
             self.average.take(model.policy)
-        training = {name: float(value) for name, value in model.logger.name_to_value.items()}
         figures = self.environments.statistics() | self._judged(training)
         seconds = {f"seconds/{part}": spent for part, spent in model.seconds.items()}
         rest = time.perf_counter() - begin - sum(seconds.values())
@@ -144,14 +143,14 @@ class TeacherTraining:
     def arrays(self) -> Arrays:
         """Everything that a resumed training needs, between two updates."""
         model = self.model
-        assert model._last_obs is not None, "arrays() comes after an update"
+        assert model.observation is not None, "arrays() comes after an update"
         return {
             **self._learnt(),
             **prefixed("best", self.best.arrays()),
             **prefixed("random", checkpoint.random_arrays()),
             **prefixed("environment", self.environments.state()),
-            "observation": np.array(model._last_obs),
-            "counters": np.array([model.num_timesteps, model._n_updates]),
+            "observation": np.array(model.observation),
+            "counters": np.array([model.steps]),
             "learning_rate": np.array([model.learning_rate]),
             **({} if self.average is None else prefixed("average", self.average.arrays)),
         }
@@ -185,8 +184,8 @@ class TeacherTraining:
             self.average.restore(under("average", arrays))
         self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
-        model._last_obs = np.array(arrays["observation"])
-        model.num_timesteps, model._n_updates = (int(value) for value in arrays["counters"])
+        model.observation = np.array(arrays["observation"])
+        model.steps = int(arrays["counters"][0])
         model.learning_rate = float(arrays["learning_rate"][0])
         checkpoint.restore_random(under("random", arrays))
 

@@ -105,7 +105,7 @@ def run(job: Job) -> None:
 
     network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
-    training.model.save(job.out / "teacher_sb3.zip")
+    training.model.save_for_sb3(job.out / "teacher_sb3.zip")
     for name in ("divergences", VIDEOS):
         if (job.work / name).is_dir():
             (job.work / name).rename(job.out / name)
