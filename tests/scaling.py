@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import psutil
 import torch
+from local_nodes import connected_nodes
 
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.evaluation.trials.plan import Trial, planned_sweeps
@@ -22,7 +23,7 @@ from iowbc.evaluation.trials.protocol import Batches
 from iowbc.learning.as_numpy import teacher_policy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import load_teacher, save_network
-from iowbc.pipeline.cluster.cluster import Cluster, started_here
+from iowbc.pipeline.cluster.cluster import Cluster
 from iowbc.pipeline.cluster.folders import files_of
 from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.recipe.evaluation.segment import Segment
@@ -113,7 +114,7 @@ def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], N
         for _ in range(turns):
             turn: Turn = {}
             for nodes in NODES:
-                with started_here([1] * nodes, copy=True) as cluster:
+                with connected_nodes([1] * nodes) as cluster:
                     turn[nodes], sizes = _paces(cluster, world, nodes)
                     figures |= sizes
             measured.append(turn)

@@ -29,12 +29,19 @@ from typing import Any
 import psutil
 from tally import ENDED, Tally, Turn, Undisturbed
 
-from iowbc.pipeline.cluster.local_nodes import ALONE, NODE, STARTS
+from iowbc.pipeline.cluster.cluster import ALONE, STARTS
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
 PATIENT = {"RAY_raylet_start_wait_time_s": "300"}
 """Environment in which a node may take its time to start on a busy machine."""
+NODE = {
+    "object_store_memory": 1 << 30,
+    "include_dashboard": False,
+    "include_log_monitor": False,
+    "no_monitor": True,
+}
+"""Settings of each node."""
 IDLE = ("IDLE", "Agent")
 """Ends of the names of Ray's processes that do nothing for a run."""
 WORKERS = ("multiprocessing.spawn", "task.vector.worker", "ray::ActorHost")
@@ -221,7 +228,6 @@ def main() -> int:
         os.environ |= {
             **ALONE,
             **PATIENT,
-            "RAY_AUTH_MODE": "token",
             "RAY_AUTH_TOKEN": token,
             "RAY_TMPDIR": folder,
         }  # its own files lie in ray/ there

@@ -20,11 +20,11 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
     begun: list[int] = []
 
     @contextmanager
-    def here(cores: Sequence[int], *, copy: bool) -> Iterator[Any]:
+    def here(cores: Sequence[int]) -> Iterator[Any]:
         begun.append(len(cores))
         yield SimpleNamespace(spread=lambda paths: Backwards())
 
-    monkeypatch.setattr(scaling, "started_here", here)
+    monkeypatch.setattr(scaling, "connected_nodes", here)
     monkeypatch.setattr(scaling, "label_everywhere", lambda *words, **settings: None)
     monkeypatch.setattr(scaling, "_timed", timed)
     monkeypatch.setattr(scaling, "SHARES", 1)

@@ -1,10 +1,12 @@
 """The driver's side: a connection to Ray, on whose nodes stages run."""
 
+import atexit
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -12,11 +14,11 @@ from typing import Any
 from iowbc.errors import Interrupted, IowbcError, StageFailed, UsageError
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
 from iowbc.pipeline.cluster.identity import identity
-from iowbc.pipeline.cluster.local_nodes import cores_of, local_nodes
 from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.pipeline.cluster.stage_task import TOKEN, Event, Mailbox, Order, execute
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
+from iowbc.processes import available_cores
 
 TRIES = 5
 """Times that a stage is begun whose node or worker is lost, before it counts as failed."""
@@ -31,6 +33,15 @@ SETTINGS = {
 }
 """Environment of Ray: it sends nothing to its makers, leaves accelerators' variables as they are, and its workers have
 the priority that those of a local run have."""
+LOCAL = "local"
+"""Address of a cluster of this machine alone, which listens on 127.0.0.1 and ends with this process."""
+ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+"""Environment in which Ray listens on 127.0.0.1 (on Linux it otherwise takes an address that others reach), to those
+alone who know a token."""
+OBJECT_STORE = 1 << 30
+"""Bytes of memory for objects in such a cluster; what is more goes to disk."""
+STARTS = 4
+"""Attempts to start it: on a busy machine Ray's own processes give each other up after 15 to 30 s."""
 HEAD = "node:__internal_head__"
 """Resource that Ray gives to the head node alone."""
 
@@ -43,7 +54,7 @@ class Cluster:
     """A connection to Ray. Runs stages on its nodes; several threads may ask for one each."""
 
     def __init__(self, address: str, *, copy: bool) -> None:
-        """address: `auto`, `host:port` or `ray://host:port`. copy: nodes keep to their own disks.
+        """address: `local`, `auto`, `host:port` or `ray://host:port`. copy: nodes keep to their own disks.
 
         Raises `UsageError` where Ray does not answer.
         """
@@ -169,40 +180,39 @@ class Cluster:
 @contextmanager
 def connected(address: str, *, copy: bool) -> Iterator[Cluster]:
     """A connection to the end of the block; so long lives a local cluster, too. Raises `UsageError`."""
-    if cores := cores_of(address):
-        with started_here(cores, copy=copy) as cluster:
-            yield cluster
-        return
-    _require_ray()
-    with closing(Cluster(address, copy=copy)) as cluster:
-        yield cluster
-
-
-@contextmanager
-def started_here(cores: Sequence[int], *, copy: bool) -> Iterator[Cluster]:
-    """A cluster of this machine alone to the end of the block, with the cores of each node. Raises `UsageError`."""
-    _require_ray()
-    with local_nodes(cores) as address, closing(Cluster(address, copy=copy)) as cluster:
-        yield cluster
-
-
-def _require_ray() -> None:
-    """Raises `UsageError` where it is not installed; else sets it up as iowbc wants it."""
     if find_spec("ray") is None:
         raise UsageError("Ray is needed, which this installation leaves out: `pip install 'iowbc[cluster]'`")
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
+    with closing(Cluster(address, copy=copy)) as cluster:
+        yield cluster
 
 
 def _initialised(address: str) -> Any:
+    """Ray, connected. Raises `UsageError`."""
+    if address != LOCAL:
+        return _connected(address)
+    os.environ.update(ALONE)
+    os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # Ray reads a token once in a process
+    settings = {"num_cpus": available_cores(), "object_store_memory": OBJECT_STORE, "include_dashboard": False}
+    folder = tempfile.mkdtemp(prefix="iowbc-ray-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    for _ in range(STARTS - 1):
+        with suppress(UsageError):
+            return _connected(address, **settings, _temp_dir=folder)
+    return _connected(address, **settings, _temp_dir=folder)
+
+
+def _connected(address: str, **settings: Any) -> Any:
     import ray
 
     try:
-        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+        ray.init(address=address, log_to_driver=False, logging_level="ERROR", **settings)
     except Exception as error:  # Ray raises this and that
+        ray.shutdown()
         raise UsageError(
-            f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local, or local:NODES (this machine "
-            "alone), auto (the one that `ray start` began here), HOST:PORT, or ray://HOST:PORT"
+            f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local (this machine alone), auto (the "
+            "one that `ray start` began here), HOST:PORT, or ray://HOST:PORT"
         ) from error
     return ray
 

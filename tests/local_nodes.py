@@ -1,12 +1,10 @@
-"""A Ray cluster of this machine alone, on 127.0.0.1, without dashboard, log monitor and autoscaler.
+"""A Ray cluster of several nodes on this machine, which can be killed one by one.
 
-A process of its own holds its nodes (`python -m`, with the parent's number and the cores of each node): signals to the
-run do not reach them, and they end with the run, however it ends.
+A process of its own holds the nodes (`python FILE`, with the parent's number and the cores of each node).
 """
 
 import contextlib
 import os
-import re
 import secrets
 import signal
 import subprocess
@@ -16,13 +14,9 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from iowbc.errors import UsageError
-from iowbc.processes import available_cores, die_with_parent
+from iowbc.pipeline.cluster.cluster import ALONE, STARTS, Cluster, connected
+from iowbc.processes import die_with_parent
 
-LOCAL = re.compile(r"local(?::([1-9][0-9]?))?")
-"""Addresses that stand for such a cluster, of one node or of as many as are named."""
-ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
-"""Environment in which Ray listens on 127.0.0.1; on Linux it otherwise takes an address that others reach."""
 NODE = {
     "object_store_memory": 1 << 30,  # bytes on each node; what is more goes to disk
     "include_dashboard": False,
@@ -31,8 +25,6 @@ NODE = {
 }
 """Settings of each node."""
 STARTED = "all nodes run, address "
-STARTS = 4
-"""Attempts: on a busy machine Ray's own processes give each other up after 15 to 30 s."""
 PATIENCE = 120.0
 """Seconds that an attempt may take."""
 LAST_OUTPUT = 500
@@ -43,23 +35,13 @@ STOP_PATIENCE = 15.0
 """Seconds that the nodes have to end all their processes."""
 
 
-def cores_of(address: str) -> list[int]:
-    """Cores of each node that `local` or `local:NODES` stands for; empty for the address of another cluster."""
-    found = LOCAL.fullmatch(address)
-    if found is None:
-        return []
-    count = int(found[1] or 1)
-    return [max(1, available_cores() // count)] * count
-
-
 @contextlib.contextmanager
 def local_nodes(cores: Sequence[int]) -> Iterator[str]:
     """Nodes with these cores to the end of the block; the address of their cluster.
 
-    Only who knows the token in this process's environment reaches it. Raises `UsageError` where they do not start.
+    Only who knows the token in this process's environment reaches it. Raises RuntimeError where they do not start.
     """
     os.environ.update(ALONE)
-    os.environ.setdefault("RAY_AUTH_MODE", "token")
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # Ray reads a token once in a process
     with tempfile.TemporaryDirectory(prefix="iowbc-ray-", ignore_cleanup_errors=True) as folder:
         for _ in range(STARTS):
@@ -68,16 +50,23 @@ def local_nodes(cores: Sequence[int]) -> Iterator[str]:
                 break
             _stop(process)
         else:
-            raise UsageError(f"Ray does not start here: {output.strip()[-LAST_OUTPUT:] or 'it says nothing'}")
+            raise RuntimeError(f"Ray does not start here: {output.strip()[-LAST_OUTPUT:] or 'it says nothing'}")
         try:
             yield output.partition(STARTED)[2].split()[0]
         finally:
             _stop(process)
 
 
+@contextlib.contextmanager
+def connected_nodes(cores: Sequence[int]) -> Iterator[Cluster]:
+    """A connection to such a cluster, whose nodes keep to their own disks."""
+    with local_nodes(cores) as address, connected(address, copy=True) as cluster:
+        yield cluster
+
+
 def _started(cores: Sequence[int], folder: str) -> tuple["subprocess.Popen[bytes]", str]:
     """The process that holds the nodes, and its output by the time they run, it ends, or its time is over."""
-    words = [sys.executable, "-m", __name__, str(os.getpid()), *map(str, cores)]
+    words = [sys.executable, __file__, str(os.getpid()), *map(str, cores)]
     log = Path(folder, "nodes.log")
     with log.open("wb") as file:
         environment = os.environ | {"RAY_TMPDIR": folder}
