@@ -19,7 +19,7 @@ from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Options
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures

@@ -20,14 +20,13 @@ from torch import Tensor
 
 from iowbc.arrays import Array
 from iowbc.learning.as_numpy import acting_policy
+from iowbc.learning.computing import SideBySide, reduced
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.history_actor import student_architecture
 from iowbc.learning.networks import Mirrors, mirror_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.precision import reduced
 from iowbc.learning.rollout import Samples
-from iowbc.learning.side_by_side import SideBySide
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
-from iowbc.learning.average import PolicyAverage
-from iowbc.learning.best import Best
+from iowbc.learning.best import Best, PolicyAverage
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
@@ -117,7 +116,7 @@ class TeacherTraining:
             self._learn_again(self.best.learner)
 
     def _learnt(self) -> Arrays:
-        """What the learner has learnt: networks, optimiser, statistics."""
+        """Everything that the learner has learnt: networks, optimiser, statistics."""
         return {
             **prefixed("policy", checkpoint.module_arrays(self.model.policy)),
             **prefixed("optimizer", checkpoint.optimizer_arrays(self.model.policy.optimizer)),
@@ -129,7 +128,7 @@ class TeacherTraining:
         return checkpoint.module_arrays(self.model.policy) | ({} if self.average is None else self.average.arrays)
 
     def _scored(self) -> Arrays:
-        """What the learner has learnt, its policy being the one that a check scores."""
+        """The same with the policy that a check scores."""
         return {**self._learnt(), **prefixed("policy", self._acting())}
 
     def _learn_again(self, learnt: Mapping[str, NDArray[Any]]) -> None:

@@ -108,7 +108,7 @@ class Borrowed:
 
 @dataclass(frozen=True)
 class Presentation:
-    """How artifacts of a stage are shown, and what other commands find in them."""
+    """Presentation of artifacts of a stage, and what other commands find in them."""
 
     headline: tuple[str, ...] = ()
     """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
@@ -121,7 +121,7 @@ class Presentation:
     trained_by: str = ""
     """Name of the method whose steps `<stage>.steps` counts; empty for a stage that does not train."""
     leaves_policy: bool = False
-    """Whether its artifact holds a policy that can be played."""
+    """True where its artifact holds a policy that can be played."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Stage:
     """Patterns of the files that decide the stages which read this one, the same for the same key; all others are
     records: curves, times, pictures, convenience."""
     problems: Callable[[Recipe], Iterator[tuple[str, str]]] = _none
-    """What a recipe asks that this stage cannot do, known before it runs: dotted paths, and what is wrong there."""
+    """Requests of a recipe that this stage cannot fulfil, known before it runs: dotted paths, and the problem there."""
     defaults: Callable[[Recipe], Mapping[str, Any]] = _empty
     """Values of the program that decide the result where a recipe has none: JSON data by dotted path, for the key."""
     extends: str | None = None
@@ -154,4 +154,4 @@ class Stage:
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
     presentation: Presentation = Presentation()
     spreads: Callable[[Recipe], bool] = _never
-    """Whether it leaves its heavy work to `Job.spread` where there is one, for a given recipe."""
+    """True for a recipe of which it leaves its heavy work to `Job.spread` where there is one."""

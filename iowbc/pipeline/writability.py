@@ -1,4 +1,4 @@
-"""Whether a folder can be written, asked before work begins."""
+"""Checks before work begins that folders can be written."""
 
 import os
 import tempfile
@@ -24,7 +24,7 @@ def require_writable(folder: Path, option: str) -> None:
 
 
 def _remedy(folder: Path, option: str) -> str:
-    """What to do about a folder that cannot be written: another user's runs are to be given to this one; any other
+    """Remedy for a folder that cannot be written: another user's runs are to be given to this one; any other
     folder is left to its owner."""
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     owner, user = there.stat().st_uid, os.geteuid()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from iowbc.pipeline.cluster.spread import NodeSpread
 
 ACTOR = "rollout actor"
-"""What a group of environments on another machine is called."""
+"""Name of a group of environments on another machine."""
 WRITTEN = ("action", "counters", "terms")
 """Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
 

@@ -9,14 +9,13 @@ import torch
 from point_masses import MIRRORS, PointMasses
 from point_masses import SETTINGS as POINT_MASSES
 
-from iowbc.learning.acting import StudentPolicy, policy_of
+from iowbc.learning.acting import StudentPolicy, policy_of, unfinished_policy
 from iowbc.learning.as_numpy import student_policy
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.history_environments import HistoryEnvironments
 from iowbc.learning.networks import StudentNetwork
 from iowbc.learning.symmetry import mirror_tensor
 from iowbc.learning.teacher import TeacherTraining
-from iowbc.learning.unfinished import unfinished_policy
 from iowbc.recipe.teacher import HistoryNetwork, Teacher
 from iowbc.robot.mirror import MirrorMap
 from iowbc.rollouts.rollout_policies import ExploringPolicy

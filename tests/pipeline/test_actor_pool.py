@@ -16,7 +16,7 @@ from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster import actor_pool as module
 from iowbc.pipeline.cluster.actor_pool import CORE_PATIENCE, TRIES, ActorHost, NodeActorPool
 from iowbc.pipeline.cluster.folders import SharedFolder
-from iowbc.pipeline.cluster.identity import identity
+from iowbc.pipeline.machine import identity
 
 pytestmark = pytest.mark.unit
 

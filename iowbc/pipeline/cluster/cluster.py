@@ -13,9 +13,9 @@ from typing import Any
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed, UsageError
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
-from iowbc.pipeline.cluster.identity import identity
 from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.pipeline.cluster.stage_task import TOKEN, Event, Mailbox, Order, execute
+from iowbc.pipeline.machine import identity
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
 from iowbc.processes import available_cores

@@ -10,7 +10,7 @@ from typing import Any
 
 from iowbc.errors import Damaged, StageFailed
 from iowbc.files import replacing
-from iowbc.pipeline.cluster.identity import Identity, identity
+from iowbc.pipeline.machine import Identity, identity
 from iowbc.pipeline.store.digests import folder_digest, folder_files
 
 Files = Mapping[str, bytes]

@@ -1,4 +1,4 @@
-"""What the console shows of many runs at once: how each stands, and the last line that it has said."""
+"""Many runs on the console: the state of each, and the last line of its log."""
 
 import time
 from collections.abc import Callable
@@ -23,11 +23,11 @@ LAST_SHOWN = 5
 
 @dataclass
 class RunView:
-    """What is known of one of many runs."""
+    """State of one of many runs."""
 
     name: str
     log: Path
-    """What it prints."""
+    """Log of its output."""
     state: str = "waits"
     note: str = ""
     began: float = 0.0
@@ -50,7 +50,7 @@ class Board:
     """Seconds between two lines of progress where the output is not a terminal."""
     quiet: bool = False
     stopping: Callable[[], str] = lambda: ""
-    """What to show once a stop was asked for; empty before."""
+    """Text about a requested stop; empty before."""
     views: dict[str, RunView] = field(default_factory=dict)
     _live: Live | None = None
     _shown: float = field(default_factory=time.monotonic)

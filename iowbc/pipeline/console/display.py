@@ -1,4 +1,4 @@
-"""What the console shows of a run: the state of each stage, and its output as plain lines."""
+"""Displays of a run: the state of each stage, and plain lines for logs."""
 
 import os
 import sys
@@ -18,7 +18,7 @@ CURVE_POINTS = 200
 
 @dataclass
 class StageView:
-    """What is known of a stage while a recipe runs."""
+    """State of a stage while a recipe runs."""
 
     name: str
     state: str = "waits"
@@ -87,7 +87,7 @@ class StageView:
 
 
 class Display:
-    """Where a run shows how it goes; this one shows nothing."""
+    """Display of a run; this one shows nothing."""
 
     def begin(self, views: Sequence[StageView]) -> None:
         """Start to show these stages."""

@@ -104,7 +104,7 @@ def _row(view: StageView) -> tuple[Text | ProgressBar | str, ...]:
 
 
 def _note(view: StageView) -> Text:
-    """What a stage notes, in one line."""
+    """A stage's note in one line."""
     return Text(f"{view.name}: {view.note}", style="dim", no_wrap=True, overflow="ellipsis")
 
 
