@@ -153,10 +153,15 @@ class Planner:
 
     def _resumed(self, step: StagePlan) -> StagePlan:
         """A step that runs, with what it goes on from: an earlier attempt, or an artifact that ends earlier."""
-        stage, key = step.stage, str(step.key)
-        notes, expected = [*step.notes, *self._checkpoint(stage, key)], self._rest(stage, key, step.expected)
-        predecessor = None
-        if stage.name not in self.options.force:
+        stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
+        record, forced = Workspace(self.store.runs, stage.name, str(step.key)).record, stage.name in self.options.force
+        if record and (record.get("forced") or not forced):
+            done, total, seconds = (float(record[name]) for name in ("done", "total", "seconds"))
+            share = f", {100 * done / total:.0f} %" if total else ""
+            notes.append(f"goes on from attempt {record['attempts'] or 1}{share}")
+            if done and total and seconds:  # the rest at its own rate
+                expected = seconds * max(0.0, total / done - 1.0)
+        if not forced:
             predecessor = self._predecessor(stage, step.ingredients or {})
         if predecessor is not None:
             notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
@@ -195,24 +200,6 @@ class Planner:
                 and stage.name not in self.options.force
             ):
                 yield f"{path} is {_shown(old)} in it; `--force {stage.name}` makes it with {_shown(new)}"
-
-    def _attempt(self, stage: Stage, key: str) -> dict[str, Any]:
-        """The record of an attempt that this run would go on from; empty where there is none."""
-        record = Workspace(self.store.runs, stage.name, key).record
-        return record if record.get("forced") or stage.name not in self.options.force else {}
-
-    def _rest(self, stage: Stage, key: str, expected: float | None) -> float | None:
-        """The time that is left where an earlier attempt has left something, at its own rate [s]."""
-        record = self._attempt(stage, key)
-        done, total, seconds = (float(record.get(name, 0.0)) for name in ("done", "total", "seconds"))
-        return seconds * max(0.0, total / done - 1.0) if done and total and seconds else expected
-
-    def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
-        """A note on the attempt that this run would go on from."""
-        record = self._attempt(stage, key)
-        if record:
-            share = f", {100 * record['done'] / record['total']:.0f} %" if record["total"] else ""
-            yield f"goes on from attempt {int(record['attempts']) or 1}{share}"
 
     def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
         """The stored artifact of a stage that differs least; of several this recipe's own, then the newest."""
