@@ -1,4 +1,4 @@
-"""Members on nodes that are busy or lost, on a stand-in for Ray with a clock of its own."""
+"""Members on nodes that are busy or lost, on a stand-in for Ray."""
 
 import traceback
 from collections.abc import Iterator, Mapping
@@ -13,8 +13,7 @@ import ray
 from ray import exceptions
 
 from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
-from iowbc.pipeline.cluster import actor_pool as module
-from iowbc.pipeline.cluster.actor_pool import CORE_PATIENCE, TRIES, ActorHost, NodeActorPool
+from iowbc.pipeline.cluster.actor_pool import TRIES, ActorHost, NodeActorPool
 from iowbc.pipeline.cluster.folders import SharedFolder
 from iowbc.pipeline.machine import identity
 
@@ -53,10 +52,9 @@ class Call:
 
 @dataclass(eq=False)
 class Actor:
-    """A holder, on a core of its own unless it asks for none."""
+    """A holder, begun where a core is free."""
 
     holder: ActorHost
-    cores: int
     placed: bool = False
     killed: bool = False
     last: Call | None = None
@@ -76,7 +74,6 @@ class Nodes:
     """Ray with so many cores."""
 
     cores: int
-    clock: float = 0.0
     actors: list[Actor] = field(default_factory=list)
     lost: set[int] = field(default_factory=set)
     """Actors whose node is lost while they are asked."""
@@ -86,11 +83,11 @@ class Nodes:
 
         class Options:
             @staticmethod
-            def options(*, num_cpus: int, **settings: Any) -> Any:
+            def options(**settings: Any) -> Any:
                 class Made:
                     @staticmethod
                     def remote(*arguments: Any) -> Actor:
-                        nodes.actors.append(Actor(holder(*arguments), num_cpus))
+                        nodes.actors.append(Actor(holder(*arguments)))
                         return nodes.actors[-1]
 
                 return Made
@@ -98,15 +95,12 @@ class Nodes:
         return Options
 
     def wait(self, calls: list[Call], num_returns: int, timeout: float) -> tuple[list[Call], list[Call]]:
-        self.clock += timeout
         self._place()
         over = [call for call in calls if call.actor.placed]
         return over, [call for call in calls if call not in over]
 
     def get(self, call: Call) -> Any:
         number = self.actors.index(call.actor)
-        if call.method == "__ray_ready__":
-            return True
         if number in self.lost:
             raise exceptions.ActorDiedError()
         try:
@@ -120,9 +114,7 @@ class Nodes:
 
     def _place(self) -> None:
         for actor in self.actors:
-            free = self.cores - sum(one.cores for one in self.actors if one.placed)
-            if not actor.placed and not actor.killed and actor.cores <= free:
-                actor.placed = True
+            actor.placed = not actor.killed and self.cores > 0
 
 
 @dataclass
@@ -149,7 +141,6 @@ def watch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watch]:
     nodes = Nodes(2)
     for name in ("remote", "wait", "get", "kill"):
         monkeypatch.setattr(ray, name, getattr(nodes, name))
-    monkeypatch.setattr(module.time, "monotonic", lambda: nodes.clock)
     return Watch(nodes)
 
 
@@ -161,14 +152,6 @@ def test_members_answer_in_order_and_go_on_from_what_they_were(watch: Watch) -> 
     assert watch.said == []
     pool.close()
     assert all(actor.killed for actor in watch.nodes.actors)
-
-
-def test_who_finds_no_core_shares_one_after_a_while(watch: Watch) -> None:
-    pool = watch.pool(10, 20, 30)
-    assert watch.added(pool, 1, 2, 3) == [11, 22, 33]
-    assert watch.nodes.clock == pytest.approx(CORE_PATIENCE, abs=1.0)
-    assert watch.said == ["1 of 3 helpers find no core of their own, and share one"]
-    assert [actor.cores for actor in watch.nodes.actors if not actor.killed] == [1, 1, 0]
 
 
 def test_a_lost_member_goes_on_elsewhere_from_its_last_state(watch: Watch) -> None:
@@ -205,7 +188,7 @@ def test_a_node_with_another_version_is_refused_with_both(watch: Watch) -> None:
 
 
 def test_a_stop_ends_the_wait_of_who_has_not_begun(watch: Watch) -> None:
-    watch.stop, watch.nodes.cores = True, 1
+    watch.stop, watch.nodes.cores = True, 0
     with pytest.raises(Interrupted, match="had not begun"):
         watch.added(watch.pool(10, 20), 1, 2)
 

@@ -1,6 +1,8 @@
-"""Objects that a stage holds on other nodes, one a core: asked side by side, remade where their node is lost."""
+"""Objects that a stage holds on other nodes: asked side by side, remade where their node is lost.
 
-import time
+Ray begins an actor on a node with a free core and reserves none for it afterwards: pools never wait for one another.
+"""
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,9 +15,6 @@ TRIES = 5
 """Times in a row that a member is remade whose node or worker is lost, before the stage counts as failed."""
 POLL = 0.2
 """Seconds between two looks at the members."""
-CORE_PATIENCE = 30.0
-"""Seconds after which a member that waits for a core shares one: those that are there may be held by pools that wait
-for this one's, or may have gone for good."""
 
 
 class ActorHost:
@@ -41,24 +40,17 @@ class ActorHost:
 
 @dataclass(eq=False)
 class Place:
-    """A member's actor, its last state, and Ray's references to what it has not answered yet."""
+    """A member's actor, and its last state and answer."""
 
     arguments: tuple[Any, ...]
     actor: Any = None
-    starting: Any = None
-    """None once the actor runs on a node."""
-    asked: Any = None
     made: bool = False
     """True once this actor has answered: it holds its state itself."""
-    since: float = 0.0
-    """Start of the wait for a core [s]."""
     state: Any = None
     """After the last request that changed it."""
     answer: Any = None
     losses: int = 0
     """In a row."""
-    shares: bool = False
-    """True where it takes no core of its own."""
 
 
 class NodeActorPool:
@@ -73,7 +65,7 @@ class NodeActorPool:
         interrupted: Callable[[], bool],
         say: Callable[[str], None],
     ) -> None:
-        """See `NodeSpread.actor_pool`. say: prints a line about members that are lost or share a core."""
+        """See `NodeSpread.actor_pool`. say: prints a line about members that are lost."""
         import ray
 
         self._called, self._make, self._folders = called, make, folders
@@ -81,6 +73,8 @@ class NodeActorPool:
         self._host = ray.remote(ActorHost)
         self._messages: Sequence[Any] = ()
         self._changes = False
+        self._asked: dict[Any, Place] = {}
+        """Members that have not answered yet, by Ray's references to their answers."""
         self._places = [Place(arguments) for arguments in calls]
         for place in self._places:
             self._start(place)
@@ -104,15 +98,12 @@ class NodeActorPool:
         """
         import ray
 
-        while waiting := {
-            one: place for place in self._places for one in (place.starting, place.asked) if one is not None
-        }:
-            over, late = ray.wait(list(waiting), num_returns=len(waiting), timeout=POLL)
+        while self._asked:
+            over, late = ray.wait(list(self._asked), num_returns=len(self._asked), timeout=POLL)
             for reference in over:
-                if reference in (waiting[reference].starting, waiting[reference].asked):  # else it was lost meanwhile
-                    self._hear(waiting[reference], reference)
-            if late:
-                self._look()
+                self._hear(reference)
+            if late and self._interrupted() and any(place.state is None for place in self._asked.values()):
+                raise Interrupted("members had not begun yet")
         return [place.answer for place in self._places]
 
     def close(self) -> None:
@@ -124,60 +115,39 @@ class NodeActorPool:
         self._places = []
 
     def _start(self, place: Place) -> None:
-        options = {"num_cpus": 0 if place.shares else 1, "scheduling_strategy": "SPREAD", "max_restarts": 0}
+        options = {"scheduling_strategy": "SPREAD", "max_restarts": 0}
         place.actor = self._host.options(**options).remote(self._make, place.arguments, self._folders)
-        place.starting, place.made, place.since = place.actor.__ray_ready__.remote(), False, time.monotonic()
+        place.made = False
 
     def _request(self, place: Place) -> None:
         message, state = self._messages[self._places.index(place)], None if place.made else place.state
-        place.asked = place.actor.ask.remote(state, message, self._changes)
+        self._asked[place.actor.ask.remote(state, message, self._changes)] = place
 
-    def _hear(self, place: Place, reference: Any) -> None:
+    def _hear(self, reference: Any) -> None:
         import ray
 
+        place = self._asked.pop(reference)
         try:
-            found = ray.get(reference)
+            place.answer, state = ray.get(reference)
         except ray.exceptions.RayError as error:
             cause = getattr(error, "cause", None)
             if isinstance(error, ray.exceptions.RayTaskError) and not isinstance(cause, ray.exceptions.RayError):
                 who = f"{self._called} {self._places.index(place) + 1} of {len(self._places)}, on {error.ip}"
                 raise WorkerFailed(f"{who}:\n{cause if isinstance(cause, IowbcError) else error}") from None
-            self._lost(place, str(error).strip().splitlines()[0])
+            self._remake(place, str(error).strip().splitlines()[0])
             return
-        if reference == place.starting:
-            place.starting = None
-            return
-        place.asked, place.made, place.losses = None, True, 0
-        place.answer, state = found
+        place.made, place.losses = True, 0
         if self._changes:
             place.state = state
 
-    def _look(self) -> None:
-        """Treat members that have not begun yet."""
-        now = time.monotonic()
-        starting = [place for place in self._places if place.starting is not None]
-        if any(place.state is None for place in starting) and self._interrupted():
-            raise Interrupted("members had not begun yet")
-        late = [place for place in starting if not place.shares and now - place.since > CORE_PATIENCE]
-        if late:
-            self._say(f"{len(late)} of {len(self._places)} {self._called}s find no core of their own, and share one")
-        for place in late:
-            place.shares = True
-            self._remake(place)
+    def _remake(self, place: Place, why: str) -> None:
+        """Remake a member whose node or worker is lost, and ask it again."""
+        import ray
 
-    def _lost(self, place: Place, why: str) -> None:
-        """Remake a member whose node or worker is lost."""
         place.losses += 1
         if place.losses > TRIES:
             raise StageFailed(f"lost a {self._called} {place.losses} times in a row, the last time: {why}")
         self._say(f"a {self._called} was lost; another one takes its place")
-        place.shares = False
-        self._remake(place)
-
-    def _remake(self, place: Place) -> None:
-        import ray
-
         ray.kill(place.actor)
         self._start(place)
-        if place.asked is not None:
-            self._request(place)
+        self._request(place)
