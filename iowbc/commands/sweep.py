@@ -141,7 +141,7 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
                 record.send()
             origin = None if record is None else record.origin
             tasks = [_task(one, stop, folder, origin, cluster, workers) for one in points]
-            views = {task.name: RunView(task.name, task.log) for task in tasks}
+            views = {task.name: RunView(task.name, log=task.log) for task in tasks}
             with Board(console, execution.line_interval, quiet, lambda: stop.text, views) as board:
                 if cluster is None:
                     endings = run_processes(tasks, jobs, stop, board)

@@ -10,6 +10,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.pipeline.console.display import StageView
 from iowbc.pipeline.console.live_table import STYLES
 from iowbc.pipeline.console.wording import duration
 
@@ -22,23 +23,11 @@ LAST_SHOWN = 5
 
 
 @dataclass
-class RunView:
+class RunView(StageView):
     """State of one of many runs."""
 
-    name: str
-    log: Path
+    log: Path = Path()
     """Log of its output."""
-    state: str = "waits"
-    note: str = ""
-    began: float = 0.0
-    """On the monotonic clock [s]."""
-    ended: float = 0.0
-    """On the monotonic clock [s]."""
-
-    @property
-    def spent(self) -> float | None:
-        """Time since its beginning, or until its end [s]; None before it runs."""
-        return (self.ended or time.monotonic()) - self.began if self.began else None
 
 
 @dataclass
@@ -52,6 +41,8 @@ class Board:
     stopping: Callable[[], str] = lambda: ""
     """Text about a requested stop; empty before."""
     views: dict[str, RunView] = field(default_factory=dict)
+    _over: list[RunView] = field(default_factory=list)
+    """In the order in which they have ended."""
     _live: Live | None = None
     _shown: float = field(default_factory=time.monotonic)
 
@@ -75,10 +66,9 @@ class Board:
     def ended(self, name: str, state: str, note: str) -> None:
         """A run has ended: `done`, `failed` or `stopped`."""
         view = self.views[name]
-        view.state, view.note = state, note
-        if view.began:
-            view.ended = time.monotonic()
-        took = f" in {duration(view.spent)}" if view.began else ""
+        view.state, view.note, view.seconds = state, note, view.spent
+        self._over.append(view)
+        took = f" in {duration(view.seconds)}" if view.seconds is not None else ""
         self._say(f"{name}: {state}{took}{f' - {note}' if note else ''} ({self._counts()})", lost=state == "failed")
 
     def refresh(self) -> None:
@@ -107,10 +97,8 @@ class Board:
         table = Table(box=None, padding=(0, 1, 0, 0))
         for name in ("run", "state", "spent", "says"):
             table.add_column(name, no_wrap=True, overflow="ellipsis")
-        over = [view for view in self.views.values() if view.state not in ("waits", "runs")]
-        over.sort(key=lambda view: view.ended)
         running = [view for view in self.views.values() if view.state == "runs"]
-        for view in (*over[-LAST_SHOWN:], *running):
+        for view in (*self._over[-LAST_SHOWN:], *running):
             text = view.note or (last_line(view.log) if view.state == "runs" else "")
             state = Text(view.state, style=STYLES.get(view.state, ""))
             table.add_row(Text(view.name), state, duration(view.spent), Text(text, style="dim"))
