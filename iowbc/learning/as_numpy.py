@@ -80,7 +80,8 @@ def _head(head: SymmetricHead) -> Linear:
 def _history_policy(network: StudentNetwork, normal: Normal) -> HistoryPolicy:
     own, mirror, estimate = network.encoder, None, None
     if isinstance(own, MirroredEncoder):
-        own, mirror = own.encoder, (own.permutation.numpy(), own.sign.numpy())
+        mirror = own.permutation.numpy(), own.sign.numpy()
+        own = own.encoder
     frame, whole = own.frame[0], own.whole[0]
     assert isinstance(frame, nn.Linear)
     assert isinstance(whole, nn.Linear)
