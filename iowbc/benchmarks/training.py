@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
 from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.control.action import action_mirror
 from iowbc.learning.activations import ACTIVATIONS
-from iowbc.learning.side_by_side import prepare_process
+from iowbc.learning.computing import prepare_process
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe

@@ -19,8 +19,7 @@ from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.learning.acting import load_policy
-from iowbc.learning.unfinished import unfinished_policy
+from iowbc.learning.acting import load_policy, unfinished_policy
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Presentation, Spread, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Stage, always
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from iowbc.evaluation.trials.plan import Trial
     from iowbc.evaluation.trials.protocol import Batches
     from iowbc.evaluation.trials.rollout import Acting
+    from iowbc.pipeline.cluster.spread import NodeSpread
     from iowbc.task.specification import Specification
 
 
@@ -146,7 +147,7 @@ def read_by_trials(job: Job) -> dict[str, Path]:
 
 
 def play_everywhere(
-    spread: Spread, recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
+    spread: "NodeSpread", recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
 ) -> "Iterator[tuple[str, bytes]]":
     """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
     names = list(batches)
