@@ -15,9 +15,7 @@ from iowbc.cli.measuring import bench_control, bench_reference, bench_scale, ben
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
-from iowbc.commands.ending import leave
-from iowbc.commands.streams import let_go, prepare_streams
-from iowbc.commands.unexpected import described
+from iowbc.commands.process import described, leave, let_go, prepare_streams
 from iowbc.processes import name_glfw
 
 COMMANDS: dict[str, Callable[..., None]] = {

@@ -48,7 +48,7 @@ def report(
     runs: RunsFolder = None,
 ) -> None:
     """Write one HTML page about runs: tables, interactive curves, films, differences; it opens without a network."""
-    from iowbc.commands.report import report as write_report
+    from iowbc.commands.compare import report as write_report
 
     store = store_in(runs)
     name = "-".join(Path(recipe).stem for recipe in recipes)

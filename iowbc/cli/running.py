@@ -23,7 +23,7 @@ from iowbc.cli.options import (
     runs_folder,
 )
 from iowbc.commands import completion
-from iowbc.commands.streams import outlasting_readers
+from iowbc.commands.process import outlasting_readers
 
 if TYPE_CHECKING:
     from iowbc.commands.request import Request

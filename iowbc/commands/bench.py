@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from iowbc.commands.training import require_training
+from iowbc.commands.needs import require_training
 from iowbc.errors import require_known
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.tracker import record_figures

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.named import Named, named
+from iowbc.commands.lookup import Named, named
 from iowbc.commands.printed import hanging, print_json, tell
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
@@ -23,14 +24,11 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.results.table import NARROWEST, folded
 
 ABSENT = "(absent)"
 """In place of a value that one of the two has not."""
 INDENT = 2
 """Characters by which differences stand to the right of their stage."""
-GAP = 2
-"""Characters between two columns."""
 WHOLE = 14
 """A value of at most so many characters, such as a number or the beginning of a key, is never folded."""
 
@@ -46,8 +44,8 @@ def diff(store: Store, console: Console, first: str, second: str, as_json: bool 
         console.print("no difference")
     elif console.is_terminal:
         tell(console, f"{first} -> {second}")
-        for place in dict.fromkeys(difference.place for difference in found):
-            _draw(console, place, [difference for difference in found if difference.place == place])
+        for place, own in groupby(found, lambda difference: difference.place):
+            _draw(console, place, list(own))
     else:
         for difference in found:
             tell(console, difference.line)
@@ -78,20 +76,16 @@ class Difference:
 
 
 def _draw(console: Console, place: str, found: Sequence[Difference]) -> None:
-    """The differences of one place, old and new values below one another, and what has none below them.
-
-    Long values are folded before names, and names before numbers and keys, which stay whole.
-    """
+    """The differences of one place, old and new values side by side, and those without values below."""
     whole = max((len(text) for one in found for text in (one.old, one.new) if len(text) <= WHOLE), default=0)
-    steps = max(len(one.step) for one in found)
-    names = max(console.width - INDENT - 3 * GAP - 2 * whole - steps, NARROWEST)
-    table = Table.grid(padding=(0, GAP, 0, 0))
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(overflow="fold")
+    for _ in range(2):
+        table.add_column(overflow="fold", min_width=whole)
     table.add_column(no_wrap=True)
-    for _ in range(3):
-        table.add_column(overflow="fold")
     for one in found:
         if one.has_values:
-            table.add_row(*map(Text, (folded(one.name, names), one.old, one.new, one.step)))
+            table.add_row(*map(Text, (one.name, one.old, one.new, one.step)))
     console.print(Text(place or "recipe", style="bold"))
     console.print(Padding(table, (0, 0, 0, INDENT)))
     for one in found:
@@ -100,14 +94,19 @@ def _draw(console: Console, place: str, found: Sequence[Difference]) -> None:
 
 
 def difference_lines(a: Named, b: Named) -> list[str]:
-    """How two recipes or artifacts differ, a line each; empty where they do not."""
+    """Differences of two recipes or artifacts, a line each; empty where there are none."""
     return [difference.line for difference in differences_of(a, b)]
 
 
 def differences_of(a: Named, b: Named) -> Iterator[Difference]:
-    """How two recipes or artifacts differ."""
+    """Differences of two recipes or artifacts, those of a stage together."""
     yield from _changes("", "", _today(a.recipe), _today(b.recipe))
-    yield from _stages(a, b)
+    for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
+        old, new = a.artifacts.get(stage), b.artifacts.get(stage)
+        if old is None or new is None:
+            yield Difference(stage, f"only in {b.word if old is None else a.word}")
+        else:
+            yield from _artifacts(stage, old, new, with_recipe=a.recipe is None or b.recipe is None)
 
 
 def _either(store: Store, word: str) -> Named:
@@ -132,15 +131,6 @@ def _today(recipe: Mapping[str, Any] | None) -> Mapping[str, Any]:
         return recipe or {}
 
 
-def _stages(a: Named, b: Named) -> Iterator[Difference]:
-    for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
-        old, new = a.artifacts.get(stage), b.artifacts.get(stage)
-        if old is None or new is None:
-            yield Difference(stage, f"only in {b.word if old is None else a.word}")
-        else:
-            yield from _artifacts(stage, old, new, with_recipe=a.recipe is None or b.recipe is None)
-
-
 def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[Difference]:
     before, after = old.manifest, new.manifest
     if before.key != after.key:
@@ -149,8 +139,9 @@ def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> I
         return
     if with_recipe:
         yield from _changes(stage, "", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
-    for name, first, second in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
-        yield Difference(stage, f"input {name}", _digest(first), _digest(second))
+    for name, *digests in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
+        texts = [ABSENT if digest is MISSING else str(digest)[:KEY_LENGTH] for digest in digests]
+        yield Difference(stage, f"input {name}", *texts)
     if before.version != after.version:
         yield Difference(stage, "stage version", str(before.version), str(after.version))
     yield from _changes(stage, "version of ", before.versions, after.versions)
@@ -160,25 +151,12 @@ def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> I
     for name in dict.fromkeys([*old.metrics, *new.metrics]):
         first, second = old.metrics.get(name), new.metrics.get(name)
         if first != second:
-            yield Difference(stage, f"metric {name}", _number(first), _number(second), _step(first, second))
+            values = [ABSENT if value is None else figure(value, 6) for value in (first, second)]
+            step = figure(second - first, 3, "+") if first is not None and second is not None else ""
+            yield Difference(stage, f"metric {name}", *values, step)
 
 
 def _changes(place: str, prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Difference]:
-    for path, old, new in differences(nested(before), nested(after)):
-        yield Difference(place, f"{prefix}{path}", _value(old), _value(new))
-
-
-def _digest(value: Any) -> str:
-    return ABSENT if value is MISSING else str(value)[:KEY_LENGTH]
-
-
-def _value(value: Any) -> str:
-    return ABSENT if value is MISSING else shown(value)
-
-
-def _number(value: float | None) -> str:
-    return ABSENT if value is None else figure(value, 6)
-
-
-def _step(old: float | None, new: float | None) -> str:
-    return figure(new - old, 3, "+") if old is not None and new is not None else ""
+    for path, *values in differences(nested(before), nested(after)):
+        texts = [ABSENT if value is MISSING else shown(value) for value in values]
+        yield Difference(place, f"{prefix}{path}", *texts)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.named import named
+from iowbc.commands.lookup import named
+from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, tell
-from iowbc.commands.training import require_training
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.named import known_recipes, last_used
+from iowbc.commands.lookup import known_recipes, last_used
 from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError, nearest
 from iowbc.files import OLD

@@ -3,7 +3,7 @@
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.named import known_recipes
+from iowbc.commands.lookup import known_recipes
 from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json
 from iowbc.commands.results import metrics_text
 from iowbc.errors import require_known

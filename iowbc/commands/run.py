@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 
 from iowbc.commands.compare import compare, film_together
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
+from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, tell
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.request import Request, in_order, prepared, recipes
 from iowbc.commands.results import TABLES, described, print_results
-from iowbc.commands.training import require_training
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable

@@ -9,7 +9,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.named import named
+from iowbc.commands.lookup import named
 from iowbc.commands.printed import artifact_data, print_json, shown_path, tell
 from iowbc.errors import shown
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size

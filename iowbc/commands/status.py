@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
-from iowbc.commands.named import known_recipes, last_used
+from iowbc.commands.lookup import known_recipes, last_used
 from iowbc.commands.printed import plain_table, print_json, shown_path, tell
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration

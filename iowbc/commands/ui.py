@@ -8,9 +8,8 @@ import sys
 
 from rich.console import Console
 
-from iowbc.commands.ports import HOST, require_free
+from iowbc.commands.needs import HOST, require_free, require_training
 from iowbc.commands.printed import tell
-from iowbc.commands.training import require_training
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, set_up
 from iowbc.pipeline.tracking.tracker import backlog, start_sender

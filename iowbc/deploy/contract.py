@@ -17,7 +17,7 @@ from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
-from iowbc.recipe.simulation.sensing import Sensing
+from iowbc.recipe.simulation.simulation import Sensing
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import DESCRIPTION

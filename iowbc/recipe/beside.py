@@ -82,3 +82,12 @@ class MeshFile(FileBeside):
 
     suffixes: ClassVar[tuple[str, ...]] = (".obj", ".stl")
     largest: ClassVar[int] = 400_000
+
+
+class OwnFunction(Section):
+    """A function in a file of one's own."""
+
+    module: ModuleFile
+    """Python file beside the recipe, which may import what is installed, and no file beside it."""
+    function: str = Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)
+    """Its function."""

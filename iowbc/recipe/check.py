@@ -2,8 +2,7 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from iowbc.recipe.evaluation.scripts import DrawnScripts
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.section import COSMETIC, LATER, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from iowbc.errors import nearest
-from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.trial_scenes import TrialScene
+from iowbc.recipe.evaluation.evaluation import Evaluation, TrialScene
 from iowbc.recipe.export import Export
 from iowbc.recipe.simulation.scene import Scenes
 from iowbc.recipe.simulation.simulation import Simulation

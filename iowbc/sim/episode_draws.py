@@ -6,9 +6,9 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.distribution import Distribution
 from iowbc.recipe.simulation.holding import BY_AXIS, SWITCHES
 from iowbc.recipe.simulation.partner import Partner
+from iowbc.recipe.simulation.randomization import Distribution
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot.description import GRAVITY, Robot

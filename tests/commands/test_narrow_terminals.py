@@ -14,12 +14,12 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
+from iowbc.commands.lookup import named
 from iowbc.commands.ls import list_artifacts
-from iowbc.commands.named import named
+from iowbc.commands.plan import PlannedStage, plan_table
 from iowbc.commands.printed import hanging
 from iowbc.commands.show import show
 from iowbc.commands.status import print_status
-from iowbc.commands.sweep_plan import PlannedStage, plan_table
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.step import Step

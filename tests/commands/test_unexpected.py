@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.unexpected import described
+from iowbc.commands.process import described
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 

@@ -12,7 +12,7 @@ from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.evaluation.trials.transport import commanded_path
 from iowbc.recipe.check import Check
 from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.scripts import DrawnScripts
+from iowbc.recipe.evaluation.segment import DrawnScripts
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
 from iowbc.robot.description import robot_folder

@@ -7,7 +7,7 @@ import pytest
 
 from iowbc.errors import RecipeError
 from iowbc.recipe.reading import sweep as reading
-from iowbc.recipe.reading.sweep import Sweep, load_sweep
+from iowbc.recipe.sweep import Sweep, load_sweep
 
 
 @pytest.fixture

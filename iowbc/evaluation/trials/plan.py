@@ -5,11 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iowbc.evaluation.trials.scripts import drawn_script
-from iowbc.recipe.evaluation.compliance import Impedance
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
-from iowbc.recipe.evaluation.suites import EIGHT, Case, PushLadder, Sweep
+from iowbc.recipe.evaluation.suites import EIGHT, Case, Impedance, PushLadder, Sweep
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.partner import BEHAVIOURS

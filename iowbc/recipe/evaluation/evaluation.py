@@ -4,18 +4,56 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.evaluation.compliance import Compliance
 from iowbc.recipe.evaluation.model_based import ModelBased
-from iowbc.recipe.evaluation.probe import Probe
-from iowbc.recipe.evaluation.push_map import PushMap
-from iowbc.recipe.evaluation.scripts import DrawnScripts
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.evaluation.success import Success
-from iowbc.recipe.evaluation.suites import HeavyCase, Robustness, Stagnation, Sweep
-from iowbc.recipe.evaluation.trial_scenes import SIZES, TrialScene
-from iowbc.recipe.evaluation.video import Video
+from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, Probe, PushMap, Robustness, Stagnation, Sweep
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
+from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import Simulation
+
+
+class Video(Section):
+    """Short films of trials."""
+
+    count: int = Field(default=2, ge=0, le=1000)
+    """Number of films, spread over the sweeps' masses; 0 makes none."""
+    width: int = Field(default=640, ge=64, le=3840, multiple_of=16)
+    """Width of a frame [pixel]; video codecs want multiples of 16."""
+    height: int = Field(default=480, ge=64, le=2160, multiple_of=16)
+    """Height of a frame [pixel]."""
+    fps: int = Field(default=20, ge=1, le=50)
+    """Frames per second; a frame takes 0.1 to 0.2 s to draw without a graphics card."""
+    duration: float = Field(default=12.0, gt=0)
+    """Longest film [s]."""
+    traces: bool = True
+    """Draw scene, mass, time and command into the frames."""
+
+
+class TrialScene(Section):
+    """A scene beside those of the training. What the policy observes does not change with it."""
+
+    scene: Scene
+    """The object and how it is held; it may also replace a scene of the training."""
+    wrists: tuple[float, float, float]
+    """Base grasp: left wrist from the pelvis, heading frame [m]; as an entry of `task.references.grasps`."""
+    load: float | None = Field(default=0.0, ge=0.0)
+    """What the arms expect to carry [kg], as an entry of `task.references.loads`; empty takes that of `lift`."""
+
+
+BESIDE = 0.035
+"""Distance of a wrist from the side of the box in its hands [m], in the scene `lift`."""
+
+
+def box(width: float) -> TrialScene:
+    """The box of the scene `lift` in another width [m], held as there."""
+    thing = Object(shape="box", size=(0.30, width, 0.30), mass=7.0)
+    return TrialScene(scene=Scene(kind="lift", object=thing), wrists=(0.30, width / 2 + BESIDE, 0.26), load=None)
+
+
+SIZES = {"narrow_box": box(0.2), "wide_box": box(0.45)}
+"""Boxes beyond the training's 0.25 m."""
+
 
 SceneName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 

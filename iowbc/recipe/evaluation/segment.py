@@ -1,4 +1,4 @@
-"""A stretch of a scripted command sequence."""
+"""Commands of a trial: a stretch of a scripted sequence, and scripts that are drawn trial by trial."""
 
 from typing import Self
 
@@ -51,4 +51,58 @@ class Segment(Section):
     def _ramp_fits(self) -> Self:
         if self.ramp > self.duration:
             raise ValueError(f"ramp {self.ramp} s is longer than the segment's duration {self.duration} s")
+        return self
+
+
+Range = tuple[float, float]
+
+
+class DrawnScripts(Section):
+    """Every script holds the same kinds of motion in a drawn order, each with drawn sizes and times.
+
+    With an object in the hands, or without one: walk, walk with raised hands, turn left and right, walk back and
+    sideways, crouch, bow, stop. Behind a crate: push straight, in a left and a right turn, from a crouch, stop bowed,
+    stop upright. Sizes are clipped to the ranges of `task.commands`, and commands change as fast as its rates allow.
+    """
+
+    duration: float = Field(default=24.0, ge=12.0, le=600.0)
+    """Time of a script [s]: nine kinds of motion with a second or two at each. A script whose ramps leave less than
+    `shortest_hold` for each is longer."""
+    start: float = Field(default=1.0, ge=0.0)
+    """Time for which the robot stands at first [s]: the object's weight comes to bear."""
+    shortest_hold: float = Field(default=0.5, gt=0.0)
+    """Shortest time for which a command is held after its ramp [s]."""
+    walking: Range = (0.3, 0.5)
+    """Forward speed [m/s]; from what is worth a step to that of the fixed sequences."""
+    backward: Range = (0.2, 0.3)
+    """Backward speed [m/s]; training draws up to 0.3."""
+    sideways: Range = (0.15, 0.2)
+    """Speed to either side [m/s]; training draws up to 0.2."""
+    turning: Range = (0.2, 0.4)
+    """Yaw rate of a turn [rad/s], on the spot in every other one; training draws up to 0.4."""
+    crate_turning: Range = (0.05, 0.1)
+    """Yaw rate of a turn behind a crate [rad/s]; two palms turn it slowly."""
+    height: Range = (0.62, 0.76)
+    """Pelvis height while walking in another posture than the nominal one [m]."""
+    pitch: Range = (-0.2, 0.4)
+    """Torso pitch in such a posture [rad]."""
+    posture_share: float = Field(default=0.5, ge=0.0, le=1.0)
+    """Part of the walks and stops in another posture than the nominal one."""
+    raised: Range = (0.02, 0.05)
+    """Height of raised hands above their grasp [m]."""
+    crouch: Range = (0.5, 0.6)
+    """Pelvis height of a crouch [m]; the paper's lowest is 0.5."""
+    bow: Range = (0.4, 0.75)
+    """Torso pitch of a bow while standing [rad]; as far as `task.commands.pitch` goes."""
+    deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
+    """Part of the bows that go on to the paper's range, up to `task.commands.deep_pitch`; as often as training draws
+    them."""
+    bow_height: Range = (0.64, 0.72)
+    """Pelvis height of a bow [m]; at 1.5 rad 0.62 to 0.72 m are feasible."""
+
+    @model_validator(mode="after")
+    def _ranges_ascend(self) -> Self:
+        for name, value in self:
+            if isinstance(value, tuple) and value[0] > value[1]:
+                raise ValueError(f"{name}: the lower end {value[0]} is above the upper end {value[1]}")
         return self

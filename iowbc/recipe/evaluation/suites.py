@@ -1,13 +1,15 @@
-"""Groups of trials: sweeps over mass, single cases, and pushes on the base that grow until the robot falls."""
+"""Groups of trials: sweeps over mass, single cases, pushes that grow until the robot falls, a map of pushes, a probe of
+the history, and interaction with partners."""
 
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.sequences import BOWING, STAGNATION, STANDING, WALKING, WALKING_ON
+from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
+from iowbc.recipe.simulation.partner import BEHAVIOURS
 
 PartnerShare = Annotated[float, Field(ge=-1, le=1)] | None
 
@@ -196,3 +198,124 @@ class Robustness(Section):
     """Pushes on the base while standing; empty leaves them out."""
     walking_pushes: PushLadder | None = PushLadder(time=4.0, sequence=WALKING)
     """Pushes on the base while walking; empty leaves them out."""
+
+
+class PushMap(Section):
+    """Pushes at every rolling resistance and mass: a mass alone says little of how hard a crate is to push."""
+
+    scene: ObjectScene = "push"
+    """Scene of `simulation.scenes` with a crate."""
+    rolling_resistances: tuple[float, ...] = Field(default=(0.02, 0.06, 0.1, 0.15), min_length=1)
+    """Rolling resistances μ; the ends are those of the paper's Table I."""
+    masses: tuple[float, ...] = Field(default=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0), min_length=1)
+    """Masses [kg]."""
+    partner_share: float = Field(default=0.0, ge=-1, le=1)
+    """Part of the rolling resistance that the partner overcomes."""
+    trials: int | None = Field(default=5, ge=1, le=10_000)
+    """Trials of each pair; empty takes `eval.trials`. Few, for neighbours in the map support each other."""
+    sequence: tuple[Segment, ...] = ()
+    """Commands; empty takes those of the sweeps."""
+
+    @model_validator(mode="after")
+    def _grid_ascends(self) -> Self:
+        for name in ("rolling_resistances", "masses"):
+            values = getattr(self, name)
+            if list(values) != sorted(set(values)) or values[0] <= 0:
+                raise ValueError(f"{name} must be positive and ascend without repetition, got {list(values)}")
+        return self
+
+
+class Probe(Section):
+    """Trials with masses spread over a range, and a linear regression of the mass on what the policy sees in them.
+
+    Every other trial is regressed on, those between them are tested: the masses tested are none that were learnt.
+    """
+
+    scene: ObjectScene = "lift"
+    """Scene of `simulation.scenes`, with an object."""
+    masses: tuple[float, float] = (1.0, 10.0)
+    """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is what
+    training carries of the box."""
+    trials: int = Field(default=180, ge=20, le=2000)
+    """Number of trials, each with a mass and a seed of its own. Some 70 numbers are drawn once for a trial: a
+    regression on fewer trials than that cannot tell which of them is the mass."""
+    seed: int = Field(default=9000, ge=0, lt=2**32)
+    """Seed of the first trial: apart from those of training, its checks, evaluation and export."""
+    partner_share: PartnerShare = 0.0
+    """As in a sweep. Without a partner, for what the hands feel of a mass is what he leaves."""
+    fixed: Held = Field(default_factory=dict)
+    """Any other randomised quantity that is held at a value instead of being drawn, by its name."""
+    sequence: tuple[Segment, ...] = Field(default=PROBED, min_length=1)
+    """Commands of a trial, in order; gentle, so that few end early."""
+    interval: float = Field(default=0.5, gt=0)
+    """Time between two readings [s]; as long as a history of 25 observations, so that no two share one."""
+
+    @model_validator(mode="after")
+    def _masses_ascend(self) -> Self:
+        light, heavy = self.masses
+        if not 0 < light < heavy:
+            raise ValueError(f"masses must be a lightest above 0 and a heavier one, got {list(self.masses)}")
+        return self
+
+
+class Impedance(Section):
+    """Sinusoidal pulls on the centre of mass of a held object, from whose motion the mechanical impedance follows. The
+    robot stands meanwhile and nobody else holds the object; it then has to walk on."""
+
+    scene: ObjectScene = "lift"
+    """Scene of `simulation.scenes`."""
+    mass: float = Field(default=4.0, gt=0)
+    """Object mass [kg]."""
+    directions: tuple[Literal["x", "y"], ...] = Field(default=("x", "y"), min_length=1)
+    """Directions of the pull: forward (x) and to the left (y) of the commanded heading."""
+    frequencies: tuple[float, ...] = Field(default=(0.2, 0.5, 1.0, 2.0), min_length=1)
+    """Frequencies [Hz]: from the slow yielding to a leading partner to the frequency of steps."""
+    amplitude: float = Field(default=10.0, gt=0)
+    """Amplitude of the force [N]; small against the partner's 80 N, large against the noise of a balancing robot."""
+    begin: float = Field(default=2.0, ge=0)
+    """Time at which the pull begins [s]."""
+    cycles: int = Field(default=3, ge=1)
+    """Fewest periods of a pull."""
+    shortest: float = Field(default=6.0, gt=0)
+    """Shortest pull [s]; it lasts a whole number of periods."""
+    walk: tuple[Segment, ...] = Field(default=WALKING_ON, min_length=1)
+    """Commands after the pull: a robot that does not move at all fails them."""
+
+    @model_validator(mode="after")
+    def _frequencies_are_positive(self) -> Self:
+        if min(self.frequencies) <= 0:
+            raise ValueError(f"frequencies must be positive, got {list(self.frequencies)}")
+        return self
+
+
+class Compliance(Section):
+    """Partners that behave in different ways, a crate that is blocked, and sinusoidal pulls; without impulses and
+    pushes, so that every force is that of the interaction."""
+
+    scene: ObjectScene = "lift"
+    """Scene of `simulation.scenes`, with an object that is held."""
+    masses: tuple[float, ...] = Field(default=(4.0,), min_length=1)
+    """Object masses [kg]."""
+    partner_shares: tuple[float, ...] = Field(default=(0.5,), min_length=1)
+    """Parts of the weight that the partner bears."""
+    behaviours: tuple[str, ...] = BEHAVIOURS
+    """How the partner behaves, a case each; the last two are never trained with."""
+    trials: int | None = Field(default=None, ge=1, le=10_000)
+    """Trials of each case; empty takes `eval.trials`."""
+    sequence: tuple[Segment, ...] = ()
+    """Commands; empty takes those of the sweeps."""
+    blocked: Case | None = Case(
+        name="blocked crate", scene="push", mass=65.0, fixed={"resistance_scale": 50.0}, sequence=STAGNATION
+    )
+    """A push against what does not move; empty leaves it out."""
+    impedance: Impedance | None = Impedance()
+    """Sinusoidal pulls; empty leaves them out."""
+
+    @model_validator(mode="after")
+    def _behaviours_are_known(self) -> Self:
+        unknown = [name for name in self.behaviours if name not in BEHAVIOURS]
+        if unknown:
+            raise ValueError(f"no partner behaviour {unknown[0]!r}; valid: {', '.join(BEHAVIOURS)}")
+        if min(self.masses) <= 0:
+            raise ValueError(f"masses must be positive, got {list(self.masses)}")
+        return self

@@ -4,9 +4,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from iowbc.recipe.simulation.distribution import Distribution
 from iowbc.recipe.simulation.partner import BEHAVIOURS, Leader, Partner, Stopping
-from iowbc.recipe.simulation.randomization import Randomization
+from iowbc.recipe.simulation.randomization import Distribution, Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
 SCENES = tuple(Scenes.model_fields)

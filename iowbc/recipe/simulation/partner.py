@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, field_validator, model_validator
 
 from iowbc.recipe.section import LATER, Section
-from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.randomization import Distribution
 
 LONGEST_DELAY = 10.0
 """Commands of so long a time are remembered at most [s]."""
