@@ -1,10 +1,11 @@
 """The base of every recipe section, and which of its values decide results."""
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 from pydantic.fields import FieldInfo
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
@@ -13,6 +14,26 @@ LATER: dict[str, Any] = {"later": True}
 """Extra of a field that came after artifacts were published. At its default, which is what the program did before, it
 decides nothing, so that their keys hold."""
 
+
+def in_order(ends: tuple[float, float]) -> tuple[float, float]:
+    """The lower and upper end of a range. Raises ValueError where they are the other way round."""
+    if ends[0] > ends[1]:
+        raise ValueError(f"the lower end {ends[0]:g} is above the upper end {ends[1]:g}")
+    return ends
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if any(low >= high for low, high in itertools.pairwise(values)):
+        raise ValueError(f"must ascend without repetition, got {list(values)}")
+    return values
+
+
+Range = Annotated[tuple[float, float], AfterValidator(in_order)]
+"""Lower and upper end."""
+Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Field(min_length=1)]
+"""Positive values that ascend without repetition."""
+Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
+"""Masses [kg] that ascend without repetition."""
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]

@@ -1,11 +1,11 @@
 """PPO with privileged information (paper section III-C, Table I)."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import AfterValidator, Field, PositiveFloat, model_validator
 
 from iowbc.recipe.check import Check
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width, in_order
 
 LARGEST_UPDATE = 10_000_000
 """Samples that are kept in memory for one update."""
@@ -60,7 +60,7 @@ class Teacher(Section):
     """KL divergence of the old policy from the new one that an update should have, in closed form: the step size falls
     by a fifth beyond one and a half times as much, and rises by a fifth below two thirds. At 0.016 a sixth of the
     samples is clipped; at 0.04 a third was, and training was slower. Empty keeps the step size constant."""
-    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (2e-5, 1e-3)
+    learning_rate_range: Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)] = (2e-5, 1e-3)
     """Least and largest step size, where `desired_kl` moves it."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
@@ -138,13 +138,6 @@ class Teacher(Section):
     policy that learns before loses what it could."""
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
-
-    @model_validator(mode="after")
-    def _range_ascends(self) -> "Teacher":
-        low, high = self.learning_rate_range
-        if low > high:
-            raise ValueError(f"learning_rate_range: the least step size {low:g} is above the largest {high:g}")
-        return self
 
     @model_validator(mode="after")
     def _deviations_descend(self) -> "Teacher":

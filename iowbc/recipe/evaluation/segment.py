@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, field_validator, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Range, Section
 
 REACHABLE_HEIGHT = (0.3, 1.0)
 """No humanoid of this size commands its pelvis out of these heights [m]."""
@@ -54,9 +54,6 @@ class Segment(Section):
         return self
 
 
-Range = tuple[float, float]
-
-
 class DrawnScripts(Section):
     """Every script holds the same kinds of motion in a drawn order, each with drawn sizes and times.
 
@@ -99,10 +96,3 @@ class DrawnScripts(Section):
     them."""
     bow_height: Range = (0.64, 0.72)
     """Pelvis height of a bow [m]; at 1.5 rad 0.62 to 0.72 m are feasible."""
-
-    @model_validator(mode="after")
-    def _ranges_ascend(self) -> Self:
-        for name, value in self:
-            if isinstance(value, tuple) and value[0] > value[1]:
-                raise ValueError(f"{name}: the lower end {value[0]} is above the upper end {value[1]}")
-        return self

@@ -3,11 +3,11 @@ the history, and interaction with partners."""
 
 from typing import Annotated, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Ascending, Masses, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 
@@ -28,7 +28,7 @@ class WithShare(Section):
 
     partner_share: float = Field(ge=-1, le=1)
     """The share, one of the sweep's."""
-    masses: tuple[float, ...] | None = Field(default=None, min_length=1)
+    masses: Masses | None = Field(default=None, min_length=1)
     """Object masses [kg], ascending; empty takes the sweep's."""
     rolling_resistance: float | None = Field(default=None, ge=0, le=1)
     """Rolling resistance μ; empty takes the sweep's."""
@@ -39,11 +39,11 @@ class Sweep(Section):
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes` or `eval.scenes` in which the object is met."""
-    masses: tuple[float, ...] = Field(default=(0.05, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
+    masses: Masses = Field(default=(0.05, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0), min_length=1)
     """Object masses [kg], ascending; none is lighter than the object's `smallest_mass`."""
     no_object: bool = True
     """Also play the commands once in the scene without an object, without a partner: the row "no object"."""
-    undisturbed: tuple[float, ...] = ()
+    undisturbed: Masses = ()
     """Masses of a second suite without impulses and pushes [kg], where `eval.disturbances` are on; empty has none."""
     beyond: Beyond | None = None
     """Heavier masses, tried as long as one trial survives; empty stops at the last mass."""
@@ -67,12 +67,7 @@ class Sweep(Section):
         return self.model_copy(update={**given, "partner_shares": (share,), "with_share": ()})
 
     @model_validator(mode="after")
-    def _masses_ascend(self) -> Self:
-        for masses in (self.masses, self.undisturbed, *(one.masses or () for one in self.with_share)):
-            if any(mass < 0 for mass in masses):
-                raise ValueError(f"masses must not be negative, got {list(masses)}")
-            if list(masses) != sorted(set(masses)):
-                raise ValueError(f"masses must ascend without repetition, got {list(masses)}")
+    def _shares_differ(self) -> Self:
         if len(set(self.partner_shares)) != len(self.partner_shares):
             raise ValueError(f"partner_shares must differ, got {list(self.partner_shares)}")
         named = [one.partner_share for one in self.with_share]
@@ -149,7 +144,7 @@ class PushLadder(Section):
     """Horizontal directions in the frame of the robot's heading."""
     trials: int | None = Field(default=5, ge=1, le=10_000)
     """Trials of each size and direction; empty takes `eval.trials`. Few, for neighbours support each other."""
-    impulses: tuple[float, ...] = Field(default=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0), min_length=1)
+    impulses: Ascending = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
     """Sizes tried [N·s], ascending; 37 N·s would give robot and 4 kg box 1 m/s in the air."""
     time: float = Field(default=2.0, ge=0)
     """When the push begins [s]."""
@@ -157,12 +152,6 @@ class PushLadder(Section):
     """Time over which it acts, as a constant force [s]."""
     sequence: tuple[Segment, ...] = Field(default=STANDING, min_length=1)
     """Commands while it is pushed."""
-
-    @model_validator(mode="after")
-    def _impulses_ascend(self) -> Self:
-        if list(self.impulses) != sorted(set(self.impulses)) or self.impulses[0] <= 0:
-            raise ValueError(f"impulses must be positive and ascend without repetition, got {list(self.impulses)}")
-        return self
 
 
 class Robustness(Section):
@@ -205,9 +194,9 @@ class PushMap(Section):
 
     scene: ObjectScene = "push"
     """Scene of `simulation.scenes` with a crate."""
-    rolling_resistances: tuple[float, ...] = Field(default=(0.02, 0.06, 0.1, 0.15), min_length=1)
+    rolling_resistances: Ascending = (0.02, 0.06, 0.1, 0.15)
     """Rolling resistances μ; the ends are those of the paper's Table I."""
-    masses: tuple[float, ...] = Field(default=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0), min_length=1)
+    masses: Ascending = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
     """Masses [kg]."""
     partner_share: float = Field(default=0.0, ge=-1, le=1)
     """Part of the rolling resistance that the partner overcomes."""
@@ -215,14 +204,6 @@ class PushMap(Section):
     """Trials of each pair; empty takes `eval.trials`. Few, for neighbours in the map support each other."""
     sequence: tuple[Segment, ...] = ()
     """Commands; empty takes those of the sweeps."""
-
-    @model_validator(mode="after")
-    def _grid_ascends(self) -> Self:
-        for name in ("rolling_resistances", "masses"):
-            values = getattr(self, name)
-            if list(values) != sorted(set(values)) or values[0] <= 0:
-                raise ValueError(f"{name} must be positive and ascend without repetition, got {list(values)}")
-        return self
 
 
 class Probe(Section):
@@ -233,7 +214,7 @@ class Probe(Section):
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object."""
-    masses: tuple[float, float] = (1.0, 10.0)
+    masses: tuple[PositiveFloat, PositiveFloat] = (1.0, 10.0)
     """Lightest and heaviest object [kg]; the trials' masses are spread evenly between them. The default is what
     training carries of the box."""
     trials: int = Field(default=180, ge=20, le=2000)
@@ -252,9 +233,8 @@ class Probe(Section):
 
     @model_validator(mode="after")
     def _masses_ascend(self) -> Self:
-        light, heavy = self.masses
-        if not 0 < light < heavy:
-            raise ValueError(f"masses must be a lightest above 0 and a heavier one, got {list(self.masses)}")
+        if self.masses[0] >= self.masses[1]:
+            raise ValueError(f"masses must be a lightest and a heavier one, got {list(self.masses)}")
         return self
 
 
@@ -268,7 +248,7 @@ class Impedance(Section):
     """Object mass [kg]."""
     directions: tuple[Literal["x", "y"], ...] = Field(default=("x", "y"), min_length=1)
     """Directions of the pull: forward (x) and to the left (y) of the commanded heading."""
-    frequencies: tuple[float, ...] = Field(default=(0.2, 0.5, 1.0, 2.0), min_length=1)
+    frequencies: tuple[PositiveFloat, ...] = Field(default=(0.2, 0.5, 1.0, 2.0), min_length=1)
     """Frequencies [Hz]: from the slow yielding to a leading partner to the frequency of steps."""
     amplitude: float = Field(default=10.0, gt=0)
     """Amplitude of the force [N]; small against the partner's 80 N, large against the noise of a balancing robot."""
@@ -281,12 +261,6 @@ class Impedance(Section):
     walk: tuple[Segment, ...] = Field(default=WALKING_ON, min_length=1)
     """Commands after the pull: a robot that does not move at all fails them."""
 
-    @model_validator(mode="after")
-    def _frequencies_are_positive(self) -> Self:
-        if min(self.frequencies) <= 0:
-            raise ValueError(f"frequencies must be positive, got {list(self.frequencies)}")
-        return self
-
 
 class Compliance(Section):
     """Partners that behave in different ways, a crate that is blocked, and sinusoidal pulls; without impulses and
@@ -294,7 +268,7 @@ class Compliance(Section):
 
     scene: ObjectScene = "lift"
     """Scene of `simulation.scenes`, with an object that is held."""
-    masses: tuple[float, ...] = Field(default=(4.0,), min_length=1)
+    masses: tuple[PositiveFloat, ...] = Field(default=(4.0,), min_length=1)
     """Object masses [kg]."""
     partner_shares: tuple[float, ...] = Field(default=(0.5,), min_length=1)
     """Parts of the weight that the partner bears."""
@@ -316,6 +290,4 @@ class Compliance(Section):
         unknown = [name for name in self.behaviours if name not in BEHAVIOURS]
         if unknown:
             raise ValueError(f"no partner behaviour {unknown[0]!r}; valid: {', '.join(BEHAVIOURS)}")
-        if min(self.masses) <= 0:
-            raise ValueError(f"masses must be positive, got {list(self.masses)}")
         return self
