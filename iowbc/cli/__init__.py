@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from iowbc.cli.comparing import compare, diff, report, ui
-from iowbc.cli.listing import gc, list_, show, status
+from iowbc.cli.listing import compare, diff, gc, list_, report, show, status, ui
 from iowbc.cli.measuring import bench_control, bench_reference, bench_scale, bench_simulation, bench_training
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema

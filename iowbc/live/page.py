@@ -13,8 +13,7 @@ from iowbc.live.drawing import Drawing
 from iowbc.live.figures import figures
 from iowbc.live.panel import LIVE, PAST, Panel
 from iowbc.live.session import Pushed, Session
-from iowbc.live.track import Track
-from iowbc.live.trials import played_again, trial_titles
+from iowbc.live.track import Track, played_again, trial_titles
 
 PICTURES = 1.0 / 25.0
 """Time between two pictures [s]."""
@@ -147,7 +146,7 @@ class Page:
                 self.paused = True
                 panel.label_pause(True)
         if not self.paused and now >= self._due:
-            session.helm.wanted[:] = panel.command
+            session.wanted[:] = panel.command
             session.step()
             self._due = max(self._due + session.environment.period / panel.speed.value, now - BEHIND)
         elif self.paused:

@@ -20,7 +20,7 @@ from iowbc.live.page import SETTLED, Page
 from iowbc.live.panel import LIVE
 from iowbc.live.server import HOST, serving
 from iowbc.live.session import Session
-from iowbc.live.trials import trial_titles
+from iowbc.live.track import trial_titles
 from iowbc.recipe.evaluation.segment import Segment
 
 STANDING = (Segment(duration=0.2, ramp=0.0),)

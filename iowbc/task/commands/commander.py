@@ -36,6 +36,12 @@ class Commander:
         self.scripted = np.array([script is not None for script in scripts])
         self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
         self._times, self._values = _knots(scripts)
+        self._given: Array | None = None
+
+    def steer(self, wanted: Array) -> None:
+        """Follow a command that somebody gives, (11,), in place of all scripts; it may be changed in place. Episodes
+        begin in its posture, standing."""
+        self._given = wanted
 
     def start(self, which: Indices, memory: Memory, key: Keys) -> None:
         """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
@@ -48,6 +54,8 @@ class Commander:
         if scripted.any():
             memory.goal[which[scripted]] = self._scripted(memory)[which[scripted]]
             command[scripted] = memory.goal[which[scripted]]
+            if self._given is not None:
+                command[:, VELOCITY] = 0.0
         memory.command[which] = self._references.clamp(command)
 
     def advance(self, memory: Memory, key: Keys) -> None:
@@ -70,6 +78,8 @@ class Commander:
         memory.draws[which] += 1
 
     def _scripted(self, memory: Memory) -> Array:
+        if self._given is not None:
+            return np.broadcast_to(self._given, memory.goal.shape)
         return interpolate(self._times, self._values, memory.steps * self._period)
 
 
