@@ -11,7 +11,7 @@ from iowbc.commands import completion
 
 def status(as_json: AsJson = False, runs: RunsFolder = None) -> None:
     """Show what runs, what was left unfinished, and what each recipe has."""
-    from iowbc.commands.status import print_status
+    from iowbc.commands.listing import print_status
 
     print_status(store_in(runs), console(), as_json)
 
@@ -24,14 +24,14 @@ def list_(
     runs: RunsFolder = None,
 ) -> None:
     """List the stored artifacts."""
-    from iowbc.commands.ls import list_artifacts
+    from iowbc.commands.listing import list_artifacts
 
     list_artifacts(store_in(runs), console(), stage, as_json)
 
 
 def show(what: Named, as_json: AsJson = False, runs: RunsFolder = None) -> None:
     """Show an artifact in detail, or the stages and metrics of a recipe."""
-    from iowbc.commands.show import show as print_artifact
+    from iowbc.commands.listing import show as print_artifact
 
     print_artifact(store_in(runs), console(), what, as_json)
 

@@ -132,28 +132,27 @@ def _today(recipe: Mapping[str, Any] | None) -> Mapping[str, Any]:
 
 
 def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[Difference]:
-    before, after = old.manifest, new.manifest
-    if before.key != after.key:
-        yield Difference(stage, "key", before.key[:KEY_LENGTH], after.key[:KEY_LENGTH], mark=" ")
-    elif before.digest == after.digest:
+    one, other = old.manifest, new.manifest
+    if one.key != other.key:
+        yield Difference(stage, "key", one.key[:KEY_LENGTH], other.key[:KEY_LENGTH], mark=" ")
+    elif one.digest == other.digest:
         return
     if with_recipe:
         yield from _changes(stage, "", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
     for name, *digests in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
         texts = [ABSENT if digest is MISSING else str(digest)[:KEY_LENGTH] for digest in digests]
         yield Difference(stage, f"input {name}", *texts)
-    if before.version != after.version:
-        yield Difference(stage, "stage version", str(before.version), str(after.version))
-    yield from _changes(stage, "version of ", before.versions, after.versions)
-    changed = changed_code(before.code, after.code)
-    if changed:
+    if one.version != other.version:
+        yield Difference(stage, "stage version", str(one.version), str(other.version))
+    yield from _changes(stage, "version of ", one.versions, other.versions)
+    if changed := changed_code(one.code, other.code):
         yield Difference(stage, f"code of {', '.join(changed)}")
     for name in dict.fromkeys([*old.metrics, *new.metrics]):
         first, second = old.metrics.get(name), new.metrics.get(name)
         if first != second:
-            values = [ABSENT if value is None else figure(value, 6) for value in (first, second)]
+            before, after = (ABSENT if value is None else figure(value, 6) for value in (first, second))
             step = figure(second - first, 3, "+") if first is not None and second is not None else ""
-            yield Difference(stage, f"metric {name}", *values, step)
+            yield Difference(stage, f"metric {name}", before, after, step)
 
 
 def _changes(place: str, prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Difference]:

@@ -4,7 +4,7 @@ from html import escape
 from math import isnan
 
 from iowbc.live.moment import Moment
-from iowbc.live.track import WINDOW, Readings
+from iowbc.live.track import WINDOW, TrackFigures
 
 UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
 SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
@@ -12,7 +12,7 @@ CELL = "padding:0 0.6em 0 0;text-align:right"
 NAME = "padding:0 0.6em 0 0;text-align:left"
 
 
-def figures(moment: Moment, readings: Readings) -> str:
+def figures(moment: Moment, readings: TrackFigures) -> str:
     """What is commanded and what is, at a moment, and the errors of the seconds before."""
     signals = moment.signals
     going, wanted = signals["system_velocity"], signals["commanded_velocity"]

@@ -11,7 +11,7 @@ from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.live.drawing import Drawing
 from iowbc.live.figures import figures
-from iowbc.live.panel import LIVE, PAST, Panel
+from iowbc.live.panel import LIVE, PAST, ControlPanel
 from iowbc.live.session import Pushed, Session
 from iowbc.live.track import Track, played_again, trial_titles
 
@@ -39,7 +39,7 @@ class Page:
     def __init__(self, server: viser.ViserServer, session: Session, evaluated: Actor | None = None) -> None:
         self.server, self.session, self._evaluated = server, session, evaluated
         recipe, robot = session.source.world.recipe, session.environment.batch.robot
-        self.panel = Panel(server.gui, recipe, session.request, self._trials)
+        self.panel = ControlPanel(server.gui, recipe, session.request, self._trials)
         self.drawing = Drawing(server.scene, robot, session.pull)
         server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
         self.paused = False

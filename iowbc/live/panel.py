@@ -12,7 +12,7 @@ from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, VELOCITY
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
-from iowbc.live.drawing import Shown
+from iowbc.live.drawing import ShownParts
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.commands.drawing import nominal_command
@@ -39,7 +39,7 @@ LABELS = {
 }
 
 
-class Panel:
+class ControlPanel:
     """Controls of the page; all tabs of the browser share them."""
 
     def __init__(self, gui: viser.GuiApi, recipe: Recipe, request: PlayRequest, trials: Sequence[str]) -> None:
@@ -68,7 +68,7 @@ class Panel:
             gui.add_markdown("Every change begins a new episode.")
             self._conditions()
         with tabs.add_tab("View"):
-            usual = Shown()
+            usual = ShownParts()
             self._shown = {
                 "forces": gui.add_checkbox("Forces", usual.forces),
                 "support": gui.add_checkbox("Support polygon, centre of mass", usual.support),
@@ -144,9 +144,9 @@ class Panel:
         )
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> ShownParts:
         """What is to be drawn."""
-        return Shown(**{name: box.value for name, box in self._shown.items()})
+        return ShownParts(**{name: box.value for name, box in self._shown.items()})
 
     def pressed(self) -> list[Button]:
         """The buttons that were pressed since this was asked last."""

@@ -24,7 +24,7 @@ WINDOW = 3.0
 
 
 @dataclass(frozen=True)
-class Readings:
+class TrackFigures:
     """Figures of the seconds before a moment; NaN where there is nothing to measure."""
 
     errors: dict[str, float]
@@ -72,7 +72,7 @@ class Track:
         """Index of the moment at a time [s], or of the nearest one."""
         return int(np.clip(round((seconds - self.start) / self.period), 0, len(self.moments) - 1))
 
-    def readings(self, place: int) -> Readings:
+    def readings(self, place: int) -> TrackFigures:
         """The figures at the moment of an index."""
         first = max(0, place + 1 - round(WINDOW / self.period))
         seen = [self.moments[index] for index in range(first, place + 1)]
@@ -81,7 +81,7 @@ class Track:
         deviations = deviations_from_clamped(trace, max(1, round(self.gait_period / self.period)))
         shares = trace.joint_saturation.mean(axis=0)
         means = deviations.means()
-        return Readings(
+        return TrackFigures(
             errors={name: means[name] for name in ERRORS},
             weight_in_hands=load_metrics(trace, self.held_weight, Success().least_weight)["weight_in_hands"],
             saturated={name: float(share) for name, share in zip(self.joints, shares, strict=True) if share > 0},

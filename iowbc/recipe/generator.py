@@ -72,7 +72,7 @@ class Sampling(Section):
         return self
 
 
-class Problem(Section):
+class PostureProblem(Section):
     """The cost (paper eq. 4) and the physical limits, the same for both methods. Costs are ½·weight·residual²."""
 
     com_weight: Positive = 1e3
@@ -213,7 +213,7 @@ class FitGates(Section):
     """Largest move of a joint for one small step of the command [rad]."""
 
 
-class Smoothness(Section):
+class SmoothnessCheck(Section):
     """How the network's smoothness is measured: random lines through the feasible map, walked in small steps."""
 
     lines: int = Field(default=1000, ge=1, le=1_000_000)
@@ -249,7 +249,7 @@ class Fit(Section):
     """Length [m] that weighs as much as one radian in that loss."""
     gates: FitGates = FitGates()
     """Limits on held-out data."""
-    smoothness: Smoothness = Smoothness()
+    smoothness: SmoothnessCheck = SmoothnessCheck()
     """How smoothness is measured."""
 
 
@@ -262,7 +262,7 @@ class ReferenceGenerator(Section):
     """What the commanded height is: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass as the paper writes."""
     sampling: Sampling = Sampling()
     """Which arms and commands are labelled."""
-    problem: Problem = Problem()
+    problem: PostureProblem = PostureProblem()
     """Costs and physical limits."""
     ocp: OptimalControl = OptimalControl()
     """The optimal control problem over a horizon."""

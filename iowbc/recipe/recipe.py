@@ -11,7 +11,7 @@ from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import misnamed
 from iowbc.recipe.section import Section, Unfitting
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
@@ -41,7 +41,7 @@ class Recipe(Section):
     """Stages of this experiment; they run in the order of the pipeline."""
     rg: ReferenceGenerator = ReferenceGenerator()
     """The reference generator: its dataset and its network."""
-    simulation: Simulation = Simulation()
+    simulation: SimulationSettings = SimulationSettings()
     """The world: physics, scenes, partner, randomisation, sensing."""
     task: Task = Task()
     """The Markov decision process: commands, observation, action, reward, terminations, curriculum."""

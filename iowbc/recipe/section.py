@@ -55,7 +55,7 @@ class Section(BaseModel):
         return False
 
 
-class Named(Section):
+class NamedEntries(Section):
     """Entries by name: fields for those that every recipe has, and a recipe's own beside them, all of one type.
 
     The type of one's own is the annotation of `__pydantic_extra__`.

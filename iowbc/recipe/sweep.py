@@ -94,7 +94,7 @@ class Drawn(Section):
         return round(found) if self.whole else float(f"{found:.{DIGITS}g}")
 
 
-class Draws(Section):
+class RandomDraws(Section):
     """Points drawn at random, each with all of these values."""
 
     count: int = Field(ge=1, le=MOST_VALUES)
@@ -123,7 +123,7 @@ class SweepFile(Section):
     grid: Mapping[str, Sequence[JsonValue] | Range] = {}
     """Values by dotted path of the recipe: a list, or a range with `start`, `stop` and `step`; an item `0..4` of a list
     stands for the integers 0 to 4."""
-    draws: Draws | None = None
+    draws: RandomDraws | None = None
     """Values that are drawn at random."""
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Mask
-from iowbc.recipe.simulation.simulation import Sensing as Recipe
+from iowbc.recipe.simulation.simulation import SensorNoise as Recipe
 from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import MeasuredState, SimulationState
@@ -31,7 +31,7 @@ class Columns:
         self.width = self.robot.stop + OBJECT_WIDTH
 
 
-class Sensing:
+class SensorNoise:
     """Sensors of n environments; two delay lines, one for joints and inertial unit, one for the object's tracking."""
 
     def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int, period: float) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim import partner
@@ -41,7 +41,7 @@ STARTS_AT_ZERO = (
 """Parts of the state that an episode begins without."""
 
 
-class Simulation:
+class SimulationSettings:
     """The environments of one process. Set `target` and `feed`, call `step`, read `state` and `measured`."""
 
     def __init__(

@@ -14,12 +14,10 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
+from iowbc.commands.listing import list_artifacts, print_status, show
 from iowbc.commands.lookup import named
-from iowbc.commands.ls import list_artifacts
 from iowbc.commands.plan import PlannedStage, plan_table
 from iowbc.commands.printed import hanging
-from iowbc.commands.show import show
-from iowbc.commands.status import print_status
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.step import Step

@@ -15,7 +15,7 @@ from iowbc.pipeline.store.runs import read_yaml
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.reading.writing import as_yaml
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.simulation import SimulationSettings
 
 RECIPES = Path(__file__).parents[2] / "recipes"
 
@@ -177,7 +177,7 @@ def test_a_section_that_is_off_by_default_may_hold_any_part_of_its_keys(tmp_path
     file = tmp_path / "one.yaml"
     file.write_text("eval: {simulation: {partner: {share: {probability: 0.5}}}}\n")
     world = load_recipe(file).recipe.eval.simulation
-    usual = Simulation()
+    usual = SimulationSettings()
     assert world is not None
     assert world.partner.share == usual.partner.share.model_copy(update={"probability": 0.5})
     assert world.model_dump(exclude={"partner"}) == usual.model_dump(exclude={"partner"})

@@ -8,7 +8,7 @@ from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
-from iowbc.recipe.evaluation.suites import EIGHT, Case, Impedance, PushLadder, Sweep
+from iowbc.recipe.evaluation.suites import EIGHT, Case, Impedance, MassSweep, PushLadder
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.partner import BEHAVIOURS
@@ -117,7 +117,7 @@ class Condition:
         return Episode(scene, seed, self.script.duration, held, self.script, self.push, self.pull)
 
 
-def held_fixed(part: Sweep | Case, partner_share: float | None, *, disturbed: bool) -> dict[str, float]:
+def held_fixed(part: MassSweep | Case, partner_share: float | None, *, disturbed: bool) -> dict[str, float]:
     """The randomised quantities that a sweep or a case holds, by name."""
     held = {} if disturbed else dict(UNDISTURBED)
     if part.rolling_resistance is not None:
@@ -133,7 +133,7 @@ class PlannedSweep:
 
     recipe: Recipe
     kind: str
-    sweep: Sweep
+    sweep: MassSweep
     """As it is with that share (`Sweep.at`)."""
     disturbed: bool
     """Whether impulses and pushes act."""

@@ -7,10 +7,10 @@ from pydantic import Field, model_validator
 from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.evaluation.success import Success
-from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, Probe, PushMap, Robustness, Stagnation, Sweep
+from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
 from iowbc.recipe.simulation.scene import Object, Scene
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.simulation import SimulationSettings
 
 
 class Video(Section):
@@ -81,7 +81,7 @@ class Evaluation(Section):
     scripts: DrawnScripts | None = None
     """Scripts drawn trial by trial for every sweep and case without a sequence; empty takes the fixed sequence of
     lifting or pushing."""
-    simulation: Simulation | None = None
+    simulation: SimulationSettings | None = None
     """The world of all trials; empty is the training's. Pinned (`{}` to the default), variants that were trained
     in other worlds meet the same trials."""
     scenes: dict[SceneName, TrialScene] = Field(default=SIZES)
@@ -91,11 +91,11 @@ class Evaluation(Section):
     same bit for bit when it is played again alone; another size rounds differently."""
     foot_load: float = Field(default=50.0, gt=0)
     """Vertical force from which a foot counts as loaded when its sliding is measured [N]; 15 % of the weight."""
-    lifting: Sweep | None = Sweep()
+    lifting: MassSweep | None = MassSweep()
     """Masses lifted (paper's Table II); empty leaves the sweep out."""
-    pushing: Sweep | None = None
+    pushing: MassSweep | None = None
     """Masses pushed (paper's Table III), with a rolling resistance; empty leaves the sweep out."""
-    squeezing: Sweep | None = None
+    squeezing: MassSweep | None = None
     """Masses held between the palms by friction alone, in a scene such as `squeeze`; empty leaves the sweep out."""
     heavy: tuple[HeavyCase, ...] = ()
     """The paper's heavy tasks: 7 kg box, 18 kg tyre, 65 kg crate with a partner."""
@@ -141,7 +141,7 @@ class Evaluation(Section):
         return self
 
     @property
-    def sweeps(self) -> dict[str, Sweep]:
+    def sweeps(self) -> dict[str, MassSweep]:
         """The sweeps, by what is done with the objects."""
         asked = {"lifting": self.lifting, "pushing": self.pushing, "squeezing": self.squeezing}
         return {kind: sweep for kind, sweep in asked.items() if sweep is not None}

@@ -34,7 +34,7 @@ class WithShare(Section):
     """Rolling resistance μ; empty takes the sweep's."""
 
 
-class Sweep(Section):
+class MassSweep(Section):
     """Trials over a range of object masses in one scene."""
 
     scene: ObjectScene = "lift"
@@ -60,7 +60,7 @@ class Sweep(Section):
     """Command sequence of this sweep; empty takes `eval.sequence`, or else `eval.scripts`, or else that of lifting or
     pushing."""
 
-    def at(self, share: float | None) -> "Sweep":
+    def at(self, share: float | None) -> "MassSweep":
         """The sweep as it is with one share of the partner's."""
         own = [one for one in self.with_share if one.partner_share == share]
         given = {name: value for one in own for name, value in one if value is not None and name != "partner_share"}

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from iowbc.errors import PROBLEMS_TOLD, Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.section import Named, Unfitting
+from iowbc.recipe.section import NamedEntries, Unfitting
 
 LARGEST_NUMBER = 1e12
 """No quantity, size or count of a recipe is larger."""
@@ -27,7 +27,7 @@ def validate(tree: Located) -> Recipe:
 
     Raises `RecipeError` with all problems.
     """
-    whole = merged(_defaults(), _opened(tree, _defaults()))
+    whole = merged(defaults(), _opened(tree, defaults()))
     try:
         recipe = Recipe.model_validate(plain(whole))
     except ValidationError as error:
@@ -49,8 +49,8 @@ def validate(tree: Located) -> Recipe:
 
 
 @functools.cache
-def _defaults() -> Located:
-    """What a recipe says that says nothing; only its name has to be given."""
+def defaults() -> Located:
+    """A recipe that says nothing, but for its name, which has to be given."""
     return located(Recipe(name="default").model_dump(mode="json", exclude={"name"}), "default")
 
 
@@ -145,7 +145,7 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
 def _meant(path: Sequence[str]) -> str:
     """`; did you mean 'x'?` where an entry of a recipe's own lacks something and its name is nearly a known one."""
     for model in models_at(path[:-1]) if path else ():
-        if issubclass(model, Named) and path[-1] not in model.model_fields:
+        if issubclass(model, NamedEntries) and path[-1] not in model.model_fields:
             return nearest(path[-1], model.model_fields)
     return ""
 
@@ -187,7 +187,7 @@ def _inside(annotation: Any, name: str) -> Iterator[Any]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if name in annotation.model_fields:
             yield annotation.model_fields[name].annotation
-        elif issubclass(annotation, Named):
+        elif issubclass(annotation, NamedEntries):
             yield annotation.own_type()
     elif get_origin(annotation) in (Union, types.UnionType):
         for member in get_args(annotation):

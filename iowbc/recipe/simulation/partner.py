@@ -82,7 +82,7 @@ class Lagging(Section):
     """Part of the drawn damping that it has."""
 
 
-class Partner(Section):
+class PartnerSettings(Section):
     """A compliant carrier: a spring, a damper and a preload at the far handle. Its behaviour decides where it goes."""
 
     enabled: bool = True

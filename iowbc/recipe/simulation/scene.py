@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.beside import MeshFile
-from iowbc.recipe.section import LATER, Named, Section
+from iowbc.recipe.section import LATER, NamedEntries, Section
 
 Size = tuple[float, float, float]
 
@@ -113,7 +113,7 @@ class Scene(Section):
         return self
 
 
-class Scenes(Named):
+class Scenes(NamedEntries):
     """The scenes by name; a recipe may add its own, with `task.references.grasps` and `.loads` of the same name."""
 
     __pydantic_extra__: dict[str, Scene] = Field(init=False)

@@ -5,12 +5,12 @@ from typing import Literal
 from pydantic import Field
 
 from iowbc.recipe.section import COSMETIC, Section
-from iowbc.recipe.simulation.partner import Partner
+from iowbc.recipe.simulation.partner import PartnerSettings
 from iowbc.recipe.simulation.randomization import Impulses, Pushes, Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
 
-class Sensing(Section):
+class SensorNoise(Section):
     """White noise per measurement, standard deviations; biases and latencies are in `randomization`."""
 
     enabled: bool = True
@@ -68,14 +68,14 @@ class Physics(Section):
     """How many diverged simulations are kept for replay."""
 
 
-class Simulation(Section):
+class SimulationSettings(Section):
     """The world: physics, scenes, partner, randomisation, sensing."""
 
     physics: Physics = Physics()
     """How MuJoCo integrates."""
     scenes: Scenes = Scenes()
     """The worlds by name."""
-    partner: Partner = Partner()
+    partner: PartnerSettings = PartnerSettings()
     """The second carrier."""
     randomization: Randomization = Randomization()
     """What is drawn anew for each episode."""
@@ -83,5 +83,5 @@ class Simulation(Section):
     """Impulses on the object's centre of mass."""
     pushes: Pushes = Pushes()
     """Pushes on the base."""
-    sensing: Sensing = Sensing()
+    sensing: SensorNoise = SensorNoise()
     """What the sensors add to the truth."""

@@ -4,12 +4,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import LATER, Named, Section
+from iowbc.recipe.section import LATER, NamedEntries, Section
 
 Vector = tuple[float, float, float]
 
 
-class Grasps(Named):
+class Grasps(NamedEntries):
     """Base grasp of each scene: left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
 
     __pydantic_extra__: dict[str, Vector] = Field(init=False)
@@ -26,7 +26,7 @@ class Grasps(Named):
     """Behind the crate's upper edge."""
 
 
-class Loads(Named):
+class Loads(NamedEntries):
     """What the arms expect to carry in each scene [kg]: as much lighter or heavier objects lift or lower the hands."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.section import LATER, OWN_NAME, Named, Section
+from iowbc.recipe.section import LATER, OWN_NAME, NamedEntries, Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.recipe.task.joint_references import References
@@ -68,7 +68,7 @@ class Termination(Section):
     """A held object further than this from its place in the grasp is dropped [m]."""
 
 
-class SceneShares(Named):
+class SceneShares(NamedEntries):
     """Which part of the environments plays which scene of `simulation.scenes`; only the proportions matter."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)

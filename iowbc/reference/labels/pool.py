@@ -36,7 +36,7 @@ STARTS_WITHOUT_WORK = 3
 IDLE = -1
 
 
-class Task(Protocol):
+class SolverFactory(Protocol):
     """A picklable recipe for a solver."""
 
     def prepare(self) -> Solver:
@@ -63,7 +63,7 @@ class _Book:
 
 
 def label_all(
-    task: Task,
+    task: SolverFactory,
     indices: Sequence[int],
     *,
     folder: Path,
@@ -113,7 +113,7 @@ def label_all(
     return merge([done[number] for number in range(len(chunks))])
 
 
-def _start_worker(task: Task, key: str) -> _Worker:
+def _start_worker(task: SolverFactory, key: str) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     current = context.Value("q", IDLE, lock=False)
@@ -176,7 +176,7 @@ def _on_death(worker: _Worker, book: _Book) -> None:
         book.waiting.insert(0, worker.chunk)
 
 
-def _work(task: Task, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
+def _work(task: SolverFactory, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
     for ignored in (signal.SIGINT, signal.SIGHUP):
         signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

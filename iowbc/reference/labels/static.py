@@ -11,7 +11,7 @@ import pinocchio
 
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
-from iowbc.recipe.generator import Problem
+from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.soles import sole_limits
@@ -25,7 +25,7 @@ class StaticMethod:
     def __init__(self, support: SupportModel, height: Literal["pelvis", "com"]) -> None:
         self.support, self.height = support, height
         problem, self.joints = support.problem, len(support.robot.support)
-        self.problem: Problem = problem
+        self.problem: PostureProblem = problem
         self.velocities = support.model.nv
         self.size = self.velocities + 12
         self.start = support.start()
