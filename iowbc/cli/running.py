@@ -48,7 +48,7 @@ def run(
     from iowbc.commands.run import run as run_recipe
     from iowbc.stages.registry import STAGES
 
-    options = {"until": until, "workers": workers, "engine": engine, "address": address}
+    options: dict[str, Any] = {"until": until, "workers": workers, "engine": engine, "address": address}
     request = request_of(recipe, overrides, runs, force, on_code_change=on_code_change, **options)
     if dry_run:
         print_plan(request, STAGES, console())
@@ -91,7 +91,7 @@ def sweep(
     from iowbc.commands.sweep import sweep as run_sweep
     from iowbc.stages.registry import STAGES
 
-    options = {"until": until, "workers": workers, "engine": engine, "address": address}
+    options: dict[str, Any] = {"until": until, "workers": workers, "engine": engine, "address": address}
     request = request_of(recipe, overrides, runs, on_code_change=on_code_change, **options)
     asked = SweepRequest(request, file, jobs, points)
     if dry_run:

@@ -33,7 +33,7 @@ REMEMBERED = (
 )
 
 
-class PartnerSettings:
+class Partner:
     """Partners of n environments. Their forces are held over a control period."""
 
     def __init__(self, recipe: Recipe, scenes: list[Scene], period: float) -> None:

@@ -31,7 +31,7 @@ class Columns:
         self.width = self.robot.stop + OBJECT_WIDTH
 
 
-class SensorNoise:
+class Sensing:
     """Sensors of n environments; two delay lines, one for joints and inertial unit, one for the object's tracking."""
 
     def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int, period: float) -> None:

@@ -41,7 +41,7 @@ STARTS_AT_ZERO = (
 """Parts of the state that an episode begins without."""
 
 
-class SimulationSettings:
+class Simulation:
     """The environments of one process. Set `target` and `feed`, call `step`, read `state` and `measured`."""
 
     def __init__(
