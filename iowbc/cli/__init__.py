@@ -70,7 +70,7 @@ def _options(
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """What comes before a command."""
+    """Options that come before a command."""
 
 
 for name, command in COMMANDS.items():

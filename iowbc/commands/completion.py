@@ -1,4 +1,4 @@
-"""What a shell offers on Tab: recipes, stages, artifacts by name or key, and dotted paths of a recipe."""
+"""Completions that a shell offers on Tab: recipes, stages, artifacts by name or key, and dotted paths of a recipe."""
 
 import os
 from collections.abc import Iterable

@@ -122,8 +122,8 @@ def named_source(
     scene: str | None = None,
     registry: Registry = NO_STAGES,
 ) -> "Source":
-    """What a word and `--stage` name, told on the console while it is trained. Raises `UsageError`, also for a `scene`
-    that its recipe has not.
+    """The source that a word and `--stage` name, with a line on the console while it is trained. Raises `UsageError`,
+    also for a `scene` that its recipe has not.
 
     A recipe's file names the artifacts that `iowbc plan` calls cached; it, or the recipe of a name, says by its own
     `eval` what is played of them.

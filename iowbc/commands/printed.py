@@ -79,7 +79,7 @@ def filming(console: Console, film: Path | None) -> Iterator[Callable[[float, fl
 
 
 def artifact_data(artifact: Artifact) -> dict[str, Any]:
-    """What an artifact is."""
+    """An artifact for other programs."""
     manifest = artifact.manifest
     return {
         "stage": manifest.stage,

@@ -35,7 +35,7 @@ class RunEnding:
 
     code: int
     failure: str = ""
-    """Which stage failed and why, in a line; empty where none did."""
+    """The stage that failed and the reason, in a line; empty where none did."""
 
 
 def close_on_termination() -> None:

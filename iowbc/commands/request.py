@@ -78,7 +78,8 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
 
 
 def in_order(planner: Planner) -> list[Planner]:
-    """What runs for a recipe: first those from whose artifacts it begins, where they are not stored, then itself."""
+    """Planners of all that runs for a recipe: first those from whose artifacts it begins, where they are not stored,
+    then itself."""
     missing = [origin for origin in planner.origins.values() if not origin.plan()[-1].cached]
     return [*(each for origin in missing for each in in_order(origin)), planner]
 

@@ -80,7 +80,7 @@ def described(artifacts: Mapping[str, Artifact]) -> str:
 
 
 def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) -> list[str]:
-    """What a user would type next: to see the robot, where there is a policy, and to read about the run.
+    """The next commands: to see the robot, where there is a policy, and to read about the run.
 
     What a run with overrides made goes by its key, if they gave it no name of its own: the recipe's name stands for
     what it has without any.

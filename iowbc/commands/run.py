@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
 
 Manner = Literal["usual", "quiet", "verbose"]
-"""How much a run prints."""
+"""Amount of a run's output."""
 
 
 def run(request: Request, registry: Mapping[str, Stage], console: Console, manner: Manner = "usual") -> int:

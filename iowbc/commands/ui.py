@@ -50,7 +50,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
 
 
 def view() -> dict[str, object]:
-    """How MLflow shows the runs: newest first, stages within their run, with the columns that tell most."""
+    """MLflow's view of the runs: newest first, stages within their run, with the columns that tell most."""
     metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.presentation.columns]
     return {
         "searchFilter": "",

@@ -1,4 +1,4 @@
-"""What is to be seen in the browser: the bodies of a model, forces, the support polygon, the reference posture."""
+"""The scene in the browser: the bodies of a model, forces, the support polygon, the reference posture."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ GHOST = (0.15, 0.45, 0.95)
 GHOST_OPACITY = 0.35
 SUPPORT, BALANCE = (60, 170, 90), (210, 40, 40)
 ABOVE_GROUND = 0.003
-"""What is drawn on the ground lies so far above it [m]."""
+"""Height above the ground of what is drawn on it [m]."""
 DOT = 0.025
 """Radius of the mark under the centre of mass [m]."""
 FOLLOWING = 0.1
@@ -35,7 +35,7 @@ Pull = Callable[[Pushed, Array], None]
 
 @dataclass(frozen=True)
 class ShownParts:
-    """What is drawn beside the robot and its object."""
+    """Parts that are drawn beside the robot and its object."""
 
     forces: bool = True
     support: bool = True

@@ -13,7 +13,7 @@ NAME = "padding:0 0.6em 0 0;text-align:left"
 
 
 def figures(moment: Moment, readings: TrackFigures) -> str:
-    """What is commanded and what is, at a moment, and the errors of the seconds before."""
+    """The command and the state at a moment, and the errors of the seconds before."""
     signals = moment.signals
     going, wanted = signals["system_velocity"], signals["commanded_velocity"]
     rows = [

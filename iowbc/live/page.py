@@ -28,13 +28,13 @@ CHECKPOINTS = 2.0
 BEHIND = 0.2
 """A simulation that is further behind its pace lets the time go [s]."""
 VIEW = (1.7, -1.4, 1.2)
-"""Where a camera begins [m]."""
+"""First position of a camera [m]."""
 AIM = (0.1, 0.0, 0.6)
 """At what it looks [m]."""
 
 
 class Page:
-    """What a server shows of a session, and of the trials of an evaluation where there is one."""
+    """The page of a session, and of the trials of an evaluation where there is one."""
 
     def __init__(self, server: viser.ViserServer, session: Session, evaluated: Actor | None = None) -> None:
         self.server, self.session, self._evaluated = server, session, evaluated
@@ -44,9 +44,9 @@ class Page:
         server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
         self.paused = False
         self.track: Track = session.track
-        """What is shown: the session's own, or a trial."""
+        """The track that is shown: the session's own, or a trial."""
         self.place = 0
-        """Which of its moments."""
+        """Index of its moment that is shown."""
         self._showing = LIVE
         self._cursor = self._slid = 0.0
         self._wish, self._wished = session.request, 0.0

@@ -21,7 +21,7 @@ Button = Literal["pause", "reset", "push robot", "push object"]
 
 LIVE = "live"
 PAST = 60.0
-"""How far back a live episode can be looked at [s]."""
+"""Length of the past of a live episode that can be looked at [s]."""
 HEAVIEST = 2.0
 """Largest mass on the slider, in nominal masses of the scene's object."""
 LIGHTEST = 1.0
@@ -124,7 +124,7 @@ class ControlPanel:
 
     @property
     def command(self) -> Array:
-        """What the sliders ask for, (11,)."""
+        """The command that the sliders ask for, (11,)."""
         return np.array([slider.value for slider in self._command])
 
     def set_command(self, name: str, value: float) -> None:
@@ -145,7 +145,7 @@ class ControlPanel:
 
     @property
     def shown(self) -> ShownParts:
-        """What is to be drawn."""
+        """Parts that are to be drawn."""
         return ShownParts(**{name: box.value for name, box in self._shown.items()})
 
     def pressed(self) -> list[Button]:

@@ -32,7 +32,8 @@ UNUSED = (
 
 
 def refusal(headers: Any, connected: int) -> tuple[HTTPStatus, str] | None:
-    """Why a request is not answered: a page from elsewhere, which the user also visits, would steer the robot."""
+    """Reason why a request is not answered: a page from elsewhere, which the user also visits, would steer the
+    robot."""
     hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
     if len(hosts) != 1 or _name(f"http://{hosts[0]}") not in LOCAL_NAMES:
         return HTTPStatus.FORBIDDEN, f"Host {hosts}: open the page as http://127.0.0.1:PORT or http://localhost:PORT\n"

@@ -20,9 +20,9 @@ Pushed = Literal["robot", "object"]
 AN_HOUR = (Segment(duration=600.0),) * 6
 """The longest that an episode lasts."""
 REMEMBERED = 60.0
-"""How much of the past is kept [s]."""
+"""Length of the past that is kept [s]."""
 BLOW = 0.1
-"""How long a push lasts [s]; as long as those of `eval.robustness.pushes`."""
+"""Length of a push [s]; as long as those of `eval.robustness.pushes`."""
 
 
 class Session:

@@ -31,7 +31,7 @@ class BodyMesh:
 
 
 def looks(model: Any) -> Iterator[BodyMesh]:
-    """What MuJoCo's viewer shows, without the ground."""
+    """Meshes that MuJoCo's viewer shows, without the ground."""
     return _merged(model, lambda geom: model.geom_group[geom] < HIDDEN_GROUP)
 
 

@@ -52,7 +52,7 @@ class Track:
     kept: int | None = None
     """So many of the last moments are kept; None keeps all."""
     ending: str = ""
-    """How the episode ended, once it has."""
+    """Ending of the episode, once it has ended."""
     moments: deque[Moment] = field(init=False)
 
     def __post_init__(self) -> None:

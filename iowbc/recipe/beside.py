@@ -25,7 +25,7 @@ class FileBeside(Section):
     """Bytes of the largest that is taken in."""
 
     path: str = Field(json_schema_extra=COSMETIC)
-    """Where it lay, as the recipe says it."""
+    """Its place, as the recipe says it."""
     sha256: str
     """Digest of its bytes."""
     content: str = Field(json_schema_extra=COSMETIC)

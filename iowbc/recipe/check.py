@@ -49,7 +49,7 @@ class Check(Section):
     """Errors E_α [rad], E_h [m], E_v [m/s] and E_ψ [rad] that halve their part of the score; by default the paper's
     IO-WBC without a load (Table II). An error that is far below its scale counts little."""
     fall: float = Field(default=1.0, ge=0, le=1, json_schema_extra=LATER)
-    """What the score of a trial is multiplied by that is not survived. At 1 who falls in the last second of twenty
+    """Factor on the score of a trial that is not survived. At 1 who falls in the last second of twenty
     loses a twentieth, less than what walking a little nearer to the velocity brings."""
     collapse: float = Field(default=1 / 3, gt=0, lt=1)
     """Part of the best score whose loss counts as a collapse: the training goes back to its best policy."""
@@ -59,6 +59,6 @@ class Check(Section):
     patience: int = Field(default=3, ge=1)
     """Checks in a row that must say so: one of eight trials more or less moves the score by a tenth."""
     caution: float = Field(default=0.5, gt=0, lt=1)
-    """What the desired KL divergence and the step size are multiplied by after each collapse."""
+    """Factor on the desired KL divergence and the learning rate after each collapse."""
     rollbacks: int = Field(default=6, ge=0, le=1000)
     """Collapses without a better policy between them after which the stage gives up."""

@@ -19,7 +19,7 @@ class Distillation(Section):
     history: int = Field(default=25, ge=1, le=1000)
     """Length of the observation history H_t (paper Table I)."""
     encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
-    """What turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
+    """Network that turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
     recurrent unit. Where the teacher is symmetric by construction, so is the student: the encoder has half the latent's
     size and reads the history and its mirror image."""
     frame_features: int = Field(default=32, ge=1, le=16_384)
@@ -30,7 +30,7 @@ class Distillation(Section):
     """By scene: the recipe whose teacher the student follows there, or a key as in `teacher.start`. Empty follows this
     recipe's own teacher everywhere. What the experts are is part of the key, not what they are called."""
     start: Literal["teacher", "anew"] = "teacher"
-    """What the body behind the encoder begins as. `teacher`: the teacher's own body; where that sees s_priv, it sees
+    """Beginning of the body behind the encoder. `teacher`: the teacher's own body; where that sees s_priv, it sees
     what a linear map reads from the latent, at first the mean of training. Nothing of the teacher has to be learnt
     again, and all that is learnt is what the history tells. `anew`: from nothing, on the latent itself."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
@@ -54,7 +54,7 @@ class Distillation(Section):
     training. What no history shows, such as a motor's strength, the student cannot answer to as the teacher does; and a
     teacher that walks loses nothing without it."""
     observe_object: bool = Field(default=True, json_schema_extra=LATER)
-    """Whether the student sees the object where its teacher does (`task.observation.observe_object`). Without, it has
+    """Lets the student see the object where its teacher does (`task.observation.observe_object`). Without, it has
     proprioception alone (paper III-C.2), and infers the object's pose from its history as it infers s_priv."""
     std: Literal["learnt", "shared"] = "learnt"
     """Standard deviation of the student's Gaussian. `learnt`: its own, which grows where its action is uncertain

@@ -51,7 +51,7 @@ def _unknown(path: str, names: tuple[str, ...], known: tuple[str, ...]) -> Itera
 
 
 def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Iterator[tuple[str, str]]:
-    """What a scene of a recipe's own lacks."""
+    """Entries that a scene of a recipe's own lacks."""
     scene, references = getattr(scenes, name), task.references
     if name not in references.grasps.names:
         near = references.grasps.push if scene.kind == "push" else references.grasps.lift

@@ -41,7 +41,7 @@ ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max
 DEEPEST = 16
 """Hidden layers of the deepest network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
-"""What a name looks like that a recipe gives to a scene or a term of its own."""
+"""Pattern of a name that a recipe gives to a scene or a term of its own."""
 
 
 class Section(BaseModel):
@@ -51,7 +51,7 @@ class Section(BaseModel):
 
     @property
     def idle(self) -> bool:
-        """Whether an entry of a mapping does nothing, so that it might as well not be there."""
+        """True where an entry of a mapping does nothing, so that it might as well not be there."""
         return False
 
 
@@ -98,7 +98,7 @@ class Unfitting(ValueError):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """What decides results: a section's values as JSON data, however deep, without its cosmetic fields and without
+    """The values of a section that decide results, as JSON data, however deep, without its cosmetic fields and without
     later ones at their default."""
     kept: dict[str, Any] = _deciding(section, section.model_dump(mode="json"))
     return kept

@@ -73,7 +73,7 @@ class Drawn(Section):
     scale: Literal["linear", "log"] = "linear"
     """`log` draws each order of magnitude alike often: for rates and weights whose size is not known."""
     whole: bool = False
-    """Whether it is rounded to an integer."""
+    """Rounds it to an integer."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -102,7 +102,7 @@ class RandomDraws(Section):
     seed: int = Field(default=0, ge=0, lt=2**32)
     """Seed of the draws: more of them leave the first ones as they were, and so do more paths."""
     values: Mapping[str, Drawn] = Field(min_length=1)
-    """What is drawn, by dotted path of the recipe."""
+    """Values that are drawn, by dotted path of the recipe."""
 
     def points(self) -> list[dict[str, JsonValue]]:
         """The drawn values of each draw, by dotted path."""
@@ -119,7 +119,7 @@ class SweepFile(Section):
     name: str | None = Field(default=None, pattern=f"^{NAME}$", max_length=64)
     """Name of the sweep; the file's name when empty."""
     description: str = ""
-    """What the sweep is for, in a sentence."""
+    """Purpose of the sweep, in a sentence."""
     grid: Mapping[str, Sequence[JsonValue] | Range] = {}
     """Values by dotted path of the recipe: a list, or a range with `start`, `stop` and `step`; an item `0..4` of a list
     stands for the integers 0 to 4."""
@@ -145,7 +145,7 @@ class Point:
     word: str
     """The recipe's file."""
     settings: Mapping[str, JsonValue]
-    """What the sweep varies, by dotted path."""
+    """Values that the sweep varies, by dotted path."""
 
     @property
     def name(self) -> str:
@@ -287,7 +287,7 @@ def _require_axes(axes: Sequence[str], file: Path | None) -> None:
 
 
 def _read_file(file: Path) -> SweepFile:
-    """What the file of a sweep says. Raises `RecipeError` with every problem and its line."""
+    """Contents of the file of a sweep. Raises `RecipeError` with every problem and its line."""
     tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))
     if not isinstance(tree.value, dict):
         raise RecipeError([Problem(tree.place, "a sweep is a mapping with `grid`, `draws` or both")])

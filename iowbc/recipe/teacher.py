@@ -17,7 +17,7 @@ class HistoryNetwork(Section):
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
     encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
-    """What turns the history into a latent; see `distill.encoder`."""
+    """Network that turns the history into a latent; see `distill.encoder`."""
     frame_features: int = Field(default=32, ge=1, le=16_384)
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1, le=16_384)
@@ -83,7 +83,7 @@ class Teacher(Section):
     """Environment steps in which the largest standard deviation halves, from the initial one down to `std_end`:
     exploration shrinks even where the gradient does not ask for it. Empty sets no such bound."""
     std_end: float = Field(default=0.2, gt=0)
-    """Where the largest standard deviation comes to rest."""
+    """Value at which the largest standard deviation comes to rest."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Brings exploration back once; see `Restart`. Empty lets it shrink for good."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)
@@ -95,7 +95,7 @@ class Teacher(Section):
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of the hidden layers."""
     symmetry: Literal["construction", "augment", "none"] = "construction"
-    """How the left-right symmetry of robot and task is used. `construction`: the networks commute with the mirror,
+    """Use of the left-right symmetry of robot and task. `construction`: the networks commute with the mirror,
     exactly, with half the multiplications. `augment`: dense networks that also see mirror images of their samples.
     `none`: early learning takes twice the steps."""
     mirror_gap: float = Field(default=3.0, gt=0)

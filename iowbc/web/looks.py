@@ -1,4 +1,4 @@
-"""What the page draws of a scene: the shapes of the bodies, for the eye."""
+"""The page's drawing of a scene: the shapes of the bodies, for the eye."""
 
 from typing import Any
 

@@ -28,12 +28,12 @@ FIELDS = (
     *("geom_size", "geom_friction", "geom_rbound", "geom_aabb", "site_pos", "site_quat"),
     *("actuator_gainprm", "actuator_biasprm"),
 )
-"""What of the model is written in full precision."""
+"""Arrays of the model that are written in full precision."""
 STILL = ("partner_share", "impulse_scale", "push_scale", "noise_scale")
 """Quantities of an episode that are zero on the page: nobody helps or pushes, and sensors tell the truth."""
 ABOVE = 1e-6
-"""How far the robot begins above the ground [m]: which corners of soles touch that lie exactly on it is a matter of the
-last bit, and the browser's differs."""
+"""Height above the ground at which the robot begins [m]: which corners of soles touch that lie exactly on it is a
+matter of the last bit, and the browser's differs."""
 HEAVIEST = 1.5
 """Mass to which the page's slider goes, as a part of the object's nominal one (Table I: to 150 %)."""
 
@@ -57,7 +57,7 @@ def accepted(recipe: Recipe) -> list[tuple[str, float]]:
 
 
 def _playable(scene: Scene) -> bool:
-    """Whether the page can simulate and draw a scene; it draws no meshes."""
+    """True where the page can simulate and draw a scene; it draws no meshes."""
     return scene.kind in KINDS and (scene.object is None or scene.object.mesh is None)
 
 
@@ -164,7 +164,7 @@ def _fields(world: World) -> dict[str, list[float]]:
 
 
 def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
-    """What the hands do beside their connection to the object, or the contact with it."""
+    """Actions of the hands beside their connection to the object, or the contact with it."""
     grasp, layout, model = scene.grasp, world.layout, world.model
     compliant = grasp.kind == "compliant"
     places = np.arange(model.nsite)[layout.grips] if layout.palms is None else layout.palms

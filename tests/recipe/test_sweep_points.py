@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iowbc.errors import RecipeError
-from iowbc.recipe.reading import sweep as reading
+from iowbc.recipe import sweep as reading
 from iowbc.recipe.sweep import Sweep, load_sweep
 
 

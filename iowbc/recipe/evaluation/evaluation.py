@@ -1,4 +1,4 @@
-"""What is evaluated: the suites of trials, their world, and what counts as success."""
+"""Evaluation: the suites of trials, their world, and the films of them."""
 
 from typing import Annotated, Literal, Self
 
@@ -38,7 +38,7 @@ class TrialScene(Section):
     wrists: tuple[float, float, float]
     """Base grasp: left wrist from the pelvis, heading frame [m]; as an entry of `task.references.grasps`."""
     load: float | None = Field(default=0.0, ge=0.0)
-    """What the arms expect to carry [kg], as an entry of `task.references.loads`; empty takes that of `lift`."""
+    """Load that the arms expect to carry [kg], as an entry of `task.references.loads`; empty takes that of `lift`."""
 
 
 BESIDE = 0.035
@@ -62,8 +62,8 @@ class Evaluation(Section):
     """Trials of the trained policy."""
 
     policy: Literal["student", "teacher", "model"] = "student"
-    """What acts: the deployable student, the teacher with its privileged observation, or the quadratic program of
-    `model`, which nothing is trained for."""
+    """The acting policy: the deployable student, the teacher with its privileged observation, or the quadratic program
+    of `model`, which nothing is trained for."""
     model: ModelBased = Field(default=ModelBased(), json_schema_extra=LATER)
     """The model-based rival: tasks and limits of its quadratic program."""
     label: str = Field(default="IO-WBC", min_length=1, max_length=200, json_schema_extra=COSMETIC)
@@ -148,5 +148,5 @@ class Evaluation(Section):
 
     @property
     def measured(self) -> bool:
-        """Whether there are trials whose errors are measured: a probe has none."""
+        """True where there are trials whose errors are measured: a probe has none."""
         return any((self.sweeps, self.heavy, self.stagnation, self.robustness, self.compliance, self.map))

@@ -16,7 +16,7 @@ class Segment(Section):
     """A stretch of a command sequence; the command moves to these values over `ramp` and then holds."""
 
     duration: float = Field(gt=0, le=600)
-    """How long the segment lasts, its ramp included [s]."""
+    """Length of the segment, its ramp included [s]."""
     ramp: float = Field(default=0.5, ge=0)
     """Time over which the command moves linearly from the previous segment's values [s]."""
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)

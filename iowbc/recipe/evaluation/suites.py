@@ -15,7 +15,7 @@ PartnerShare = Annotated[float, Field(ge=-1, le=1)] | None
 
 
 class Beyond(Section):
-    """How a sweep goes on past its last mass, until nothing survives."""
+    """Continuation of a sweep past its last mass, until nothing survives."""
 
     step: float = Field(default=2.0, gt=0)
     """Mass added at a time [kg]."""
@@ -24,7 +24,7 @@ class Beyond(Section):
 
 
 class WithShare(Section):
-    """What a sweep does otherwise where the partner has a certain share."""
+    """Deviations of a sweep where the partner has a certain share."""
 
     partner_share: float = Field(ge=-1, le=1)
     """The share, one of the sweep's."""
@@ -95,7 +95,7 @@ class Case(Section):
     """Command sequence of this case; empty takes `eval.sequence`, or else `eval.scripts`, or else that of lifting or
     pushing."""
     repetitions: int = Field(default=1, ge=1)
-    """How often the sequence is played in a row; drawn scripts differ from one to the next."""
+    """Times that the sequence is played in a row; drawn scripts differ from one to the next."""
 
 
 class HeavyCase(Case):
@@ -155,7 +155,8 @@ class PushLadder(Section):
 
 
 class Robustness(Section):
-    """What the paper does not try: conditions outside of the training's, long trials, pushes until the robot falls."""
+    """Trials that the paper does not have: conditions outside of the training's, long trials, pushes until the robot
+    falls."""
 
     cases: tuple[Case, ...] = (
         Case(name="nominal"),
@@ -273,7 +274,7 @@ class Compliance(Section):
     partner_shares: tuple[float, ...] = Field(default=(0.5,), min_length=1)
     """Parts of the weight that the partner bears."""
     behaviours: tuple[str, ...] = BEHAVIOURS
-    """How the partner behaves, a case each; the last two are never trained with."""
+    """Behaviours of the partner, a case each; the last two are never trained with."""
     trials: int | None = Field(default=None, ge=1, le=10_000)
     """Trials of each case; empty takes `eval.trials`."""
     sequence: tuple[Segment, ...] = ()

@@ -51,7 +51,7 @@ IMPLICIT = (
         list("-+.0123456789"),
     ),
 )
-"""What bare words are that are no text: tag, pattern, and the characters that they begin with."""
+"""Bare words that are no text: tag, pattern, and the characters that they begin with."""
 for _tag, _pattern, _first in IMPLICIT:
     _Loader.add_implicit_resolver(_tag, _pattern, _first)
 
@@ -101,7 +101,7 @@ def _limit_depth(text: str, place_of: PlaceOf) -> None:
 
 
 def _is_tab(text: str, mark: yaml.Mark) -> bool:
-    """Whether a mark of PyYAML's stands at a tab."""
+    """True where a mark of PyYAML's stands at a tab."""
     lines = text.splitlines()
     return mark.line < len(lines) and lines[mark.line][mark.column : mark.column + 1] == "\t"
 

@@ -67,7 +67,7 @@ class LoadedRecipe:
     """Place of each value that a file or an override wrote, by dotted path."""
 
     def place(self, path: str) -> str:
-        """Where the value at a dotted path was written (`file:line:column`, `--set ...`), or `default`."""
+        """Place where the value at a dotted path was written (`file:line:column`, `--set ...`), or `default`."""
         parts = path.split(".")
         for length in range(len(parts), 0, -1):
             found = self.places.get(".".join(parts[:length]))
@@ -149,7 +149,8 @@ def read_text(file: str, place: str) -> str:
 
 
 def _listed(missing: Path) -> str:
-    """What there is instead: the files beside it, where one with an ending was asked for, and recipes by name."""
+    """Alternatives to a missing file: the files beside it, where one with an ending was asked for, and recipes by
+    name."""
     folder, with_ending = missing.parent, missing.suffix in SUFFIXES
     beside = sorted(found.name for found in folder.glob("*.yaml")) if with_ending and folder.is_dir() else []
     elsewhere = list(dict.fromkeys(found.name for found in known_files() if found.parent != folder))

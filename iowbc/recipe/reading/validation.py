@@ -18,7 +18,7 @@ LARGEST_NUMBER = 1e12
 """No quantity, size or count of a recipe is larger."""
 
 SEVERAL = re.compile(r"[^,],[^,]|\d\.\.\d")
-"""What reads as more than one value: `1,2` or `0..4`."""
+"""Text that reads as more than one value: `1,2` or `0..4`."""
 
 
 def validate(tree: Located) -> Recipe:

@@ -16,7 +16,7 @@ BEHAVIOURS = (*TRAINED, "tugging", "lagging")
 
 
 class Behaviours(Section):
-    """How often a partner behaves in which way; only the proportions matter. An absent partner has the share 0."""
+    """Shares of the behaviours of a partner; only the proportions matter. An absent partner has the share 0."""
 
     path: float = Field(default=1.0, ge=0.0)
     """Follows the commanded motion and height from where the episode began, wherever the robot is."""

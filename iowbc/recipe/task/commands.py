@@ -10,7 +10,7 @@ Vector = tuple[float, float, float]
 
 
 class CommandRates(Section):
-    """How fast a command may change; a new value is approached at this rate."""
+    """Rate limits of a command; a new value is approached at this rate."""
 
     velocity: float = Field(default=1.0, gt=0.0)
     """Change of the planar velocity, per axis [m/s²]."""

@@ -32,10 +32,10 @@ class OwnPart(OwnFunction):
 
 
 class Observation(Section):
-    """What policy and teacher see."""
+    """Observations of policy and teacher."""
 
     observe_object: bool = True
-    """Whether s_t contains the object's pose and rates in the base frame (eq. 5); otherwise teacher and student have
+    """Puts into s_t the object's pose and rates in the base frame (eq. 5); otherwise teacher and student have
     proprioception alone. `distill.observe_object` is for the student."""
     own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnPart] = Field(
         default_factory=dict, json_schema_extra=LATER
@@ -69,7 +69,7 @@ class Termination(Section):
 
 
 class SceneShares(NamedEntries):
-    """Which part of the environments plays which scene of `simulation.scenes`; only the proportions matter."""
+    """Part of the environments that plays each scene of `simulation.scenes`; only the proportions matter."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.1, ge=0.0)
@@ -107,11 +107,11 @@ class Task(Section):
     commands: Commands = Commands()
     """The 11-D skill-level command and how it is drawn."""
     references: References = References()
-    """How a command becomes joint references: base grasp, arm kinematics, reference generator, gait prior."""
+    """Joint references that follow from a command: base grasp, arm kinematics, reference generator, gait prior."""
     action: Action = Action()
     """The residual action."""
     observation: Observation = Observation()
-    """What policy and teacher see."""
+    """Observations of policy and teacher."""
     reward: Reward = Reward()
     """Terms and weights of the reward."""
     termination: Termination = Termination()
