@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, ValidationError, model_validator
+from pydantic import Field, JsonValue, ValidationError, model_validator
 
 from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document, read_value
@@ -27,40 +27,6 @@ MOST_VALUES = 10_000
 """Values of one axis at most."""
 MOST_POINTS = 1_000
 """Points of a sweep at most, unless more are asked for: planning one takes some 10 ms and 200 kB."""
-
-
-class Range(Section):
-    """Evenly spaced numbers, both ends among them."""
-
-    start: int | float
-    """The first value."""
-    stop: int | float
-    """No value is greater."""
-    step: PositiveInt | PositiveFloat = 1
-    """Distance of two neighbours."""
-
-    @model_validator(mode="after")
-    def _few(self) -> Self:
-        if self.stop < self.start:
-            raise ValueError(f"stop {self.stop} comes before start {self.start}")
-        try:
-            few = self._count <= MOST_VALUES
-        except (OverflowError, ValueError):  # of infinitely many, and of numbers whose distance is none
-            few = False
-        if not few:
-            raise ValueError(
-                f"step {self.step} makes more than {MOST_VALUES:,} values from {self.start} to {self.stop}"
-            )
-        return self
-
-    @property
-    def _count(self) -> int:
-        return math.floor((self.stop - self.start) / self.step + 1e-9) + 1
-
-    def values(self) -> list[JsonValue]:
-        """The numbers, in order; integers where all three are."""
-        found = [self.start + place * self.step for place in range(self._count)]
-        return [value if isinstance(value, int) else float(f"{value:.12g}") for value in found]
 
 
 class Drawn(Section):
@@ -120,9 +86,8 @@ class SweepFile(Section):
     """Name of the sweep; the file's name when empty."""
     description: str = ""
     """Purpose of the sweep, in a sentence."""
-    grid: Mapping[str, Sequence[JsonValue] | Range] = {}
-    """Values by dotted path of the recipe: a list, or a range with `start`, `stop` and `step`; an item `0..4` of a list
-    stands for the integers 0 to 4."""
+    grid: Mapping[str, list[JsonValue]] = {}
+    """Values by dotted path of the recipe; `0..4` stands for the integers 0 to 4."""
     draws: RandomDraws | None = None
     """Values that are drawn at random."""
 
@@ -258,10 +223,8 @@ def _items(text: str, place: str) -> list[JsonValue]:
     return list(found) if isinstance(found, list) else []
 
 
-def _expanded(values: Sequence[JsonValue] | Range, place: str) -> list[JsonValue]:
+def _expanded(values: Sequence[JsonValue], place: str) -> list[JsonValue]:
     """The values of an axis, `0..4` written out, without repetitions. Raises `RecipeError`."""
-    if isinstance(values, Range):
-        return values.values()
     found: list[JsonValue] = []
     for value in values:
         ends = INTEGERS.fullmatch(value) if isinstance(value, str) else None
