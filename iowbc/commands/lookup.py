@@ -184,8 +184,7 @@ def _recorded(file: Path, key: str) -> list[str]:
 
 def members_of(word: str) -> tuple[str, ...]:
     """Names of the recipes that a study names; of anything else none. Raises `RecipeError`."""
-    study = load_study(word) if os.path.isfile(recipe_file(word)) else None
-    return () if study is None else tuple(variant.recipe.name for variant in study.variants)
+    return tuple(one.recipe.name for one in load_study(word)) if os.path.isfile(recipe_file(word)) else ()
 
 
 def film_of(runs: Runs, words: Sequence[str]) -> Path | None:

@@ -54,15 +54,12 @@ class Request:
 
 def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
     """The recipe of a request, or, of a recipe of recipes, all that it names. Raises `RecipeError`."""
-    study = load_study(request.word, request.overrides)
-    if study is None:
-        return (load_recipe(request.word, request.overrides),)
-    if request.options.force:
-        text = "names a stage of each variant, which they may share; force it in one of them: " + ", ".join(
-            str(variant.file) for variant in study.variants
-        )
+    variants = load_study(request.word, request.overrides)
+    if variants and request.options.force:
+        files = ", ".join(str(variant.file) for variant in variants)
+        text = f"names a stage of each variant, which they may share; force it in one of them: {files}"
         raise RecipeError([Problem(f"--force {min(request.options.force)}", text)])
-    return study.variants
+    return variants or (load_recipe(request.word, request.overrides),)
 
 
 def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:

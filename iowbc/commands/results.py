@@ -1,7 +1,7 @@
 """Results of a run: films, chosen metrics, tables, the next commands; and an evaluation with its policy."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,9 +72,9 @@ def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]
     return [(name, metrics[name]) for name in (chosen or list(metrics))[:METRICS_SHOWN]]
 
 
-def described(artifacts: Mapping[str, Artifact]) -> str:
-    """The main tables of a run in Markdown."""
-    found = [path for artifact in artifacts.values() for path in (artifact.folder / "tables").glob("*.md")]
+def main_tables(folders: Iterable[Path]) -> str:
+    """The main tables in the folders of artifacts or of a comparison, in Markdown."""
+    found = [path for folder in folders for path in (folder / "tables").glob("*.md")]
     chosen = sorted((path for path in found if path.stem in TABLES), key=_rank)
     return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in chosen)
 

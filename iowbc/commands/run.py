@@ -12,7 +12,7 @@ from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.request import Request, in_order, prepared, recipes
-from iowbc.commands.results import TABLES, described, print_results
+from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
@@ -69,7 +69,7 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
     """Compare the recipes of a recipe of recipes, film them side by side, and tell MLflow where that is new."""
     store, name = Store(request.runs), Path(request.word).stem
     words, output = [one.recipe.name for one in loaded], request.runs.compared / name
-    before = joined_text(output)
+    before = _report_of(output)
     compare(store, console, words, output)
     try:
         film = film_together(store, console, words, output)
@@ -78,18 +78,17 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
         tell(console, f"no film: {reason}")
     if film is not None:
         tell(console, shown_path(film))
-    told = joined_text(output)
+    told = _report_of(output)
     if told != before and loaded[0].recipe.execution.track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
         record_figures(request.runs, f"compare-{name}", {}, told, files)
     tell(console, f"next:\n  iowbc report {name}")
 
 
-def joined_text(folder: Path) -> str:
+def _report_of(folder: Path) -> str:
     """The main tables of a comparison in Markdown, and the metrics that differ."""
-    paths = [folder / "tables" / f"{name}.md" for name in (*TABLES, "differences")]
-    found = [path.read_text(encoding="utf-8") for path in (*paths, folder / "metrics.md") if path.is_file()]
-    return "\n".join(found)
+    metrics = folder / "metrics.md"
+    return main_tables([folder]) + (metrics.read_text(encoding="utf-8") if metrics.is_file() else "")
 
 
 @contextmanager
@@ -144,7 +143,7 @@ def run_recipe(
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE)
             if tracker is not None:
-                tracker.describe(described(runner.artifacts))
+                tracker.describe(main_tables(artifact.folder for artifact in runner.artifacts.values()))
         except PipelineFailed as error:
             status, ending = "FAILED", RunEnding(STAGE_FAILED, str(error).splitlines()[0])
             closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"

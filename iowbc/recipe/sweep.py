@@ -156,7 +156,7 @@ def load_sweep(
     drawn = described.draws.points() if described.draws is not None else [{}]
     drawn = [{path: value for path, value in point.items() if path not in grid} for point in drawn]
     axes = tuple(dict.fromkeys((*grid, *drawn[0])))
-    if axes or load_study(word) is None:
+    if axes or not load_study(word):
         _require_axes(axes, file)
     count = len(drawn)
     for values in grid.values():
@@ -178,12 +178,10 @@ def load_sweep(
 def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) -> list[Point]:
     """The point of a recipe, or those of the variants that a study names."""
     overrides = (*fixed, *(f"{path}={written(value)}" for path, value in settings.items()))
-    study = load_study(word, overrides)
-    if study is None:
+    variants = load_study(word, overrides)
+    if not variants:
         return [_named(load_recipe(word, overrides), word, settings)]
-    return [
-        _named(variant, str(variant.file), {RECIPE_AXIS: variant.recipe.name, **settings}) for variant in study.variants
-    ]
+    return [_named(variant, str(variant.file), {RECIPE_AXIS: variant.recipe.name, **settings}) for variant in variants]
 
 
 def _named(loaded: LoadedRecipe, word: str, settings: Mapping[str, JsonValue]) -> Point:
