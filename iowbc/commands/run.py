@@ -86,9 +86,9 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
 
 
 def _report_of(folder: Path) -> str:
-    """The main tables of a comparison in Markdown, and the metrics that differ."""
-    metrics = folder / "metrics.md"
-    return main_tables([folder]) + (metrics.read_text(encoding="utf-8") if metrics.is_file() else "")
+    """The main tables of a comparison in Markdown, the paired differences, and the metrics that differ."""
+    others = [path for path in (folder / "tables" / "differences.md", folder / "metrics.md") if path.is_file()]
+    return "\n".join([main_tables([folder]), *(path.read_text(encoding="utf-8") for path in others)])
 
 
 @contextmanager
