@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from iowbc.errors import StageFailed
 from iowbc.learning.checkpoint import Arrays, prefixed, under
-from iowbc.recipe.check import Check
+from iowbc.recipe.teacher import Check
 
 
 class Best:

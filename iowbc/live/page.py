@@ -10,8 +10,7 @@ import viser
 from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.live.drawing import Drawing
-from iowbc.live.figures import figures
-from iowbc.live.panel import LIVE, PAST, ControlPanel
+from iowbc.live.panel import LIVE, PAST, ControlPanel, figures
 from iowbc.live.session import Pushed, Session
 from iowbc.live.track import Track, played_again, trial_titles
 

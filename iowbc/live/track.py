@@ -15,7 +15,7 @@ from iowbc.evaluation.trials.load import load_metrics
 from iowbc.evaluation.trials.rollout import RECORDED, play_in, trace_of
 from iowbc.evaluation.trials.table import replayed
 from iowbc.live.moment import Moment, Witness
-from iowbc.recipe.evaluation.success import Success
+from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 

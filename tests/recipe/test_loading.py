@@ -12,9 +12,9 @@ from processor_time import yardsticks
 
 from iowbc.errors import RecipeError
 from iowbc.pipeline.store.runs import read_yaml
+from iowbc.recipe.reading.document import as_yaml
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
-from iowbc.recipe.reading.writing import as_yaml
 from iowbc.recipe.simulation.simulation import SimulationSettings
 
 RECIPES = Path(__file__).parents[2] / "recipes"

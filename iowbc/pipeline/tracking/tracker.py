@@ -22,8 +22,8 @@ from iowbc.pipeline.tracking.delivery import tracking_uri
 from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
 from iowbc.processes import SINGLE_THREADED
 from iowbc.recipe.execution import Execution
+from iowbc.recipe.reading.document import as_yaml
 from iowbc.recipe.reading.loading import LoadedRecipe
-from iowbc.recipe.reading.writing import as_yaml
 
 PARENT = "recipe"
 """Identifier of the parent run within a journal; a nested run has its stage's name."""

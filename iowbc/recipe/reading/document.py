@@ -1,4 +1,4 @@
-"""A YAML file as a tree that remembers where each value stands."""
+"""A YAML file as a tree that remembers where each value stands, and a resolved recipe as YAML."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import yaml
+from pydantic import BaseModel
 
 from iowbc.errors import Problem, RecipeError, shown
 
@@ -205,3 +206,16 @@ def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
         yield path, tree
     for name, entry in entries:
         yield from leaves(entry, (*path, name))
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Puts in quotes what any version of YAML reads as something else than text: PyYAML alone leaves `1e3` bare."""
+
+
+for _tag, _pattern, _first in IMPLICIT:
+    _Dumper.add_implicit_resolver(_tag, _pattern, _first)
+
+
+def as_yaml(recipe: BaseModel) -> str:
+    """Every field with its value, in the order of the recipe's sections."""
+    return str(yaml.dump(recipe.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False))
