@@ -49,7 +49,7 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_j
     planners = list(longest.values())
     if as_json:
         names = [planner.loaded.recipe.name for planner in planners]
-        steps = [[_data(step) for step in planner.plan()] for planner in planners]
+        steps = [[step_data(step) for step in planner.plan()] for planner in planners]
         print_json(console, [{"recipe": name, "stages": own} for name, own in zip(names, steps, strict=True)])
     elif len(planners) == 1:
         _print(planners[0].plan(), console)
@@ -175,7 +175,7 @@ def _described(step: Step) -> Text:
     return Text.assemble(("run", "bold yellow"), takes)
 
 
-def _data(step: Step) -> dict[str, Any]:
+def step_data(step: Step) -> dict[str, Any]:
     """The step for other programs."""
     return {
         "stage": step.stage.name,

@@ -53,7 +53,7 @@ class Request:
 
 
 def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
-    """The recipe of a request, or, of a recipe of recipes, all that it names. Raises `RecipeError`."""
+    """The recipe of a request, or all variants of the study that it names. Raises `RecipeError`."""
     variants = load_study(request.word, request.overrides)
     if variants and request.options.force:
         files = ", ".join(str(variant.file) for variant in variants)

@@ -37,7 +37,7 @@ Manner = Literal["usual", "quiet", "verbose"]
 def run(request: Request, registry: Mapping[str, Stage], console: Console, manner: Manner = "usual") -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
 
-    Of a recipe of recipes each is run, in order, up to the first that does not end; then they are compared.
+    The variants of a study run in order, up to the first that does not end; then they are compared.
     """
     loaded = recipes(request)
     ready = [prepared(one, request, registry) for one in loaded]
@@ -66,7 +66,7 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
 
 
 def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: Console) -> None:
-    """Compare the recipes of a recipe of recipes, film them side by side, and tell MLflow where that is new."""
+    """Compare the variants of a study, film them side by side, and tell MLflow where that is new."""
     store, name = Store(request.runs), Path(request.word).stem
     words, output = [one.recipe.name for one in loaded], request.runs.compared / name
     before = _report_of(output)

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from iowbc.commands.lookup import named, record_sweep
 from iowbc.commands.needs import require_training
-from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned
+from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import print_json, shown_path, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
@@ -114,16 +114,7 @@ def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Cons
 
 def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
     """A planned point for other programs."""
-    stages = [
-        {
-            "stage": stage.step.stage.name,
-            "cached": stage.step.cached,
-            "shared_with": stage.shared_with or None,
-            "key": stage.step.key,
-            "expected_seconds": None if stage.step.cached or stage.shared_with else stage.step.expected,
-        }
-        for stage in own
-    ]
+    stages = [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 

@@ -4,10 +4,10 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Width
 
 
-class Distillation(Section):
+class Distillation(Encoder):
     """On-policy distillation of the teacher into the student."""
 
     steps: int = Field(default=4_000_000, ge=1, le=10**12)
@@ -18,14 +18,6 @@ class Distillation(Section):
     """Control steps between two rounds of gradient steps."""
     history: int = Field(default=25, ge=1, le=1000)
     """Length of the observation history H_t (paper Table I)."""
-    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
-    """Network that turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
-    recurrent unit. Where the teacher is symmetric by construction, so is the student: the encoder has half the latent's
-    size and reads the history and its mirror image."""
-    frame_features: int = Field(default=32, ge=1, le=16_384)
-    """Features to which one observation of the history is projected, with the same weights for all."""
-    latent: int = Field(default=64, ge=1, le=16_384)
-    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
     experts: dict[str, ArtifactName] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """By scene: the recipe whose teacher the student follows there, or a key as in `teacher.start`. Empty follows this
     recipe's own teacher everywhere. What the experts are is part of the key, not what they are called."""

@@ -3,7 +3,7 @@
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 from pydantic.fields import FieldInfo
@@ -86,6 +86,19 @@ class NamedEntries(Section):
             if hasattr(type(self), name):
                 raise ValueError(f"{name!r} is a word that sections have a use of their own for; take another")
         return self
+
+
+class Encoder(Section):
+    """A network that turns the observation history H_t into a latent."""
+
+    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
+    """Network that turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
+    recurrent unit. Where the teacher is symmetric by construction, so is the student: the encoder has half the latent's
+    size and reads the history and its mirror image."""
+    frame_features: int = Field(default=32, ge=1, le=16_384)
+    """Features to which one observation of the history is projected, with the same weights for all."""
+    latent: int = Field(default=64, ge=1, le=16_384)
+    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
 
 
 class Unfitting(ValueError):

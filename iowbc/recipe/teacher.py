@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width, in_order
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Section, Width, in_order
 from iowbc.recipe.simulation.holding import ObjectScene
 
 STAND_WALK_TURN = (
@@ -70,17 +70,11 @@ LARGEST_UPDATE = 10_000_000
 """Samples that are kept in memory for one update."""
 
 
-class HistoryNetwork(Section):
+class HistoryNetwork(Encoder):
     """The student's network as PPO trains it, without a teacher (the paper's "w/o distillation")."""
 
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
-    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
-    """Network that turns the history into a latent; see `distill.encoder`."""
-    frame_features: int = Field(default=32, ge=1, le=16_384)
-    """Features to which one observation of the history is projected, with the same weights for all."""
-    latent: int = Field(default=64, ge=1, le=16_384)
-    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
 
 
 class Restart(Section):
