@@ -86,10 +86,8 @@ class Page:
             elif button == "reset":
                 self._reset()
             elif self._showing == LIVE:
-                self._push("robot" if button == "push robot" else "object")
-
-    def _push(self, what: Pushed) -> None:
-        self.session.push(what, self.panel.direction.value, self.panel.impulse.value)
+                what: Pushed = "robot" if button == "push robot" else "object"
+                self.session.push(what, self.panel.direction.value, self.panel.impulse.value)
 
     def _pause(self, paused: bool) -> None:
         self.paused = paused
@@ -118,16 +116,15 @@ class Page:
         else:
             row = self._evaluated.trials.iloc[self._trials.index(title)]
             try:
-                self.track = played_again(self._evaluated, row, lambda: self._left(title), self._tell)
+                self.track = played_again(
+                    self._evaluated, row, lambda: bool(self.panel.showing.value != title), self._tell
+                )
             except Interrupted:
                 return
             time_slider.min, time_slider.max = 0.0, max(self.track.end, self.track.period)
         self._showing, self._cursor = title, 0.0
         self._slide(0.0)
         self._pause(False)
-
-    def _left(self, title: str) -> bool:
-        return bool(self.panel.showing.value != title)
 
     def _tell(self, seconds: float) -> None:
         self.panel.status.content = f"Plays the trial again: {seconds:.0f} s"

@@ -131,10 +131,6 @@ class ControlPanel:
         """The command that the sliders ask for, (11,)."""
         return np.array([slider.value for slider in self._command])
 
-    def set_command(self, name: str, value: float) -> None:
-        """Moves the slider of an entry of the command, one of `COMMAND`."""
-        self._command[COMMAND.index(name)].value = value
-
     @property
     def conditions(self) -> PlayRequest:
         """The episode that is asked for."""

@@ -67,14 +67,14 @@ def test_a_ramp_longer_than_its_segment_is_refused() -> None:
 
 @pytest.mark.parametrize("height", [0.1, 1.2])
 def test_a_height_out_of_reach_is_refused(height: float) -> None:
-    with pytest.raises(ValidationError, match=r"never reaches a height of .* give 0.3 to 1 m"):
+    with pytest.raises(ValidationError, match=r"height\n.*(greater than or equal to 0.3|less than or equal to 1)"):
         Segment(duration=1.0, height=height)
     assert Segment(duration=1.0, height=0.3).height == 0.3
 
 
 @pytest.mark.parametrize("offset", [0.6, -3.0])
 def test_wrists_out_of_reach_are_refused(offset: float) -> None:
-    with pytest.raises(ValidationError, match=r"never reach an offset of .* give -0.5 to 0.5 m"):
+    with pytest.raises(ValidationError, match=r"wrists.4\n.*(greater than or equal to -0.5|less than or equal to 0.5)"):
         Segment(duration=1.0, wrists=(0, 0, 0, 0, offset, 0))
     assert Segment(duration=1.0, wrists=(0, 0, 0, 0, 0, -0.5)).wrists[5] == -0.5
 

@@ -70,7 +70,7 @@ def test_a_slider_changes_the_command_in_force(page: Page) -> None:
     clock = Clock(page)
     clock.run(0.1)
     assert page.track.moments[-1].command[0] == 0.0
-    page.panel.set_command("v_x", 0.2)
+    page.panel._command[0].value = 0.2
     clock.run(0.4)
     assert page.track.moments[-1].command[0] == pytest.approx(0.2)
 
