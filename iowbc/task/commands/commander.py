@@ -1,4 +1,4 @@
-"""Where commands come from: drawn goals in training, scripts in trials; rate-limited, clamped to what is feasible."""
+"""Commands: drawn goals in training, scripts in trials, or a user's; rate-limited, clamped to what is feasible."""
 
 from collections.abc import Sequence
 
@@ -39,9 +39,10 @@ class Commander:
         self._given: Array | None = None
 
     def steer(self, wanted: Array) -> None:
-        """Follow a command that somebody gives, (11,), in place of all scripts; it may be changed in place. Episodes
-        begin in its posture, standing."""
+        """Follow commands that somebody gives, (11,) or (n, 11), in place of drawn and scripted ones; they may be
+        changed in place. Episodes begin in their posture, standing."""
         self._given = wanted
+        self.scripted[:], self._drawn[:], self._any_script = True, False, True
 
     def start(self, which: Indices, memory: Memory, key: Keys) -> None:
         """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
