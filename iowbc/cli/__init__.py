@@ -9,15 +9,12 @@ from typing import Annotated
 
 import typer
 
-from iowbc.cli.comparing import compare, diff, report, ui
-from iowbc.cli.listing import gc, list_, show, status
+from iowbc.cli.listing import compare, diff, gc, list_, report, show, status, ui
 from iowbc.cli.measuring import bench_control, bench_reference, bench_simulation, bench_training
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
-from iowbc.commands.ending import leave
-from iowbc.commands.streams import let_go, prepare_streams
-from iowbc.commands.unexpected import described
+from iowbc.commands.process import described, leave, let_go, prepare_streams
 from iowbc.processes import name_glfw
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -72,7 +69,7 @@ def _options(
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """What comes before a command."""
+    """Options that come before a command."""
 
 
 for name, command in COMMANDS.items():

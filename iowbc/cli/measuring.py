@@ -55,6 +55,6 @@ def bench_control(
     steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
 ) -> None:
     """Measure how long a control step of an exported controller takes on one thread, without torch or a simulator."""
-    from iowbc.commands.bench_control import control
+    from iowbc.commands.bench import control
 
     control(what, steps)

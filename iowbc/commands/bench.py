@@ -1,9 +1,12 @@
-"""`iowbc bench`: the speed of this machine; the figures go to MLflow."""
+"""`iowbc bench`: the speed of this machine; figures of training and simulation go to MLflow."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from iowbc.commands.training import require_training
+import numpy as np
+
+from iowbc.commands.needs import require_training
+from iowbc.deploy.timing import step_seconds
 from iowbc.errors import require_known
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.tracker import record_figures
@@ -38,6 +41,16 @@ def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
     from iowbc.benchmarks import reference
 
     record_figures(runs, "bench-rg", reference.main(recipe, workers=tuple(workers)))
+
+
+def control(what: str, steps: int) -> None:
+    """Measure and print the time of a control step, with nothing loaded but what a robot's computer has. Raises
+    ContractBroken where there is no exported controller."""
+    print(f"{what}: {steps:,} control steps of one robot on one thread")
+    print(f"{'':16}{'median':>12}{'99th percentile':>18}{'longest':>12}")
+    for name, taken in zip(("time", "processor time"), 1e3 * step_seconds(what, steps).T, strict=True):
+        median, late, longest = (f"{value:.3f} ms" for value in np.quantile(taken, (0.5, 0.99, 1.0)))
+        print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
 
 
 def _recipe(runs: Runs, file: Path | None, scene: str | None = None) -> Recipe | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.partner import BEHAVIOURS
-from iowbc.recipe.simulation.partner import Partner as Recipe
+from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY

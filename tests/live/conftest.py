@@ -41,7 +41,7 @@ def opened(source: Source) -> Iterator[Session]:
 @pytest.fixture
 def session(opened: Session) -> Session:
     """At the start of an episode with 4 kg, told to stand, let alone."""
-    opened.helm.wanted[:] = nominal_command(opened.source.world.recipe.task.commands)
+    opened.wanted[:] = nominal_command(opened.source.world.recipe.task.commands)
     opened.pull("robot", np.zeros(3))
     opened.pull("object", np.zeros(3))
     opened.begin(PlayRequest(mass=4.0)) if opened.request.mass != 4.0 else opened.reset()

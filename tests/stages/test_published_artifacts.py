@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
-from iowbc.commands.named import named
+from iowbc.commands.lookup import named
 from iowbc.commands.play import playable
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller

@@ -1,21 +1,61 @@
-"""What a command prints to: any character can be written, and a run goes on when nobody can read it any more."""
+"""A command as a process: exit codes, signals outside of a run, output streams, unexpected errors."""
 
 import errno
 import io
 import os
+import shlex
+import signal
 import sys
-from collections.abc import Iterator
+import tempfile
+import traceback
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, TextIO
 
-from iowbc.full_disk import FULL
+from iowbc.full_disk import FULL, nothing_fits, what_is_full
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
+"""Exit codes."""
+IMPORTS = "importlib._bootstrap"
+"""Module whose code is on the stack while a module is being read."""
 GONE = (errno.EIO, errno.EPIPE, *FULL)
 """Errors of a terminal or reader that has gone away, and of a file that takes no more."""
 STANDARD_OUTPUT = 1
+
+
+@dataclass(frozen=True)
+class RunEnding:
+    """Exit code of one run."""
+
+    code: int
+    failure: str = ""
+    """The stage that failed and the reason, in a line; empty where none did."""
+
+
+def close_on_termination() -> None:
+    """From now on a termination, or a lost terminal, closes what is open, as Ctrl-C does."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.getsignal(signal.SIGINT))
+
+
+def leave(number: int, frame: FrameType | None) -> None:
+    """End the command: by `SystemExit`, so that what is open is closed.
+
+    While a module is being read that would reach its caller as an error of that module, if at all; then the process
+    ends at once.
+    """
+    while frame is not None:
+        if frame.f_globals.get("__name__") == IMPORTS:
+            os._exit(INTERRUPTED)
+        frame = frame.f_back
+    sys.exit(INTERRUPTED)
 
 
 def prepare_streams() -> None:
@@ -75,3 +115,21 @@ def _lead_to_nowhere(descriptor: int) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)
+
+
+def described(error: Exception, arguments: Sequence[str]) -> str:
+    """The message of an unexpected error: one sentence, the place of the details, and the next command. Needs no disk:
+    where the details cannot be written they follow it."""
+    again = f"to go on: {shlex.join(['iowbc', *arguments])}"
+    if nothing_fits(error):
+        full = what_is_full(error, (Path("runs"), Path(os.environ.get("TMPDIR", "/tmp"))))
+        return f"no space is left: {full}; make some (`iowbc gc` removes what you name), and then\n{again}"
+    summary = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    details = "".join(traceback.format_exception(error))
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="iowbc-", suffix=".txt", delete=False, encoding="utf-8") as file:
+            file.write(details)
+        where = f"the details are in {file.name}"
+    except OSError:
+        where = f"the details could not be written:\n{details.rstrip()}"
+    return f"unexpected error: {summary}; {where}\n{again}"
