@@ -1,0 +1,153 @@
+"""A robot in MuJoCo that is driven by low-level commands alone, as the real one is.
+
+The world is the recipe's own, with its objects, sensors, delays and motor limits, at 1 kHz and with explicit PD control
+by the gains of each command.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from iowbc import counter_random as random
+from iowbc.arrays import Array
+from iowbc.onboard import messages
+from iowbc.onboard.machine import FREQUENCY
+from iowbc.onboard.messages import Record
+from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.robot import rotations
+from iowbc.robot.description import GRAVITY, Robot
+from iowbc.sim.simulation import Simulation
+from iowbc.twin.support import Support
+
+TIMESTEP = 0.001
+"""Physics step [s], and period of the motors' PD control."""
+MODEL = 5
+"""`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
+SILENCE = 0.1
+"""Time without commands after which the motors brake [s]; an assumption, for the drives' behaviour is not public."""
+CHARGE, WARM = 90, 35
+"""Battery [%] and motor temperature [°C] of a twin."""
+LYING_HEIGHT, LYING_TILT = 0.35, 1.2
+"""Pelvis height [m] below which, and tilt [rad] beyond which, the robot has fallen."""
+LATENCIES = ("action_latency", "sensor_latency", "object_latency")
+
+
+def at_bus_rate(recipe: Recipe, control_frequency: float) -> Recipe:
+    """The same world with a period of the bus in place of one of the policy; latencies keep their time."""
+    periods = round(FREQUENCY / control_frequency)
+    drawn = recipe.randomization
+    delays = {
+        name: (kind := getattr(drawn, name)).model_copy(
+            update={end: periods * getattr(kind, end) for end in ("low", "high", "nominal")}
+        )
+        for name in LATENCIES
+    }
+    randomization = drawn.model_copy(update={**delays, "longest_latency": periods * drawn.longest_latency})
+    physics = recipe.physics.model_copy(update={"timestep": TIMESTEP, "pd": "explicit"})
+    return recipe.model_copy(update={"physics": physics, "randomization": randomization})
+
+
+class Twin:
+    """A simulated robot: low-level commands in, low-level states out, a period of the bus at a time."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        recipe: Recipe,
+        control_frequency: float,
+        scene: str,
+        seed: int,
+        posture: Array,
+        support: Support,
+        fixed: dict[str, float],
+    ) -> None:
+        """`recipe` of the world; `posture` at the start, (joints,) [rad]; `fixed`: quantities that are not drawn."""
+        self.robot, self.support = robot, support
+        self._kd = robot.kd
+        held = {name: np.array([value]) for name, value in fixed.items()}
+        self.simulation = Simulation(
+            robot,
+            at_bus_rate(recipe, control_frequency),
+            envs=np.zeros(1, np.int64),
+            seed=seed,
+            scenes=(scene,),
+            fixed=held,
+            control_frequency=FREQUENCY,
+        )
+        world = self.simulation.worlds[0]
+        self._gain, self._bias = world.batch.expand("actuator_gainprm"), world.batch.expand("actuator_biasprm")
+        self._pull = world.batch.bind("xfrc_applied")[0, world.layout.torso]
+        self._torso, self._velocity = world.batch.bind("xpos")[0, world.layout.torso], world.batch.bind("qvel")
+        self.simulation.reset(np.zeros(1, np.int64), posture[None])
+        self._start = self._torso.copy()
+        self.periods = 0
+        self._silent = 0
+        self._command = messages.empty(messages.LOW_COMMAND)
+        self.rejected = 0
+        """Commands with a wrong checksum."""
+
+    def command(self, message: Record) -> None:
+        """Takes in a command; one with a wrong checksum is passed over, as by the robot."""
+        if messages.checksum(message) != message["crc"]:
+            self.rejected += 1
+            return
+        self._command, self._silent = message, 0
+
+    def step(self) -> None:
+        """A period of the bus."""
+        motors = self._command["motor_cmd"][: len(self.robot.joints)]
+        enabled = motors["mode"] == 1
+        kp, kd = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd"))
+        if self._silent > SILENCE * FREQUENCY and kp.any():
+            kp, kd = 0.0 * kp, self._kd
+        feed = np.where(enabled, motors["tau"] + kd * motors["dq"], 0.0)
+        self._drive(kp, kd, motors["q"] + feed / np.where(kp > 0.0, kp, np.inf))
+        self.periods += 1
+        self._silent += 1
+        self.support.advance(1.0 / FREQUENCY, bool((kp >= 0.99 * self.robot.kp).all()))
+        if self.support.rigid:
+            self.simulation.pause()
+            return
+        if self.support.just_released:
+            self.simulation.clock[:] = 0
+        self._pull[:3] = self.support.force(self._torso - self._start, self._velocity[0, :3])
+        self.simulation.step()
+
+    def _drive(self, kp: Array, kd: Array, target: Array) -> None:
+        """Gains of this period, times what the motors' own differ by, and targets without numbers as none."""
+        drawn, simulation = self.simulation.drawn, self.simulation
+        kp, kd = kp * drawn["kp_scale"][0], kd * drawn["kd_scale"][0]
+        self._gain[0, :, 0], self._bias[0, :, 1], self._bias[0, :, 2] = kp, -kp, -kd
+        simulation.target[0] = np.where(np.isfinite(target), target, simulation.target[0])
+
+    @property
+    def state(self) -> Record:
+        """The state that the robot sends."""
+        message, seen, truth = messages.empty(messages.LOW_STATE), self.simulation.measured, self.simulation.state
+        message["mode_machine"], message["tick"] = MODEL, round(1e3 * self.periods / FREQUENCY)
+        motors, imu = message["motor_state"][: len(self.robot.joints)], message["imu_state"]
+        motors["mode"], motors["temperature"] = 1, WARM
+        motors["q"], motors["dq"] = seen.joint_position[0], seen.joint_velocity[0]
+        motors["tau_est"] = truth.joint_torque[0]
+        gravity = seen.projected_gravity[0]
+        pitch = np.arctan2(gravity[0], np.hypot(gravity[1], gravity[2]))
+        roll, yaw = np.arctan2(-gravity[1], -gravity[2]), seen.heading[0, 0]
+        imu["quaternion"] = rotations.from_euler(roll, pitch, yaw)
+        imu["rpy"] = roll, pitch, yaw
+        imu["gyroscope"], imu["accelerometer"] = seen.base_angular_velocity[0], -GRAVITY * gravity
+        message["crc"] = messages.checksum(message)
+        return message
+
+    @property
+    def battery(self) -> Record:
+        """The battery state that the robot sends."""
+        message = messages.empty(messages.BATTERY_STATE)
+        message["soc"] = CHARGE
+        return message
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the robot lies."""
+        state = self.simulation.state
+        low = state.base_position[0, 2] < LYING_HEIGHT
+        return bool(low or state.base_rotation[0, 2, 2] < np.cos(LYING_TILT))
