@@ -17,7 +17,7 @@ from iowbc.recipe.simulation.simulation import Simulation as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.simulation import Simulation
-from iowbc.twin.support import Support
+from iowbc.twin.support import HOOK, Support
 
 TIMESTEP = 0.001
 """Physics step [s], and period of the motors' PD control."""
@@ -76,10 +76,11 @@ class Twin:
         )
         world = self.simulation.worlds[0]
         self._gain, self._bias = world.batch.expand("actuator_gainprm"), world.batch.expand("actuator_biasprm")
-        self._pull = world.batch.bind("xfrc_applied")[0, world.layout.torso]
-        self._torso, self._velocity = world.batch.bind("xpos")[0, world.layout.torso], world.batch.bind("qvel")
+        self._pull, self._centre, self._origin, self._frame = (
+            world.batch.bind(name)[0, world.layout.torso] for name in ("xfrc_applied", "xipos", "xpos", "xmat")
+        )
         self.simulation.reset(np.zeros(1, np.int64), posture[None])
-        self._start = self._torso.copy()
+        self._start = self._hook = self._hook_position()
         self.periods = 0
         self._silent = 0
         self._command = messages.empty(messages.LOW_COMMAND)
@@ -110,8 +111,14 @@ class Twin:
             return
         if self.support.just_released:
             self.simulation.clock[:] = 0
-        self._pull[:3] = self.support.force(self._torso - self._start, self._velocity[0, :3])
+        before, self._hook = self._hook, self._hook_position()
+        force = self.support.force(self._hook - self._start, FREQUENCY * (self._hook - before))
+        self._pull[:] = *force, *rotations.cross(self._hook - self._centre, force)
         self.simulation.step()
+
+    def _hook_position(self) -> Array:
+        place: Array = self._origin + self._frame.reshape(3, 3) @ HOOK
+        return place
 
     def _drive(self, kp: Array, kd: Array, target: Array) -> None:
         """Gains of this period, times what the motors' own differ by, and targets without numbers as none."""

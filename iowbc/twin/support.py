@@ -6,14 +6,19 @@ import numpy as np
 
 from iowbc.arrays import Array
 
-STIFFNESS, DAMPING = 2000.0, 400.0
-"""Of the band [N/m], [N·s/m]; it stretches by 0.16 m under a G1."""
-LIFT = 0.2
-"""How far above the standing robot the unstretched band ends [m]: its feet hang 4 cm above the ground."""
-LOWERED = 0.04
-"""The same once the robot is to stand: the band bears a quarter of its weight, and keeps it upright."""
+STIFFNESS, DAMPING = 2000.0, 200.0
+"""Of the band along it [N/m], [N·s/m]; it stretches by 0.16 m under a G1."""
+SWAY = 30.0
+"""Damping across the taut band [N·s/m]; air and bearings damp a hanging robot."""
+HOOK = np.array([0.0, 0.0, 0.35])
+"""Where the robot hangs, torso's frame [m]: between its shoulders."""
+LENGTH = 1.0
+"""Length of the band between that place of a standing robot and its upper end [m]."""
+STRETCHED = {"hanging": 0.2, "lowered": 0.12, "slack": -0.2}
+"""Stretch of the band with the robot at the height of standing [m]: at first its feet hang 4 cm above the ground;
+lowered, the band bears three quarters of its weight, which keeps it upright while its joints only hold their posture."""
 LOWERING = 2.0
-"""Time to lower the robot, and to slacken the band [s]."""
+"""Time to lower the robot, and to slacken the band before it is unhooked [s]."""
 
 
 class Support:
@@ -36,11 +41,18 @@ class Support:
         return self.kind == "fixture" and self._time < self._release
 
     def force(self, away: Array, velocity: Array) -> Array:
-        """Force on the torso, world frame, (3,) [N]; `away` from where it began (3,) [m], `velocity` (3,) [m/s]."""
-        if self.kind != "band":
+        """Force on the hook, world frame, (3,) [N]; `away` from where it began (3,) [m], `velocity` (3,) [m/s]."""
+        times = (0.0, LOWERING, max(LOWERING, self._release), max(LOWERING, self._release) + LOWERING)
+        if self.kind != "band" or self._time > times[-1]:
             return np.zeros(3)
-        held = 1.0 - np.clip((self._time - self._release) / LOWERING, 0.0, 1.0)
-        lowered = np.clip(self._time / LOWERING, 0.0, 1.0)
-        end = np.array([0.0, 0.0, LIFT + lowered * (LOWERED - LIFT)])
-        force: Array = held * (STIFFNESS * (end - away) - DAMPING * velocity)
+        hanging, lowered, slack = STRETCHED.values()
+        stretched = np.interp(self._time, times, (hanging, lowered, lowered, slack))
+        along = np.array([0.0, 0.0, LENGTH]) - away
+        distance = float(np.linalg.norm(along))
+        along = along / distance
+        speed = float(along @ velocity)
+        tension = STIFFNESS * (distance - LENGTH + stretched) - DAMPING * speed
+        if tension <= 0.0:
+            return np.zeros(3)
+        force: Array = tension * along - SWAY * (velocity - speed * along)
         return force
