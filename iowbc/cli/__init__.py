@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from iowbc.cli.comparing import compare, diff, report, ui
+from iowbc.cli.driving import robot, robot_sim
 from iowbc.cli.listing import gc, list_, show, status
 from iowbc.cli.measuring import bench_control, bench_reference, bench_scale, bench_simulation, bench_training
 from iowbc.cli.playing import export, play
@@ -35,6 +36,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "export": export,
     "gc": gc,
     "play": play,
+    "robot": robot,
+    "robot-sim": robot_sim,
     "ui": ui,
     "schema": schema,
     "doctor": doctor,

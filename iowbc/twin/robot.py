@@ -11,6 +11,7 @@ import numpy as np
 from iowbc import counter_random as random
 from iowbc.arrays import Array
 from iowbc.onboard import messages
+from iowbc.onboard.checks import MODEL
 from iowbc.onboard.machine import FREQUENCY
 from iowbc.onboard.messages import Record
 from iowbc.recipe.simulation.simulation import Simulation as Recipe
@@ -21,8 +22,8 @@ from iowbc.twin.support import HOOK, Support
 
 TIMESTEP = 0.001
 """Physics step [s], and period of the motors' PD control."""
-MODEL = 5
-"""`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
+
+
 SILENCE = 0.1
 """Time without commands after which the motors brake [s]; an assumption, for the drives' behaviour is not public."""
 CHARGE, WARM = 90, 35
@@ -81,6 +82,7 @@ class Twin:
         )
         self.simulation.reset(np.zeros(1, np.int64), posture[None])
         self._start = self._hook = self._hook_position()
+        self._object = self.simulation.state.object_position[0].copy()
         self.periods = 0
         self._silent = 0
         self._command = messages.empty(messages.LOW_COMMAND)
@@ -158,3 +160,15 @@ class Twin:
         state = self.simulation.state
         low = state.base_position[0, 2] < LYING_HEIGHT
         return bool(low or state.base_rotation[0, 2, 2] < np.cos(LYING_TILT))
+
+    @property
+    def verdict(self) -> str:
+        """What became of robot and object."""
+        state, time = self.simulation.state, self.periods / FREQUENCY
+        way = float(np.linalg.norm(state.base_position[0, :2]))
+        parts = [f"{time:.1f} s", "fallen" if self.fallen else "upright", f"pelvis {way:.2f} m from its start"]
+        if state.has_object[0]:
+            moved = float(np.linalg.norm(state.object_position[0, :2] - self._object[:2]))
+            hands = int(state.grasped[0].sum())
+            parts.append(f"object {moved:.2f} m from its start, {hands} hands at it")
+        return ", ".join(parts)

@@ -1,0 +1,70 @@
+"""Measures an exported controller on the bus: `python tests/onboard/measure.py EXPORT [--trials 5] [--seconds 60]`.
+
+Two processes, a simulated robot and the one that drives it, exchange messages alone. In lock step the figures do not
+depend on the machine's load.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from iowbc.deploy.controller import Controller
+from iowbc.deploy.exported_folder import exported_folder
+from iowbc.onboard.dds import DdsBus
+from iowbc.onboard.machine import Machine, State
+from iowbc.onboard.operators import Ranges
+from iowbc.onboard.process import LockStep, drive, listen
+from tests.onboard.scripted import SETTLED, Script, simulated
+
+TASKS = {
+    "stand": ("free", (), (0.0, 0.0, 0.0), 0.0),
+    "walk": ("free", (), (0.4, 0.0, 0.0), 0.0),
+    "carry 4 kg": ("lift", ("--mass", "4"), (0.3, 0.0, 0.0), 0.0),
+    "push 30 kg": ("push", ("--mass", "30"), (0.3, 0.0, 0.0), 0.0),
+}
+"""Scene, options of the simulated robot, velocity [m/s, m/s, rad/s], period of its sign."""
+
+
+def trial(folder: Path, task: str, seed: int, seconds: float, domain: int) -> tuple[bool, str]:
+    """Whether a robot was in Run until the end and stood, and what its simulation says."""
+    scene, options, velocity, period = TASKS[task]
+    controller = Controller.load(folder)
+    machine = Machine(controller, scene)
+    script = Script(Ranges(controller.contract).standing, velocity, period)
+    ends: list[str] = []
+    release = "1" if scene != "free" else "2"
+    settings = ("--scene", scene, *options, "--seed", str(seed), "--lockstep", "--release", release)
+    with simulated(folder, *settings, domain=domain) as robot:
+        bus = DdsBus("lo", domain)
+        assert listen(bus, 1.0).states
+        drive(bus, machine, script, LockStep(), seconds=SETTLED + seconds, tell=ends.append)
+        robot.terminate()
+        said, _ = robot.communicate(timeout=60)
+        bus.close()
+    ran = [line for line in ends if f"{State.DAMPING}:" in line][1:] == [line for line in ends if "requested" in line][-1:]
+    return ran, f"{said.strip().splitlines()[-1]}; {ends[-1].strip()}"
+
+
+def main() -> None:
+    """Print a line for each trial."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("export")
+    parser.add_argument("--trials", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--domain", type=int, default=40)
+    parser.add_argument("--task", action="append", choices=TASKS)
+    given = parser.parse_args()
+    folder = exported_folder(given.export)
+    for task in given.task or TASKS:
+        passed = 0
+        for seed in range(given.trials):
+            ran, text = trial(folder, task, seed, given.seconds, given.domain)
+            passed += ran
+            print(f"{task}, seed {seed}: {'passed' if ran else 'FAILED'}: {text}", flush=True)
+        print(f"{task}: {passed} of {given.trials}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""An operator that follows a script, and a simulated robot in a process of its own."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.onboard.machine import State, Wanted
+from iowbc.onboard.messages import Record
+
+STARTS = ((0.2, State.DAMPING), (1.5, State.STAND), (4.6, State.RUN))
+"""When a script asks for which state [s]; Stand takes 3 s."""
+SETTLED = 9.0
+"""When a robot stands without its support [s]."""
+
+
+class Script:
+    """Asks for the states in turn, and for a velocity from some time on."""
+
+    def __init__(self, standing: Array, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0), period: float = 0.0):
+        """`period`: of a velocity that turns its sign [s]; 0: it does not."""
+        self._standing, self._velocity, self._period = standing, np.array(velocity), period
+        self._begin: float | None = None
+        self._asked = 0
+
+    def wanted(self, now: float, state: Record | None) -> Wanted:
+        self._begin = now if self._begin is None else self._begin
+        passed = now - self._begin
+        request = None
+        if self._asked < len(STARTS) and passed >= STARTS[self._asked][0]:
+            request = STARTS[self._asked][1]
+            self._asked += 1
+        command = self._standing.copy()
+        if passed >= SETTLED:
+            back = self._period and (passed - SETTLED) % (2.0 * self._period) >= self._period
+            command[:3] = -self._velocity if back else self._velocity
+        return Wanted(command, now, request)
+
+
+@contextmanager
+def simulated(folder: Path | str, *options: str, domain: int) -> Iterator["subprocess.Popen[str]"]:
+    """A simulated robot on the loopback; its output is that of the process."""
+    command = [sys.executable, "-m", "iowbc", "robot-sim", str(folder), "--domain", str(domain), *options]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(20)
