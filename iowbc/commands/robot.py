@@ -57,9 +57,7 @@ def robot(
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = _stop_request()
     bus = DdsBus(network, domain)
     with ExitStack() as stack:
         stack.callback(bus.close)
@@ -92,6 +90,14 @@ def robot(
             stopped=stop.is_set,
         )
         tell(console, str(times))
+
+
+def _stop_request() -> threading.Event:
+    """What Ctrl+C and termination set."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    return stop
 
 
 def _report(console: Console, found: "list[Check]", waived: Collection[str]) -> None:
@@ -151,7 +157,7 @@ def simulated_robot(
     twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
     bus = DdsBus(network, domain)
     tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
-    told = False
+    stop, told = _stop_request(), False
 
     def watch(robot: Twin) -> None:
         nonlocal told
@@ -159,10 +165,9 @@ def simulated_robot(
             told = True
             tell(console, f"{robot.periods * PERIOD:8.3f} s  fallen")
 
-    try:
-        serve(bus, twin, lockstep=lockstep, seconds=seconds, each=watch, answer=bus.answer_mode_requests)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        tell(console, twin.verdict)
-        bus.close()
+    def going() -> bool:
+        return not stop.is_set() and twin.periods * PERIOD < seconds
+
+    serve(bus, twin, going, lockstep=lockstep, each=watch, answer=bus.answer_mode_requests)
+    tell(console, twin.verdict)
+    bus.close()

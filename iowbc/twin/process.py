@@ -15,18 +15,18 @@ BATTERY_PERIODS = 250
 def serve(
     bus: Bus,
     twin: Twin,
+    going: Callable[[], bool],
     *,
     lockstep: bool,
-    seconds: float = float("inf"),
     each: Callable[[Twin], None] = lambda _: None,
     answer: Callable[[], None] = lambda: None,
 ) -> None:
-    """Simulates the robot for some time of its own [s]; `each` is called after every period, `answer` now and then.
+    """Simulates the robot while `going`; `each` is called after every period, `answer` in it.
 
     In lock step, a state waits for the command that answers it as long as commands come.
     """
     due, following = time.monotonic(), False
-    while twin.periods * PERIOD < seconds:
+    while going():
         if twin.periods % BATTERY_PERIODS == 0:
             bus.publish(twin.battery)
         bus.publish(twin.state)

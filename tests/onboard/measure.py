@@ -5,10 +5,7 @@ depend on the machine's load.
 """
 
 import argparse
-import sys
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
@@ -16,35 +13,34 @@ from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.machine import Machine, State
 from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import LockStep, drive, listen
-from tests.onboard.scripted import SETTLED, Script, simulated
+from scripted import SETTLED, Script, simulated
 
 TASKS = {
-    "stand": ("free", (), (0.0, 0.0, 0.0), 0.0),
-    "walk": ("free", (), (0.4, 0.0, 0.0), 0.0),
-    "carry 4 kg": ("lift", ("--mass", "4"), (0.3, 0.0, 0.0), 0.0),
-    "push 30 kg": ("push", ("--mass", "30"), (0.3, 0.0, 0.0), 0.0),
+    "stand": ("free", (), (0.0, 0.0, 0.0)),
+    "walk": ("free", (), (0.4, 0.0, 0.0)),
+    "carry 4 kg": ("lift", ("--mass", "4"), (0.3, 0.0, 0.0)),
+    "push 30 kg": ("push", ("--mass", "30"), (0.3, 0.0, 0.0)),
 }
-"""Scene, options of the simulated robot, velocity [m/s, m/s, rad/s], period of its sign."""
+"""Scene, options of the simulated robot, velocity [m/s, m/s, rad/s]."""
 
 
 def trial(folder: Path, task: str, seed: int, seconds: float, domain: int) -> tuple[bool, str]:
-    """Whether a robot was in Run until the end and stood, and what its simulation says."""
-    scene, options, velocity, period = TASKS[task]
+    """Whether a robot was in Run until the end, what its simulation says of that moment, and what damped it."""
+    scene, options, velocity = TASKS[task]
     controller = Controller.load(folder)
     machine = Machine(controller, scene)
-    script = Script(Ranges(controller.contract).standing, velocity, period)
     ends: list[str] = []
     release = "1" if scene != "free" else "2"
     settings = ("--scene", scene, *options, "--seed", str(seed), "--lockstep", "--release", release)
     with simulated(folder, *settings, domain=domain) as robot:
         bus = DdsBus("lo", domain)
         assert listen(bus, 1.0).states
-        drive(bus, machine, script, LockStep(), seconds=SETTLED + seconds, tell=ends.append)
-        robot.terminate()
+        script = Script(Ranges(controller.contract).standing, velocity, SETTLED + seconds, robot.terminate)
+        drive(bus, machine, script, LockStep(), tell=ends.append, stopped=lambda: robot.poll() is not None)
         said, _ = robot.communicate(timeout=60)
         bus.close()
-    ran = [line for line in ends if f"{State.DAMPING}:" in line][1:] == [line for line in ends if "requested" in line][-1:]
-    return ran, f"{said.strip().splitlines()[-1]}; {ends[-1].strip()}"
+    damped = next(line for line in ends[1:] if f"{State.DAMPING}:" in line)
+    return float(damped.split()[0]) >= SETTLED + seconds, f"{said.strip().splitlines()[-1]}; {damped.strip()}"
 
 
 def main() -> None:

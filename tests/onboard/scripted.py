@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,13 +19,16 @@ SETTLED = 9.0
 
 
 class Script:
-    """Asks for the states in turn, and for a velocity from some time on."""
+    """Asks for the states in turn, and for a velocity from `SETTLED` on."""
 
-    def __init__(self, standing: Array, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0), period: float = 0.0):
-        """`period`: of a velocity that turns its sign [s]; 0: it does not."""
-        self._standing, self._velocity, self._period = standing, np.array(velocity), period
+    def __init__(
+        self, standing: Array, velocity: tuple[float, float, float], seconds: float, end: Callable[[], None]
+    ) -> None:
+        """`end` is called once after some time [s], if the robot still runs by then."""
+        self._standing, self._velocity, self._seconds, self._end = standing, np.array(velocity), seconds, end
         self._begin: float | None = None
         self._asked = 0
+        self.ended = False
 
     def wanted(self, now: float, state: Record | None) -> Wanted:
         self._begin = now if self._begin is None else self._begin
@@ -34,19 +37,23 @@ class Script:
         if self._asked < len(STARTS) and passed >= STARTS[self._asked][0]:
             request = STARTS[self._asked][1]
             self._asked += 1
+        if passed >= self._seconds and not self.ended:
+            self.ended = True
+            self._end()
         command = self._standing.copy()
-        if passed >= SETTLED:
-            back = self._period and (passed - SETTLED) % (2.0 * self._period) >= self._period
-            command[:3] = -self._velocity if back else self._velocity
+        command[:3] = self._velocity * (passed >= SETTLED)
         return Wanted(command, now, request)
 
 
 @contextmanager
 def simulated(folder: Path | str, *options: str, domain: int) -> Iterator["subprocess.Popen[str]"]:
-    """A simulated robot on the loopback; its output is that of the process."""
+    """A simulated robot on the loopback that has begun to send; its output is that of the process."""
     command = [sys.executable, "-m", "iowbc", "robot-sim", str(folder), "--domain", str(domain), *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert "Ctrl+C ends" in line, line + process.stdout.read()
         yield process
     finally:
         process.terminate()
