@@ -17,7 +17,7 @@ LENGTH = 1.0
 STRETCHED = {"hanging": 0.2, "lowered": 0.12, "slack": -0.2}
 """Stretch of the band with the robot at the height of standing [m]: at first its feet hang 4 cm above the ground;
 lowered, the band bears three quarters of its weight, which keeps it upright while its joints only hold their posture."""
-LOWERING = 2.0
+LOWERING, SLACKENING = 2.0, 3.0
 """Time to lower the robot, and to slacken the band before it is unhooked [s]."""
 
 
@@ -42,7 +42,8 @@ class Support:
 
     def force(self, away: Array, velocity: Array) -> Array:
         """Force on the hook, world frame, (3,) [N]; `away` from where it began (3,) [m], `velocity` (3,) [m/s]."""
-        times = (0.0, LOWERING, max(LOWERING, self._release), max(LOWERING, self._release) + LOWERING)
+        release = max(LOWERING, self._release)
+        times = (0.0, LOWERING, release, release + SLACKENING)
         if self.kind != "band" or self._time > times[-1]:
             return np.zeros(3)
         hanging, lowered, slack = STRETCHED.values()

@@ -30,7 +30,7 @@ def trial(folder: Path, task: str, seed: int, seconds: float, domain: int) -> tu
     controller = Controller.load(folder)
     machine = Machine(controller, scene)
     ends: list[str] = []
-    release = "1" if scene != "free" else "2"
+    release = "1" if scene != "free" else "3"
     settings = ("--scene", scene, *options, "--seed", str(seed), "--lockstep", "--release", release)
     with simulated(folder, *settings, domain=domain) as robot:
         bus = DdsBus("lo", domain)
@@ -53,13 +53,13 @@ def main() -> None:
     parser.add_argument("--task", action="append", choices=TASKS)
     given = parser.parse_args()
     folder = exported_folder(given.export)
-    for task in given.task or TASKS:
-        passed = 0
-        for seed in range(given.trials):
+    passed = dict.fromkeys(given.task or TASKS, 0)
+    for seed in range(given.trials):
+        for task in passed:
             ran, text = trial(folder, task, seed, given.seconds, given.domain)
-            passed += ran
+            passed[task] += ran
             print(f"{task}, seed {seed}: {'passed' if ran else 'FAILED'}: {text}", flush=True)
-        print(f"{task}: {passed} of {given.trials}", flush=True)
+    print("; ".join(f"{task}: {count} of {given.trials}" for task, count in passed.items()))
 
 
 if __name__ == "__main__":
