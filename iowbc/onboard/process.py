@@ -164,4 +164,7 @@ def drive(
             kept[0].append(getattr(clock, "late", 0.0))
             kept[1].append(time.perf_counter() - started)
         if leaving is not None and (now - leaving >= FAREWELL or not states):
-            return Times(np.array(kept[0]), np.array(kept[1]))
+            times = Times(np.array(kept[0]), np.array(kept[1]))
+            if log is not None:
+                log.add("timing", now, text=str(times))
+            return times
