@@ -35,7 +35,7 @@ def robot(
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
 ) -> None:
-    """Drive a robot, or a simulated one, with an exported controller. Never tried on hardware: see docs/deployment.md."""
+    """Drive a robot on its bus with an exported controller; never tried on hardware, see docs/deployment.md."""
     from iowbc.commands.robot import robot
 
     robot(

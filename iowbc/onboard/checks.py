@@ -48,7 +48,8 @@ def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits
     """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:
-        return [Check("states", False, f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?")]
+        text = f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?"
+        return [Check("states", False, text)]
     sensors = Sensors(len(contract.joints))
     sensors.take(tuple(heard.states), heard.seconds)
     assert sensors.posture is not None
@@ -65,7 +66,9 @@ def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits
         Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
         Check("joints", beyond is None, beyond or "within limits, no motor overloaded, upright enough"),
         Check("battery", charge is not None and charge >= limits.battery, _charge(charge, limits)),
-        Check("temperature", warmest <= limits.temperature, f"warmest motor {warmest} °C, {limits.temperature:g} allowed"),
+        Check(
+            "temperature", warmest <= limits.temperature, f"warmest motor {warmest} °C, {limits.temperature:g} allowed"
+        ),
         _dry_run(controller, sensors, wanted),
     ]
 
@@ -95,4 +98,6 @@ def _dry_run(controller: Controller, sensors: Sensors, wanted: "np.ndarray") -> 
         furthest = max(furthest, float(away[joint]))
     controller.reset()
     name = controller.contract.joints[joint]
-    return Check("policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})")
+    return Check(
+        "policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})"
+    )

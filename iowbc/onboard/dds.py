@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from cyclonedds.core import Qos, ReadCondition, WaitSet, Policy, SampleState, InstanceState, ViewState
+from cyclonedds.core import InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct, annotations
-from cyclonedds.idl.types import array, int32, int64, sequence, uint8, uint16, uint32, int16, float32
+from cyclonedds.idl.types import array, float32, int16, int32, int64, sequence, uint8, uint16, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic

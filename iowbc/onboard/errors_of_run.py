@@ -97,7 +97,7 @@ def _torso(robot: Robot, angles: dict[str, float]) -> Array:
 
 
 def _velocity(feet: Array, time: Array, heading: Array) -> Array:
-    """Planar velocity of the pelvis, heading frame, (T, 2) [m/s]; `feet` (T, 2, 3): soles from the base, heading frame."""
+    """Planar velocity of the pelvis, (T, 2) [m/s]; `feet` (T, 2, 3): soles from the base; all in the heading frame."""
     period = np.maximum(np.diff(time), 1e-6)
     lower = feet[1:, :, 2].argmin(axis=1)
     place = np.arange(len(lower))

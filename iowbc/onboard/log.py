@@ -1,7 +1,6 @@
 """The log of a robot: every message and every input of the state machine, in the MCAP format.
 
-Messages of one turn of the loop have one time. `inputs` begins a turn, and the low-level command ends it; a command that
-was computed and not sent is logged, too.
+Messages of one turn of the loop have one time. `inputs` begins a turn, and the low-level command ends it.
 """
 
 import json
@@ -51,7 +50,7 @@ class LogWriter:
         self._thread = threading.Thread(target=self._write, name="log")
         self._thread.start()
 
-    def turn(self, given: Inputs, command: Record, sent: bool) -> None:
+    def turn(self, given: Inputs, command: Record) -> None:
         """A turn of the loop."""
         wanted = given.wanted
         self.add(
@@ -64,7 +63,6 @@ class LogWriter:
             seen={name: values.tolist() for name, values in wanted.seen.items()},
             seen_at=_finite(wanted.seen_at),
             others=given.others,
-            sent=sent,
         )
         for state in given.states:
             self._queue.put((TOPICS[messages.LOW_STATE], given.now, to_cdr(state)))
@@ -96,7 +94,6 @@ class Turn:
 
     given: Inputs
     command: Record
-    sent: bool
 
 
 def read_about(path: Path) -> dict[str, str]:
@@ -139,7 +136,7 @@ def read_turns(path: Path) -> Iterator[Turn]:
         elif topic == TOPICS[messages.LOW_STATE]:
             states.append(from_cdr(messages.LOW_STATE, data))
         elif topic == TOPICS[messages.LOW_COMMAND] and inputs is not None:
-            yield Turn(_inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data), inputs["sent"])
+            yield Turn(_inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data))
 
 
 def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.sensors import Measured
+from iowbc.control.sensors import Measured, quantities
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import messages, watchdogs
 from iowbc.onboard.limits import LIMITS, Limits
@@ -78,6 +78,7 @@ class Machine:
         controller.reset(scene=scene)
         self._contract = contract = controller.contract
         self._joints = len(contract.joints)
+        self._observed = quantities(of_object=True).keys() & {port.name for port in contract.inputs}
         self.sensors = Sensors(self._joints)
         self.state = State.ZERO_TORQUE
         self.events: list[str] = []
@@ -113,8 +114,8 @@ class Machine:
             return f"second publisher: {given.others} low-level commands of another program"
         if (gap := given.now - self._last) > limits.overrun:
             return f"loop overrun: {1e3 * gap:.1f} ms since the last turn"
-        if self.state is State.RUN and (age := given.now - given.wanted.at) > limits.command_age:
-            return f"stale command: nothing new for {age:.2f} s"
+        if self.state is State.RUN and (reason := self._uninformed(given)) is not None:
+            return reason
         return watchdogs.stale(self.sensors, given.now, limits) or watchdogs.beyond(
             self.sensors.posture, self._contract, limits
         )
@@ -148,8 +149,18 @@ class Machine:
             error = np.abs(now.position - self._goal)
             if error[worst := int(np.argmax(error))] > limits.standing_error:
                 return f"{self._contract.joints[worst]} is {error[worst]:.2f} rad from the standing posture"
-            if (age := given.now - given.wanted.at) > limits.command_age:
-                return f"the command is {age:.1f} s old"
+            return self._uninformed(given)
+        return None
+
+    def _uninformed(self, given: Inputs) -> str | None:
+        """The reason where the newest command, or object pose that the policy observes, is old."""
+        wanted, limits = given.wanted, self.limits
+        if (age := given.now - wanted.at) > limits.command_age:
+            return f"stale command: nothing new for {age:.2f} s"
+        if missing := self._observed - wanted.seen.keys():
+            return f"no object pose: {', '.join(sorted(missing))}; this policy observes the object"
+        if self._observed and (age := given.now - wanted.seen_at) > limits.object_age:
+            return f"stale object pose: nothing new for {age:.2f} s"
         return None
 
     def _enter(self, state: State, given: Inputs, why: str) -> None:

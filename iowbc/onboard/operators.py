@@ -8,10 +8,11 @@ import socket
 import struct
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE
@@ -149,7 +150,7 @@ class Datagram(Section):
     """Offsets of the left and right wrist, heading frame [m]."""
     request: State | None = None
     """State to enter."""
-    seen: dict[str, tuple[float, ...]] = {}
+    seen: dict[str, tuple[float, ...]] = Field(default_factory=dict)
     """Measurements of the object by the names of the contract's inputs."""
 
 
@@ -182,7 +183,7 @@ class Udp:
                 request = State.DAMPING if request is State.DAMPING else given.request or request
                 self._wanted = self._given(given, now)
         last = self._wanted
-        return Wanted(last.command, last.at, request, last.seen, last.seen_at)
+        return replace(last, request=request)
 
     def _given(self, given: Datagram, now: float) -> Wanted:
         command = self._ranges.standing.copy()

@@ -5,7 +5,7 @@ import gc
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -34,8 +34,11 @@ KEPT_TIMES = 1 << 20
 class Clock(Protocol):
     """When the turns of the loop take place."""
 
-    def next(self, bus: Bus) -> float:
-        """Waits for the next turn and returns its time [s]."""
+    late: float
+    """How late the last turn began [s]."""
+
+    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+        """Waits for the next turn; its time [s], and the states that have arrived."""
 
 
 class MonotonicClock:
@@ -44,9 +47,8 @@ class MonotonicClock:
     def __init__(self) -> None:
         self._due = time.monotonic()
         self.late = 0.0
-        """How late the last turn began [s]."""
 
-    def next(self, bus: Bus) -> float:
+    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
         self._due += PERIOD
         now = time.monotonic()
         if now < self._due:
@@ -54,7 +56,7 @@ class MonotonicClock:
             now = time.monotonic()
         self.late = now - self._due
         self._due += PERIOD * (self.late // PERIOD)
-        return now
+        return now, tuple(bus.take(messages.LOW_STATE))
 
 
 class LockStep:
@@ -63,11 +65,13 @@ class LockStep:
     late = 0.0
 
     def __init__(self) -> None:
-        self._waited = 0.0
+        self._now = 0.0
 
-    def next(self, bus: Bus) -> float:
-        self._waited = 0.0 if bus.wait(messages.LOW_STATE, PATIENCE) else self._waited + PATIENCE
-        return self._waited
+    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+        arrived = bus.wait(messages.LOW_STATE, PATIENCE)
+        states = tuple(bus.take(messages.LOW_STATE))
+        self._now = 1e-3 * float(states[-1]["tick"]) if arrived and states else self._now + PATIENCE
+        return self._now, states
 
 
 @dataclass(frozen=True)
@@ -135,22 +139,16 @@ def drive(
     kept: tuple[list[float], list[float]] = ([], [])
     begin: float | None = None
     leaving: float | None = None
-    now, ticked = 0.0, isinstance(clock, LockStep)
     while True:
-        waited = clock.next(bus)
+        now, states = clock.turn(bus)
         started = time.perf_counter()
-        states = tuple(bus.take(messages.LOW_STATE))
         others = len(bus.take(messages.LOW_COMMAND))
-        if not ticked:
-            now = waited
-        else:
-            now = 1e-3 * float(states[-1]["tick"]) if states else now + waited
         begin = now if begin is None else begin
         wanted = operator.wanted(now, states[-1] if states else machine.sensors.state)
         if leaving is None and (stopped() or now - begin >= seconds):
             leaving = now
         if leaving is not None:
-            wanted = type(wanted)(wanted.command, wanted.at, State.DAMPING)
+            wanted = replace(wanted, request=State.DAMPING)
         given = Inputs(now, states, wanted, others)
         command = machine.turn(given)
         bus.publish(command)
@@ -159,11 +157,11 @@ def drive(
             if log is not None:
                 log.add("event", now, text=event, state=machine.state)
         if log is not None:
-            log.turn(given, command, sent=True)
+            log.turn(given, command)
         if len(kept[0]) < KEPT_TIMES:
-            kept[0].append(getattr(clock, "late", 0.0))
+            kept[0].append(clock.late)
             kept[1].append(time.perf_counter() - started)
-        if leaving is not None and (now - leaving >= FAREWELL or not states):
+        if leaving is not None and now - leaving >= FAREWELL:
             times = Times(np.array(kept[0]), np.array(kept[1]))
             if log is not None:
                 log.add("timing", now, text=str(times))

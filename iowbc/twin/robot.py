@@ -4,12 +4,10 @@ The world is the recipe's own, with its objects, sensors, delays and motor limit
 by the gains of each command.
 """
 
-from typing import Any
-
 import numpy as np
 
-from iowbc import counter_random as random
 from iowbc.arrays import Array
+from iowbc.control.sensors import Measured
 from iowbc.onboard import messages
 from iowbc.onboard.checks import MODEL
 from iowbc.onboard.machine import FREQUENCY
@@ -132,20 +130,8 @@ class Twin:
     @property
     def state(self) -> Record:
         """The state that the robot sends."""
-        message, seen, truth = messages.empty(messages.LOW_STATE), self.simulation.measured, self.simulation.state
-        message["mode_machine"], message["tick"] = MODEL, round(1e3 * self.periods / FREQUENCY)
-        motors, imu = message["motor_state"][: len(self.robot.joints)], message["imu_state"]
-        motors["mode"], motors["temperature"] = 1, WARM
-        motors["q"], motors["dq"] = seen.joint_position[0], seen.joint_velocity[0]
-        motors["tau_est"] = truth.joint_torque[0]
-        gravity = seen.projected_gravity[0]
-        pitch = np.arctan2(gravity[0], np.hypot(gravity[1], gravity[2]))
-        roll, yaw = np.arctan2(-gravity[1], -gravity[2]), seen.heading[0, 0]
-        imu["quaternion"] = rotations.from_euler(roll, pitch, yaw)
-        imu["rpy"] = roll, pitch, yaw
-        imu["gyroscope"], imu["accelerometer"] = seen.base_angular_velocity[0], -GRAVITY * gravity
-        message["crc"] = messages.checksum(message)
-        return message
+        time = round(1e3 * self.periods / FREQUENCY)
+        return low_state(time, Measured.of(self.simulation.measured), self.simulation.state.joint_torque[0])
 
     @property
     def battery(self) -> Record:
@@ -172,3 +158,22 @@ class Twin:
             hands = int(state.grasped[0].sum())
             parts.append(f"object {moved:.2f} m from its start, {hands} hands at it")
         return ", ".join(parts)
+
+
+def low_state(tick: int, seen: Measured, torque: Array) -> Record:
+    """The state message of what sensors deliver, a row; `tick` [ms]; estimated torques (joints,) [N·m].
+
+    It has an orientation for gravity and heading, so that noise in the length of gravity is lost.
+    """
+    message = messages.empty(messages.LOW_STATE)
+    message["mode_machine"], message["tick"] = MODEL, tick
+    motors, imu = message["motor_state"][: len(torque)], message["imu_state"]
+    motors["mode"], motors["temperature"], motors["tau_est"] = 1, WARM, torque
+    motors["q"], motors["dq"] = seen.joint_position[0], seen.joint_velocity[0]
+    gravity, yaw = seen.projected_gravity[0], seen.heading[0, 0]
+    roll = np.arctan2(-gravity[1], -gravity[2])
+    pitch = np.arctan2(gravity[0], np.hypot(gravity[1], gravity[2]))
+    imu["quaternion"], imu["rpy"] = rotations.from_euler(roll, pitch, yaw), (roll, pitch, yaw)
+    imu["gyroscope"], imu["accelerometer"] = seen.base_angular_velocity[0], -GRAVITY * gravity
+    message["crc"] = messages.checksum(message)
+    return message

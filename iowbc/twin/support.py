@@ -16,7 +16,7 @@ LENGTH = 1.0
 """Length of the band between that place of a standing robot and its upper end [m]."""
 STRETCHED = {"hanging": 0.2, "lowered": 0.12, "slack": -0.2}
 """Stretch of the band with the robot at the height of standing [m]: at first its feet hang 4 cm above the ground;
-lowered, the band bears three quarters of its weight, which keeps it upright while its joints only hold their posture."""
+lowered, the band bears three quarters of its weight and keeps it upright."""
 LOWERING, SLACKENING = 2.0, 3.0
 """Time to lower the robot, and to slacken the band before it is unhooked [s]."""
 

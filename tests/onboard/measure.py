@@ -7,13 +7,14 @@ depend on the machine's load.
 import argparse
 from pathlib import Path
 
+from scripted import SETTLED, Script, simulated
+
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.machine import Machine, State
 from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import LockStep, drive, listen
-from scripted import SETTLED, Script, simulated
 
 TASKS = {
     "stand": ("free", (), (0.0, 0.0, 0.0)),
