@@ -50,7 +50,7 @@ def robot(
     from iowbc.onboard.limits import LIMITS
     from iowbc.onboard.log import LogWriter
     from iowbc.onboard.machine import Machine
-    from iowbc.onboard.operators import Keyboard, Ranges, operator, single_keys
+    from iowbc.onboard.operators import Keyboard, Ranges, Udp, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
     from iowbc.onboard.replay import export_digest
 
@@ -75,6 +75,8 @@ def robot(
         writer = None if log is None else stack.enter_context(LogWriter(log, about))
         if isinstance(source, Keyboard):
             stack.enter_context(single_keys())
+        if isinstance(source, Udp):
+            stack.callback(source.close)
         source.wanted(0.0, None)  # what was asked for before the robot was ready
         pace = "in step with the simulated robot" if lockstep else prefer_this_process()
         tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")

@@ -89,8 +89,8 @@ def _dry_run(controller: Controller, sensors: Sensors, wanted: "np.ndarray") -> 
         return Check("policy", True, "observes the object: tried when its pose arrives")
     controller.reset()
     default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0
-    for _ in range(DRY_STEPS):
-        targets = controller.step(sensors.measured, wanted)
+    for step in range(DRY_STEPS):
+        targets = controller.step(sensors.measured, wanted, measured_at=float(step))
         if targets.held[0]:
             return Check("policy", False, targets.reasons[0])
         away = np.abs(targets.position[0] - default)

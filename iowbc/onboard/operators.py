@@ -185,6 +185,10 @@ class Udp:
         last = self._wanted
         return replace(last, request=request)
 
+    def close(self) -> None:
+        """Gives the port free."""
+        self._socket.close()
+
     def _given(self, given: Datagram, now: float) -> Wanted:
         command = self._ranges.standing.copy()
         command[:HEIGHT] = *given.velocity, given.yaw_rate

@@ -31,8 +31,7 @@ def trial(folder: Path, task: str, seed: int, seconds: float, domain: int) -> tu
     controller = Controller.load(folder)
     machine = Machine(controller, scene)
     ends: list[str] = []
-    release = "1" if scene != "free" else "3"
-    settings = ("--scene", scene, *options, "--seed", str(seed), "--lockstep", "--release", release)
+    settings = ("--scene", scene, *options, "--seed", str(seed), "--lockstep", "--support", "fixture", "--release", "1")
     with simulated(folder, *settings, domain=domain) as robot:
         bus = DdsBus("lo", domain)
         assert listen(bus, 1.0).states

@@ -14,7 +14,7 @@ from iowbc.onboard.messages import Record
 
 STARTS = ((0.2, State.DAMPING), (1.5, State.STAND), (4.6, State.RUN))
 """When a script asks for which state [s]; Stand takes 3 s."""
-SETTLED = 11.0
+SETTLED = 8.0
 """When a robot stands without its support [s]."""
 
 
