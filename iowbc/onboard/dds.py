@@ -4,6 +4,7 @@ import json
 import time
 import types
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,12 @@ class Response_(IdlStruct, typename="unitree_api.msg.dds_.Response_"):
     binary: sequence[uint8]
 
 
+@cache
+def _configured(domain: int, configuration: str) -> Domain:
+    """The domain, which a process can configure once and which has to live as long as its participants."""
+    return Domain(domain, configuration)
+
+
 class DdsBus:
     """A participant of the bus; see `iowbc.onboard.bus.Bus`."""
 
@@ -127,7 +134,7 @@ class DdsBus:
         extra = LOOPBACK if network == "lo" else ""
         interface = f'<General><Interfaces><NetworkInterface name="{network}"/></Interfaces></General>'
         try:
-            self._domain = Domain(domain, f"<CycloneDDS><Domain>{interface}{extra}</Domain></CycloneDDS>")
+            _configured(domain, f"<CycloneDDS><Domain>{interface}{extra}</Domain></CycloneDDS>")
             self._participant = DomainParticipant(domain)
         except Exception as error:
             raise UsageError(f"--network {network}: Cyclone DDS cannot use it: {error}; see `ip link`") from error
@@ -188,4 +195,4 @@ class DdsBus:
     def close(self) -> None:
         self._readers.clear()
         self._writers.clear()
-        del self._topics, self._participant, self._domain
+        del self._topics, self._participant

@@ -57,4 +57,6 @@ def simulated(folder: Path | str, *options: str, domain: int) -> Iterator["subpr
         yield process
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(60)
+        if process.stdout is not None:
+            process.stdout.close()

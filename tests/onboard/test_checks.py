@@ -54,9 +54,7 @@ def test_a_low_battery_is_refused(still: Still) -> None:
     assert failed(still, listened) == ["battery"]
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "name"), [("mode_machine", 2, "model"), ("mode_pr", 1, "ankles")]
-)
+@pytest.mark.parametrize(("field", "value", "name"), [("mode_machine", 2, "model"), ("mode_pr", 1, "ankles")])
 def test_another_model_is_refused(still: Still, field: str, value: int, name: str) -> None:
     def change(state: Record) -> None:
         state[field] = value

@@ -1,5 +1,6 @@
 """The state machine: order of states, gains, and what leads to damping."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,7 @@ def test_run_is_refused_far_from_the_standing_posture(still: Still) -> None:
 def test_the_policy_moves_the_targets_at_its_own_rate(still: Still) -> None:
     still.until(State.RUN)
     targets = [still.turn()["motor_cmd"]["q"][:29].copy() for _ in range(40)]
-    changed = [not np.array_equal(one, other) for one, other in zip(targets, targets[1:], strict=False)]
+    changed = [not np.array_equal(one, other) for one, other in itertools.pairwise(targets)]
     assert np.diff(np.flatnonzero(changed)).tolist() == [10, 10, 10]
 
 

@@ -9,7 +9,6 @@ from iowbc.onboard.messages import Record
 
 def filled(kind: "np.dtype[np.void]") -> Record:
     """A message of other bytes in every number."""
-    message = messages.empty(kind)
     bytes_ = np.random.default_rng(0).integers(1, 120, kind.itemsize, np.uint8)
     return messages.from_cdr(kind, messages.to_cdr(bytes_.view(kind).reshape(())))
 
