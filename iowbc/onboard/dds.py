@@ -155,7 +155,7 @@ class DdsBus:
         return [from_cdr(kind, sample.data) for sample in samples if isinstance(sample, self._types[kind])]
 
     def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
-        return self._reader(kind)[1].wait(duration(seconds=seconds)) > 0
+        return bool(self._reader(kind)[1].wait(duration(seconds=seconds)) > 0)
 
     def _reader(self, kind: np.dtype[np.void]) -> tuple[DataReader[Any], WaitSet]:
         if kind not in self._readers:

@@ -105,7 +105,7 @@ def read_about(path: Path) -> dict[str, str]:
             raise Damaged(f"{path}: cannot be read as MCAP: {error}") from error
     if not about:
         raise Damaged(f"{path}: no log of `iowbc robot`")
-    return about[0]
+    return dict(about[0])
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
