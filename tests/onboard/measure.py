@@ -1,7 +1,7 @@
 """Measures an exported controller on the bus: `python tests/onboard/measure.py EXPORT [--trials 5] [--seconds 60]`.
 
-Two processes, a simulated robot and the one that drives it, exchange messages alone, in lock step so that nothing depends
-on the machine's load, or with `--realtime` by the clock.
+Two processes, a simulated robot and the one that drives it, exchange messages alone: in lock step, so that nothing
+depends on the machine, or with `--realtime` by the clock.
 """
 
 import argparse
