@@ -109,20 +109,22 @@ def read_about(path: Path) -> dict[str, str]:
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
-    """Topic, time [s] and data of every message, as written; a file whose end is missing is read as far as it goes.
+    """Topic, time [s] and data of every message, as written; a file that was cut is read as far as it goes.
 
-    Raises UsageError for a missing file.
+    Raises UsageError for a missing file, Damaged for one without a message.
     """
     try:
         file = path.open("rb")
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}") from error
     with file:
+        found = False
         try:
             for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+                found = True
                 yield channel.topic, 1e-9 * message.log_time, message.data
-        except Exception as error:  # the reader's own, for a file that was cut
-            if not isinstance(error, EOFError) and "EndOfFile" not in type(error).__name__:
+        except Exception as error:  # of many kinds, by where the file was cut
+            if not found:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 
