@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Still
 from scripted import simulated
+from still import Still
 
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from conftest import Still
+from still import Still
 
 from iowbc.onboard import messages
 from iowbc.onboard.checks import Listened, checks

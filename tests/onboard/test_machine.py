@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Still
+from still import Still
 
 from iowbc.deploy.controller import Controller
 from iowbc.onboard.machine import State
