@@ -66,6 +66,7 @@ def test_messages_cross_and_nobody_receives_its_own(ends: tuple[DdsBus, DdsBus])
 def test_the_motion_switcher_answers_that_no_controller_is_active(ends: tuple[DdsBus, DdsBus]) -> None:
     robot, program = ends
     over = threading.Event()
+    robot.answer_mode_requests()  # its topics, which two threads cannot make at the same time
 
     def answer() -> None:
         while not over.wait(0.02):
