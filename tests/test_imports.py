@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "onboard": SHARED | {"deploy"},
     "pipeline": {"recipe", "errors", "files", "processes", "full_disk"},
     "sim": SHARED,
-    "reference": WORLD,
+    "reference": WORLD | {"results"},
     "model_based": SHARED | {"reference"},
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts"},
