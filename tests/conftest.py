@@ -10,7 +10,7 @@ import yaml
 from iowbc.robot.description import DESCRIPTION, Robot, load_robot, robot_folder
 
 TIERS = {
-    "unit": {"control", "deploy", "learning", "recipe", "report", "robot", "rollouts", "sim"},
+    "unit": {"control", "deploy", "learning", "onboard", "recipe", "report", "robot", "rollouts", "sim"},
     "integration": {"evaluation", "export", "live", "reference", "stages", "task"},
     "system": {"chaos", "commands", "pipeline", "web"},
 }

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from iowbc.cli.driving import robot, robot_sim
 from iowbc.cli.listing import compare, diff, gc, list_, report, show, status, ui
 from iowbc.cli.measuring import bench_control, bench_reference, bench_simulation, bench_training
 from iowbc.cli.playing import export, play
@@ -32,6 +33,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "export": export,
     "gc": gc,
     "play": play,
+    "robot": robot,
+    "robot-sim": robot_sim,
     "ui": ui,
     "schema": schema,
     "doctor": doctor,

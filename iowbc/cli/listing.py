@@ -89,11 +89,20 @@ def report(
         typer.Argument(help="Finished recipes, one or more.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
     output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(help="Replay and draw this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
+    ] = None,
     runs: RunsFolder = None,
 ) -> None:
     """Write one HTML page about runs: tables, interactive curves, films, differences; it opens without a network."""
     from iowbc.commands.compare import report as write_report
 
+    if log is not None:
+        from iowbc.commands.robot_log import report_log
+
+        report_log(console(), recipes[0], log, output or log.with_suffix(".png"))
+        return
     store = store_in(runs)
     name = "-".join(Path(recipe).stem for recipe in recipes)
     write_report(store, console(), recipes, output or store.runs.reports / f"{name}.html")

@@ -270,6 +270,11 @@ class Simulation:
         self._sensing.advance(state)
         self._deliver()
 
+    def pause(self) -> None:
+        """A control period in which nothing moves; the sensors deliver anew."""
+        self.clock += 1
+        self._deliver()
+
     def _hand_over(self, wrench: Array) -> None:
         """Bears at first the robot's part of a held object's weight between its hands, less and less:
         f = (1 - share) m g (1 - t / T)."""
