@@ -32,6 +32,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from iowbc.arrays import Array
 from iowbc.recipe.evaluation.engine import Drake
+from iowbc.sim.model import GROUND_BIT
 
 FREE = mujoco.mjtJoint.mjJNT_FREE.value
 SPRINGLESS = 1e-9
@@ -123,6 +124,7 @@ class Plant:
         model, settings = self._model, self.settings
         if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
             return None
+        on_ground = not (model.geom_contype[geom] | model.geom_conaffinity[geom]) & ~GROUND_BIT
         friction = float(model.geom_friction[geom, 0])
         if model.geom_priority[geom] > 0:
             friction = min(friction, MOST_FRICTION)
@@ -130,7 +132,7 @@ class Plant:
         properties = ProximityProperties()
         AddContactMaterial(
             dissipation=settings.dissipation,
-            point_stiffness=2.0 * settings.stiffness,
+            point_stiffness=2.0 * (settings.ground_stiffness if on_ground else settings.body_stiffness),
             friction=CoulombFriction(friction, friction),
             properties=properties,
         )
