@@ -1,4 +1,5 @@
-"""`bench sim`, `bench train`, `bench rg`, `bench scale` and `bench control`: the speed of this machine."""
+"""`bench sim`, `bench train`, `bench rg`, `bench scale` and `bench control`: the speed of this machine; `bench
+engines`: the agreement of two physics engines."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -77,3 +78,12 @@ def bench_control(
     from iowbc.commands.bench_control import control
 
     control(what, steps)
+
+
+def bench_engines(
+    robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
+) -> None:
+    """Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`."""
+    from iowbc.commands.bench import engines
+
+    engines(robot)

@@ -4,13 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from iowbc.commands.training import require_training
-from iowbc.errors import require_known
+from iowbc.errors import IowbcError, UsageError, require_known
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.tracker import record_figures
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import SCENES
+from iowbc.robot.description import robot_folder
 
 
 def simulation(
@@ -44,6 +45,21 @@ def scale(runs: Runs, file: Path | None, measure: Callable[[Recipe | None], Mapp
     """Measure Ray on one node and on two, with the default recipe or one in a file. Raises `UsageError`."""
     recipe = _recipe(runs, file)
     record_figures(runs, "bench-scale", measure(recipe))
+
+
+def engines(robot: str) -> None:
+    """Compare MuJoCo and Drake in experiments where they must agree. Raises `UsageError` without Drake or
+    for an unknown robot, and `IowbcError` where they differ."""
+    require_training("bench")
+    from iowbc.benchmarks import engines
+
+    try:
+        folder = robot_folder(robot)
+    except FileNotFoundError as error:
+        raise UsageError(str(error)) from None
+    differing = [row.name for row in engines.main(folder) if not row.agrees]
+    if differing:
+        raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
 
 
 def _recipe(runs: Runs, file: Path | None, scene: str | None = None) -> Recipe | None:

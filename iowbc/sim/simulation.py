@@ -400,7 +400,7 @@ def _stepped_by(drake: Drake) -> Callable[..., World]:
     try:
         from iowbc.sim.drake.world import DrakeWorld
     except ModuleNotFoundError as missing:
-        if missing.name != "pydrake":
+        if (missing.name or "").partition(".")[0] != "pydrake":
             raise
         raise UsageError("eval.engine: drake is not installed: pip install 'iowbc[drake]'") from None
     return partial(DrakeWorld, settings=drake)

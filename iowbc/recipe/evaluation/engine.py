@@ -10,7 +10,7 @@ from iowbc.recipe.section import Section
 class Drake(Section):
     """How Drake integrates; masses, gains, friction and all that is drawn are those of `simulation`."""
 
-    timestep: float = Field(default=0.002, gt=0.0, le=0.02)
+    timestep: float = Field(default=0.004, gt=0.0, le=0.02)
     """Physics step [s]; a whole number of them makes a control period."""
     contact: Literal["sap", "lagged", "similar"] = "lagged"
     """Contact approximation of the SAP solver: linear damping (`sap`) or that of Hunt and Crossley (`lagged`,

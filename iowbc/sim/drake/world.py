@@ -96,7 +96,9 @@ class DrakeWorld(World):
         if self.layout.object is not None:
             external[HANDS, 3:] = forces.hands[:, -1]
             self._past_forces[index, :, 0] = _greatest(forces.hands)
-            external[THING, 3:] = forces.object + inputs.applied[self.layout.object, :3] - forces.hands[:, -1].sum(axis=0)
+            external[THING, 3:] = (
+                forces.object + inputs.applied[self.layout.object, :3] - forces.hands[:, -1].sum(axis=0)
+            )
         return True
 
     def _look(self) -> None:
