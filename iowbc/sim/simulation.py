@@ -61,8 +61,8 @@ class Simulation:
     ) -> None:
         """`envs`: global indices of the environments, (n,); with `seed` (one, or one each) they key all that is random.
 
-        `scenes`: name of each environment's scene. `fixed`: quantities held at a value, not drawn, (n,); NaN draws. `drake`: settings with which Drake
-        takes the steps instead of MuJoCo; raises UsageError where it is not installed.
+        `scenes`: name of each environment's scene. `fixed`: quantities held at a value, not drawn, (n,); NaN draws.
+        `drake`: settings with which Drake takes the steps, not MuJoCo; raises UsageError where it is not installed.
         """
         mujoco.set_mju_user_warning(_ignore)
         self.robot, self.recipe = robot, recipe

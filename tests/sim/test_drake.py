@@ -58,8 +58,8 @@ def test_the_engine_decides_a_key_only_where_it_is_not_the_usual_one():
     assert deciding(usual.model_copy(update={"engine": "drake"}))["engine"] == "drake"
 
 
-def test_every_scene_goes_as_in_mujoco_for_a_while(drake, start, calm):
-    pair = drake(calm, SCENES), start(calm, SCENES)
+def test_every_scene_goes_as_in_mujoco_for_a_while(drake, start, by_hands):
+    pair = drake(by_hands, SCENES), start(by_hands, SCENES)
     for simulation in pair:
         run(simulation, 20)
     one, other = (simulation.state for simulation in pair)

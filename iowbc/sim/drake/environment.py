@@ -65,17 +65,18 @@ class Environment:
         self._slow, self._arm = settings.stiction, yaw_arm
         self.plant = plant = Plant(model, settings)
         self.tree = tree = plant.tree
+        self._contacts, self._reactions = tree.get_contact_results_output_port(), tree.get_reaction_forces_output_port()
         self._root = plant.diagram.CreateDefaultContext()
         self.context = context = tree.GetMyMutableContextFromRoot(self._root)
         brakes = tree.get_desired_state_input_port(ModelInstanceIndex(1))
         brakes.FixValue(context, np.zeros(brakes.size()))
         self._torques = np.zeros(tree.num_actuators())
         self._actuation = tree.get_actuation_input_port().FixValue(context, self._torques)
-        self._feet = {plant.bodies[body].index(): side for side, body in enumerate(places.feet)}
+        self._feet = {int(plant.bodies[body].index()): side for side, body in enumerate(places.feet)}
         hands = places.hands if places.object is not None else ()
-        self._hands = [(plant.joints[body].index(), plant.bodies[body]) for body in hands]
-        self._hand_bodies = {hand.index() for _, hand in self._hands}
-        self._object = None if places.object is None else plant.bodies[places.object].index()
+        self._hands = [(int(plant.joints[body].index()), plant.bodies[body]) for body in hands]
+        self._hand_bodies = {int(hand.index()) for _, hand in self._hands}
+        self._object = None if places.object is None else int(plant.bodies[places.object].index())
         self._crate = next((joint for joint in plant.joints if isinstance(joint, PlanarJoint)), None)
         self._kp, self._kd = model.actuator_gainprm[:, 0].copy(), -model.actuator_biasprm[:, 2]
         self._passive = np.array([joint.default_damping() for joint in plant.motors])
@@ -100,7 +101,7 @@ class Environment:
                 self._floating.append((slice(position + 3, position + 7), slice(speed + 3, speed + 6)))
         self._from_position, self._from_speed = from_position, from_speed
         self._motor_position = np.array([joint.position_start() for joint in self.plant.motors])
-        self._motor_speed = np.array([joint.velocity_start() for joint in self.plant.motors])
+        self._motor_speed = model.nq + np.array([joint.velocity_start() for joint in self.plant.motors])
 
     def set_state(self, position: Array, speed: Array) -> None:
         """The state of the model, (nq,) and (nv,)."""
@@ -149,9 +150,10 @@ class Environment:
     def _drive(self, target: Array, torque_range: Array) -> Array:
         """Sets the motors for a step; their torques, (joints,) [N·m]. Where one is not at its limit, an implicit
         damping of the joint control is given to Drake as damping of the joint."""
-        spring = self._kp * (target - self.tree.GetPositions(self.context)[self._motor_position])
-        torque = spring - self._kd * self.tree.GetVelocities(self.context)[self._motor_speed]
-        bounded: Array = torque.clip(*torque_range.T)
+        state = self.tree.GetPositionsAndVelocities(self.context)
+        spring = self._kp * (target - state[self._motor_position])
+        torque = spring - self._kd * state[self._motor_speed]
+        bounded: Array = np.minimum(np.maximum(torque, torque_range[:, 0]), torque_range[:, 1])
         damped = (bounded == torque) & self._implicit
         for motor in np.flatnonzero(damped != self._damped):
             damping = self._passive[motor] + damped[motor] * self._kd[motor]
@@ -174,17 +176,16 @@ class Environment:
         """Sums the contacts of the last step: on the feet, torque about the origin and force, to `feet` (2, 6); on the
         object from all but the hands, (3,)."""
         thing = np.zeros(3)
-        contacts = self.tree.get_contact_results_output_port().Eval(self.context)
+        contacts = self._contacts.Eval(self.context)
         for index in range(contacts.num_point_pair_contacts()):
             contact = contacts.point_pair_contact_info(index)
-            force, point = contact.contact_force(), contact.contact_point()
-            bodies = contact.bodyA_index(), contact.bodyB_index()
-            for body, other, sign in ((bodies[0], bodies[1], -1.0), (bodies[1], bodies[0], 1.0)):
+            one, other = int(contact.bodyA_index()), int(contact.bodyB_index())
+            force = contact.contact_force()
+            for body, by, sign in ((one, other, -1.0), (other, one, 1.0)):
                 if body in self._feet:
-                    wrench = feet[self._feet[body]]
-                    wrench[:3] += sign * rotations.cross(point, force)
-                    wrench[3:] += sign * force
-                elif body == self._object and other not in self._hand_bodies:
+                    (x, y, z), (a, b, c) = contact.contact_point(), sign * force
+                    feet[self._feet[body]] += (y * c - z * b, z * a - x * c, x * b - y * a, a, b, c)
+                elif body == self._object and by not in self._hand_bodies:
                     thing += sign * force
         return thing
 
@@ -192,7 +193,7 @@ class Environment:
         """Force of the object on each hand in the last step, which the massless hand passes on, to `hands` (2, 3)."""
         if not self._hands:
             return
-        reactions = self.tree.get_reaction_forces_output_port().Eval(self.context)
+        reactions = self._reactions.Eval(self.context)
         for force, (joint, hand) in zip(hands, self._hands, strict=True):
             turn = self.tree.EvalBodyPoseInWorld(self.context, hand).rotation()
-            force[:] = -(turn @ reactions[int(joint)].translational())
+            force[:] = -(turn @ reactions[joint].translational())

@@ -41,6 +41,8 @@ MOST_FRICTION = 1.9
 """Greatest coefficient of friction that can be reached: a harmonic mean with 1 stays below 2."""
 GROUND = 100.0
 """Edge of the cube whose upper side is the ground [m]; Drake's half space warns of what it does not support."""
+SLIDING = 3
+"""Dimension of a contact that resists sliding alone."""
 WHEELED = 3
 """Joints of a crate: along x, along y, and about z."""
 
@@ -120,42 +122,58 @@ class Plant:
         ]
         return self.tree.AddBallConstraint(*places[0], *places[1])
 
-    def _add_shape(self, geom: int) -> Any:
+    def _add_shape(self, geom: int) -> list[Any]:
+        """The geometries of a geom that touches anything. Drake has no friction of torsion: a palm is a ring of spheres,
+        whose friction resists twisting with the same lever."""
         model, settings = self._model, self.settings
         if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-            return None
+            return []
         on_ground = not (model.geom_contype[geom] | model.geom_conaffinity[geom]) & ~GROUND_BIT
-        friction = float(model.geom_friction[geom, 0])
+        sliding, torsion = model.geom_friction[geom, :2].tolist()
+        ring = _ring(model.geom_pos[geom], torsion / sliding) if model.geom_condim[geom] > SLIDING else [np.zeros(3)]
+        friction = sliding
         if model.geom_priority[geom] > 0:
-            friction = min(friction, MOST_FRICTION)
+            friction = min(sliding, MOST_FRICTION)
             friction /= 2.0 - friction
+        stiffness = (settings.ground_stiffness if on_ground else settings.body_stiffness) / len(ring)
         properties = ProximityProperties()
         AddContactMaterial(
             dissipation=settings.dissipation,
-            point_stiffness=2.0 * (settings.ground_stiffness if on_ground else settings.body_stiffness),
+            point_stiffness=2.0 * stiffness,
             friction=CoulombFriction(friction, friction),
             properties=properties,
         )
         properties.AddProperty("material", "relaxation_time", settings.relaxation)
-        return self.tree.RegisterCollisionGeometry(
-            self.bodies[model.geom_bodyid[geom]],
-            _pose(model.geom_pos[geom], model.geom_quat[geom]) @ _below(model, geom),
-            _shape(model, geom),
-            f"geom{geom}",
-            properties,
-        )
+        place = _pose(model.geom_pos[geom], model.geom_quat[geom]) @ _below(model, geom)
+        body, shape = self.bodies[model.geom_bodyid[geom]], _shape(model, geom)
+        return [
+            self.tree.RegisterCollisionGeometry(
+                body, RigidTransform(offset) @ place, shape, f"geom{geom} {number}", properties
+            )
+            for number, offset in enumerate(ring)
+        ]
 
 
-def _exclude(model: Any, scene_graph: Any, shapes: list[Any]) -> None:
+def _ring(outward: Array, radius: float) -> list[Array]:
+    """Corners of a triangle around an axis (3,), from its centre [m]."""
+    axis = outward / np.linalg.norm(outward)
+    first = np.cross(axis, (0.0, 0.0, 1.0))
+    first /= np.linalg.norm(first)
+    second = np.cross(axis, first)
+    return [radius * (np.cos(angle) * first + np.sin(angle) * second) for angle in 2.0 / 3.0 * np.pi * np.arange(3)]
+
+
+def _exclude(model: Any, scene_graph: Any, shapes: list[list[Any]]) -> None:
     """Lets those shapes pass through each other whose bits in the model say so."""
-    present = [geom for geom, shape in enumerate(shapes) if shape is not None]
+    present = [geom for geom, own in enumerate(shapes) if own]
     is_a, touches = model.geom_contype, model.geom_conaffinity
     filters = CollisionFilterDeclaration()
     for geom in present:
         apart = [
-            shapes[other]
+            shape
             for other in present
             if other > geom and not (is_a[geom] & touches[other] or is_a[other] & touches[geom])
+            for shape in shapes[other]
         ]
         if apart:
             filters.ExcludeBetween(GeometrySet(shapes[geom]), GeometrySet(apart))
