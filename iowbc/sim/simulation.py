@@ -75,10 +75,10 @@ class Simulation:
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
-        world = World if drake is None else _stepped_by(drake)
+        make = World if drake is None else _stepped_by(drake)
         self._scenes = tuple(dict.fromkeys(self.scene_names))
         self.worlds = tuple(
-            world(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
+            make(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
             for name in self._scenes
         )
         self._owner, self._index = np.empty(n, np.int64), np.empty(n, np.int64)

@@ -82,7 +82,7 @@ class World:
         self._centres = bind("xipos")
         self._squeeze, self._grip = self._grasp(scene)
         self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
-        self._memory = {} if self._rolling is None else {"touch": self._rolling.touch}
+        self._memory: dict[str, Array] = {} if self._rolling is None else {"touch": self._rolling.touch}
         self._memory |= {} if self._grip is None else self._grip.arrays()
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()

@@ -131,7 +131,7 @@ class Environment:
         for step, target in enumerate(inputs.targets):
             torque = self._drive(target, inputs.torque_range)
             if self._crate is not None:
-                self._brake(inputs.resistance)
+                self._brake(self._crate, inputs.resistance)
             self.plant.diagram.ExecuteForcedEvents(self._root)
             thing = self._touch(feet[:, step])
             self._hold(hands[:, step])
@@ -163,14 +163,13 @@ class Environment:
         self._actuation.GetMutableData().get_mutable_value().set_value(self._torques)
         return bounded
 
-    def _brake(self, resistance: float) -> None:
+    def _brake(self, crate: Any, resistance: float) -> None:
         """Rolling resistance -R w / |w| of the crate, w = (x, y, arm · yaw), as damping R / |w| solved for in the step:
         the lagged law has the same limit, and lets a crate at rest creep below the speed of regularisation."""
-        crate = self._crate
         scale = np.array([1.0, 1.0, self._arm])
         first = crate.velocity_start()
         moving = scale * self.tree.GetVelocities(self.context)[first : first + 3]
-        crate.SetDampingVector(self.context, resistance / max(np.linalg.norm(moving), self._slow) * scale**2)
+        crate.SetDampingVector(self.context, resistance / max(float(np.linalg.norm(moving)), self._slow) * scale**2)
 
     def _touch(self, feet: Array) -> Array:
         """Sums the contacts of the last step: on the feet, torque about the origin and force, to `feet` (2, 6); on the

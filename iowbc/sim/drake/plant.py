@@ -123,7 +123,7 @@ class Plant:
         return self.tree.AddBallConstraint(*places[0], *places[1])
 
     def _add_shape(self, geom: int) -> list[Any]:
-        """The geometries of a geom that touches anything. Drake has no friction of torsion: a palm is a ring of spheres,
+        """The geometries of a geom that touches anything. Drake has no torsional friction: a palm is a ring of spheres,
         whose friction resists twisting with the same lever."""
         model, settings = self._model, self.settings
         if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):

@@ -35,7 +35,7 @@ class DrakeWorld(World):
         """Physics steps by which the motors follow their targets late, (n,)."""
         self._targets = np.zeros((n, self._steps.kept_targets + self._steps.substeps - 1, len(robot.joints)))
         """Targets of the physics steps of the longest latency and of the last control period, the oldest first."""
-        self._memory |= {"lag": self._lag, "targets": self._targets}
+        self._memory.update(lag=self._lag, targets=self._targets)
         self._past_forces, past_ground = np.zeros((n, 2, 1, 3)), np.zeros((n, 2, 1, 3))
         self._past_ground = past_ground
         self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
@@ -109,4 +109,5 @@ class DrakeWorld(World):
 
 def _greatest(forces: Array) -> Array:
     """The greatest of the forces (2, substeps, 3) on each of a pair, (2, 3)."""
-    return forces[np.arange(2), np.vecdot(forces, forces).argmax(axis=1)]
+    greatest: Array = forces[np.arange(2), np.vecdot(forces, forces).argmax(axis=1)]
+    return greatest
