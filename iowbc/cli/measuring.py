@@ -1,4 +1,4 @@
-"""`bench sim`, `bench train`, `bench rg` and `bench control`: the speed of this machine."""
+"""`bench sim`, `bench train`, `bench rg`, `bench control`: the speed of this machine; `bench engines`: two engines."""
 
 from typing import Annotated
 
@@ -58,3 +58,12 @@ def bench_control(
     from iowbc.commands.bench import control
 
     control(what, steps)
+
+
+def bench_engines(
+    robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
+) -> None:
+    """Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`."""
+    from iowbc.commands.bench import engines
+
+    engines(robot)

@@ -69,6 +69,7 @@ class Batch:
             scenes=scenes,
             fixed=schedule.fixed,
             control_frequency=task.control_frequency,
+            drake=specification.drake,
         )
         self._holding = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
         self._pushing = pushing = np.array([getattr(recipe.simulation.scenes, name).kind == "push" for name in scenes])

@@ -4,6 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
@@ -159,6 +160,10 @@ class Evaluation(Section):
     disturbances: bool = False
     """Keep the impulses on the object and the pushes on the base during trials, at their nominal strength. Trials of
     `compliance` and those of planned pushes are without them."""
+    engine: Literal["mujoco", "drake"] = Field(default="mujoco", json_schema_extra=LATER)
+    """Physics engine of the trials. Drake, which is an extra, plays the same trials of a policy trained in MuJoCo."""
+    drake: Drake = Field(default=Drake(), json_schema_extra=LATER)
+    """How Drake integrates."""
     success: Success = Success()
     """When a trial counts as survived."""
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
