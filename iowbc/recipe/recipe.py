@@ -15,12 +15,13 @@ from iowbc.recipe.simulation.simulation import Simulation
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
-StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export", "skill", "skill-eval"]
 PIPELINE: tuple[StageName, ...] = get_args(StageName)
 """All stages, in the order in which they run."""
+CONTROLLER: tuple[StageName, ...] = PIPELINE[:6]
+"""Stages of the controller, without those of the skill layer above it."""
 
-
-SEEDS = ("seed", "teacher.seed", "distill.seed")
+SEEDS = ("seed", "teacher.seed", "distill.seed", "skill.learning.seed")
 """Dotted paths that tell repetitions of one experiment apart."""
 NAME = "[a-z0-9][a-z0-9_-]*"
 """What the name of an experiment looks like; it names files."""
@@ -37,8 +38,9 @@ class Recipe(Section):
     """Seed of everything that is drawn at random."""
     robot: str = "g1"
     """Folder under `robots/` that describes the robot."""
-    stages: tuple[StageName, ...] = Field(default=PIPELINE, min_length=1)
-    """Stages of this experiment; they run in the order of the pipeline."""
+    stages: tuple[StageName, ...] = Field(default=CONTROLLER, min_length=1)
+    """Stages of this experiment; they run in the order of the pipeline. `skill` and `skill-eval` are only run where
+    they are named."""
     rg: ReferenceGenerator = ReferenceGenerator()
     """The reference generator: its dataset and its network."""
     simulation: Simulation = Simulation()

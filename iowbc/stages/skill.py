@@ -1,0 +1,90 @@
+"""Stage `skill`: a robot and a human learn to transport together, on top of the frozen controller."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+
+from iowbc.learning.curves import TABLE
+from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
+from iowbc.stages.training import STATE, leave_extendable, train
+
+PANELS = (
+    *(f"{kind}/{name}" for kind in ("scripted", "learnt") for name in ("success", "partner_force_p90", "reward")),
+    *("robot/kl", "robot/std", "robot/learning_rate", "human/kl", "human/std", "human/learning_rate"),
+    *("train/explained_variance", "train/value_loss", "steps_per_second"),
+)
+"""Shown in the figure of the learning curves."""
+
+
+def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    """No student below the skill, or a human whom nobody meets."""
+    if not leaves_student(recipe):
+        text = "names skill, and no stage of the recipe trains a student to act below it; add `distill` to its stages"
+        yield "stages", text
+    if "agent" in recipe.skill.partners.training:
+        text = "agent: the learnt human joins by skill.learning.scripted_steps and learnt_share; leave it out here"
+        yield "skill.partners.training", text
+
+
+def run(job: Job) -> None:
+    """Train robot and human; leave both policies, the exported skill, curves and the state of the training."""
+    import torch
+
+    from iowbc.learning.storage import save_network
+    from iowbc.skill.game import TransportGame
+    from iowbc.skill.learner import SkillTraining
+    from iowbc.skill.student import load_student
+    from iowbc.task.specification import Specification
+
+    torch.set_num_threads(1)  # the networks are small, and the simulation has the cores
+    recipe, settings = job.recipe, job.recipe.skill.learning
+    seed = recipe.seed if settings.seed is None else settings.seed
+    world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
+    student = load_student(job.inputs[policy_stage(recipe)])
+    with closing(TransportGame(world, student, n=settings.games, workers=job.workers, seed=seed)) as game:
+        training = SkillTraining(settings, game, seed)
+        curves = train(job, training, settings.checkpoint_every, _note)
+    leave_extendable(job, training)
+    for name, agent in training.agents.items():
+        about = {"observation": game.parts[name], "algorithm": settings.algorithm}
+        save_network(agent.finished(), agent.architecture, job.out, name, about)
+    terms = sorted({name for row in curves.rows for name in row if name.startswith(("scripted/", "learnt/"))})
+    figures = curves.write_artifact(
+        job.out, f"{recipe.name}: skill", PANELS, [name for name in terms if name not in PANELS]
+    )
+    job.summarize(figures)
+
+
+def _note(values: Mapping[str, float]) -> str:
+    parts = [f"{kind} {100 * values[f'{kind}/success']:.0f} %" for kind in KINDS if f"{kind}/success" in values]
+    parts += [f"KL {values['robot/kl']:.3f}", f"{values['steps_per_second']:,.0f} decisions/s"]
+    return ", ".join(parts)
+
+
+KINDS = ("scripted", "learnt")
+"""Of humans."""
+GAME = tuple(
+    f"skill.{part}"
+    for part in ("frequency", "tasks", "goal_known", "robot", "human", "pursuit", "finish", "reward", "partners.training")
+)
+"""Dotted recipe paths that decide how a game goes."""
+
+STAGE = Stage(
+    name="skill",
+    version=1,
+    slice=("seed", "rg.height", "simulation", "task", *GAME, "skill.learning"),
+    reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
+    run=run,
+    problems=problems,
+    results=("robot.safetensors", "robot.json", "human.safetensors", "human.json"),
+    extends="skill.learning.steps",
+    extends_from=(STATE, TABLE),
+    counts=("skill.learning.steps",),
+    presentation=Presentation(
+        headline=("*/success", "*/partner_force_p90"),
+        columns=("scripted/success", "scripted/partner_force_p90"),
+        curves=("scripted/success", "scripted/partner_force_p90", "scripted/reward", "learnt/success"),
+        trained_by="MAPPO",
+    ),
+)
