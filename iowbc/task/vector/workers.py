@@ -110,7 +110,7 @@ class WorkerProcesses:
                 self._poll.register(process.connection.fileno(), select.POLLIN)
                 self._processes.append(process)
             for index, ((first, last), process) in enumerate(zip(self.groups, self._processes, strict=True)):
-                process.connection.send((setup.as_json(), first, last))
+                process.connection.send((type(setup), setup.as_json(), first, last))
                 self._asked.add(index)
             self._wait(STARTING)
         except BaseException:
