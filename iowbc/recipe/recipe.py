@@ -10,7 +10,7 @@ from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import misnamed
-from iowbc.recipe.section import LATER, Section, Unfitting
+from iowbc.recipe.section import Section, Unfitting
 from iowbc.recipe.simulation.simulation import Simulation
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
@@ -56,8 +56,8 @@ class Recipe(Section):
     """Trials of the trained policy."""
     export: Export = Export()
     """The ONNX graph and its checks."""
-    skill: Skill = Field(default=Skill(), json_schema_extra=LATER)
-    """The skill layer: the Markov game of a robot and a human."""
+    skill: Skill = Skill()
+    """The skill layer: the Markov game of a robot and a human, its training and evaluation."""
     execution: Execution = Execution()
     """How this machine runs it; never changes a result, and is not part of any key."""
 

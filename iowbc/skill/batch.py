@@ -86,11 +86,11 @@ class GameBatch:
         """The student that controls from now on."""
         self.lower.take(student)
 
-    def reset(self, seeds: Keys | None = None) -> None:
-        """Begins the first episode everywhere, the same one each time."""
+    def reset(self, seeds: Keys | None = None, draw: int = 0) -> None:
+        """Begins an episode everywhere, the same one for the same `draw`, from which episodes are counted."""
         del seeds
         for counter in (self._episode, self.lower.memory.episode, self.lower.simulation.episode):
-            counter[:] = 0
+            counter[:] = draw
         for name in ("reward", "terminated", "truncated"):
             self.buffers[name][:] = 0
         self._begin(np.arange(self.n))
@@ -182,7 +182,8 @@ class GameBatch:
         led = self._human.of_script(pursue(self._skill.pursuit, self.paths, self.now), self.now)
         blind = self._human.of_script(self._by_the_clock(), self.now)
         scripted = np.where((self.drawn.kind == KINDS.index(CLOCK))[:, None], blind, led)
-        return np.where(self.drawn.acts[:, None], self._human.of_action(action, self.now), scripted)
+        acting = led + self._human.of_action(action, self.now)
+        return np.where(self.drawn.acts[:, None], acting, scripted)
 
     def _by_the_clock(self) -> Wanted:
         return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency)

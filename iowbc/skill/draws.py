@@ -28,7 +28,7 @@ class EpisodeDraws:
         """`tasks` with their `names`; `scenes`: of each game; `partners`: humans that are drawn; `goal_known`: how
         often the robot knows the path; `plans`: one a game."""
         n = len(scenes)
-        self._goal_known, self._plans = goal_known, plans
+        self._goal_known, self._plans, self.agent_share = goal_known, plans, 0.0
         self._kinds = np.array([KINDS.index(kind) for kind in partners])
         chances = np.array([[task.weight * (task.scene == scene) for task in tasks] for scene in scenes])
         self._tasks = np.cumsum(chances, axis=1) / chances.sum(axis=1, keepdims=True)
@@ -47,10 +47,11 @@ class EpisodeDraws:
 
     def draw(self, which: Indices, key: Keys) -> dict[str, Array]:
         """Draws the next episodes of some games from keys (k,); quantities to hold in the simulation, by name, (k,)."""
-        chance = random.uniform(key, "game", 5)
+        chance = random.uniform(key, "game", 6)
         if self._plans is None:
             self.task[which] = (chance[:, :1] >= self._tasks[which]).sum(axis=1)
-            self.kind[which] = self._kinds[(chance[:, 1] * len(self._kinds)).astype(np.int64)]
+            scripted = self._kinds[(chance[:, 1] * len(self._kinds)).astype(np.int64)]
+            self.kind[which] = np.where(chance[:, 5] < self.agent_share, KINDS.index(AGENT), scripted)
             leads = self.kind[which] != FOLLOWER  # a human who follows tells nobody where to go
             self.known[which] = (chance[:, 2] < self._goal_known) | ~leads
         task, kind = self.task[which], self.kind[which]

@@ -14,7 +14,7 @@ from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.setup import GameSetup
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
-from iowbc.task.vector.messages import MakeStep, Message, Reset
+from iowbc.task.vector.messages import MakeStep, Message
 from iowbc.task.vector.workers import InProcess, WorkerProcesses
 
 PATIENCE = 60.0
@@ -63,6 +63,20 @@ class TakeStudent:
         batch.take(self.student)
 
 
+@dataclass(frozen=True)
+class Begin:
+    """Message: begin every game anew; see `TransportGame.reset`."""
+
+    draw: int
+    agent_share: float
+    changes: ClassVar[bool] = True
+
+    def carry_out(self, batch: Any) -> None:
+        """See `Message`."""
+        batch.drawn.agent_share = self.agent_share
+        batch.reset(draw=self.draw)
+
+
 class TransportGame:
     """n games. What comes of them follows from seed and game, however many workers there are."""
 
@@ -106,9 +120,10 @@ class TransportGame:
         """Games whose human is that of the actions, in the episodes now played, (n,)."""
         return self._buffers["human_acts"].copy()
 
-    def reset(self) -> Observed:
-        """Begins the first episode of every game, the same one each time."""
-        self._call(Reset())
+    def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
+        """Begins every game anew. `draw`: number of the draw of everything random, the same episodes for the same one;
+        `agent_share`: part of the episodes of drawn games whose human is that of the actions."""
+        self._call(Begin(draw, agent_share))
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> Outcome:

@@ -8,8 +8,8 @@ from iowbc.skill.pursuit import Wanted
 from iowbc.skill.situation import Situation, turned, wrapped
 
 ACTIONS = ("v_x", "v_y", "v_z", "height", "yaw_rate")
-"""Actions of the human, each in [-1, 1]: velocity of the handle in the frame of the object's yaw, offset of its height,
-yaw rate of the object."""
+"""Actions of the human, each in [-1, 1], added to what a script intends: velocity of the handle in the frame of the
+object's yaw, offset of its height, yaw rate of the object."""
 
 
 class Human:
@@ -27,7 +27,7 @@ class Human:
         self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
 
     def of_action(self, action: Array, now: Situation) -> Array:
-        """Intentions (n, 5) of actions (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the height [m]."""
+        """What actions (n, 5) add to the script's intentions (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the height [m]."""
         s = self._settings
         scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
         return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)

@@ -16,7 +16,8 @@ from iowbc.learning.ppo import adapted, explained_variance
 from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.skill.agent import Trained
-from iowbc.skill.markov_game import HUMAN, ROBOT, Game, Observed
+from iowbc.skill.markov_game import HUMAN, ROBOT, Game
+from iowbc.skill.game import Observed
 
 Array = NDArray[np.float32]
 
@@ -64,7 +65,7 @@ class SkillTraining:
         for each in self.trained.values():
             each.normalization.move(each.network.normalizer)
         self.critic.normalization.discounted[:] = 0.0
-        observed = game.reset(self.steps, self.agent_share)
+        observed = game.reset(self.steps // game.n, self.agent_share)
         inputs: dict[str, list[Array]] = {name: [] for name in self.trained}
         acted: dict[str, list[Array]] = {name: [] for name in self.agents}
         learnt: list[NDArray[np.bool_]] = []

@@ -40,15 +40,14 @@ def run(job: Job) -> None:
     torch.set_num_threads(1)  # the networks are small, and the simulation has the cores
     recipe, settings = job.recipe, job.recipe.skill.learning
     seed = recipe.seed if settings.seed is None else settings.seed
-    world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
+    world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
     student = load_student(job.inputs[policy_stage(recipe)])
     with closing(TransportGame(world, student, n=settings.games, workers=job.workers, seed=seed)) as game:
         training = SkillTraining(settings, game, seed)
         curves = train(job, training, settings.checkpoint_every, _note)
     leave_extendable(job, training)
     for name, agent in training.agents.items():
-        about = {"observation": game.parts[name], "algorithm": settings.algorithm}
-        save_network(agent.finished(), agent.architecture, job.out, name, about)
+        save_network(agent.finished(), agent.architecture, job.out, name, {"algorithm": settings.algorithm})
     terms = sorted({name for row in curves.rows for name in row if name.startswith(("scripted/", "learnt/"))})
     figures = curves.write_artifact(
         job.out, f"{recipe.name}: skill", PANELS, [name for name in terms if name not in PANELS]

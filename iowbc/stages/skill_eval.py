@@ -15,7 +15,7 @@ RIVALS = {
     "task": "nominal",
     "lead": "scripted leader",
     "follow": "admittance follower",
-    "ignore": "by the clock",
+    "clock": "by the clock",
 }
 """Labels of the rules that play without a skill."""
 
@@ -57,7 +57,7 @@ def run(job: Job) -> None:
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores
     recipe, skill = job.recipe, job.recipe.skill
-    world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
+    world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
     student = load_student(job.inputs[policy_stage(recipe)])
     human = read_network(job.inputs["skill"], "human")[0] if "skill" in job.inputs else None
     evaluation = Evaluation(

@@ -5,7 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.skill.markov_game import HUMAN, ROBOT, Array, Observed, Outcome
+from iowbc.arrays import Array
+from iowbc.skill.game import Observed, Outcome
+from iowbc.skill.markov_game import HUMAN, ROBOT
 
 PERIOD, FRICTION, DECISIONS = 0.2, 0.6, 25
 
@@ -24,7 +26,7 @@ class PullingGame:
     def human_acts(self) -> NDArray[np.bool_]:
         return self._human_acts
 
-    def reset(self, draw: int, agent_share: float) -> Observed:
+    def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
         self.generator, self.agent_share = np.random.default_rng(draw), agent_share
         self.place, self.speed, self.force, self.goal, self.total = np.zeros((5, self.n))
         self._human_acts, self.age = np.zeros(self.n, np.bool_), np.zeros(self.n, np.int64)

@@ -3,8 +3,9 @@
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -52,6 +53,8 @@ def cases(skill: Skill, learnt_human: bool) -> list[Case]:
     for (name, task), known, partner, load, episode in itertools.product(
         tasks.items(), asked.known, partners, asked.loads, range(asked.episodes)
     ):
+        if partner == "follower" and not known:
+            continue  # who follows tells nobody where to go
         low, high = task.mass
         plan = Plan(name, partner, known, mass=low + load * (high - low), seed=asked.seed + episode)
         found.append(Case(plan, load, episode))
@@ -89,8 +92,8 @@ class Evaluation:
 
     def _played(self, competitor: Competitor, planned: Sequence[Case]) -> pd.DataFrame:
         """The first episode of a game of each case."""
-        plans = [Plan(**{**case.plan.as_json(), "rule": competitor.rule}) for case in planned]
-        rows: dict[int, dict[str, object]] = {}
+        plans = [replace(case.plan, rule=competitor.rule) for case in planned]
+        rows: dict[int, dict[str, Any]] = {}
         with closing(self._make(plans)) as game:
             _require_fitting(competitor, game.observation_sizes["robot"])
             observed = game.reset()
@@ -102,9 +105,8 @@ class Evaluation:
                     "human": acted(self._human, observed.observations["human"], game.action_sizes["human"]),
                 }
                 outcome = game.step(actions)
-                for place, row in enumerate(_rows(outcome.figures)):
-                    number = int(np.flatnonzero(outcome.terminated | outcome.truncated)[place])
-                    rows.setdefault(number, row)
+                for row in _rows(outcome.figures):
+                    rows.setdefault(int(row["environment"]), row)
                 observed = outcome.observed
         return pd.DataFrame(
             [
@@ -138,6 +140,6 @@ def acted(network: TeacherNetwork | None, observation: Array, size: int) -> Arra
         return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())
 
 
-def _rows(figures: Mapping[str, Array]) -> Iterator[dict[str, object]]:
+def _rows(figures: Mapping[str, Array]) -> Iterator[dict[str, Any]]:
     for values in zip(*figures.values(), strict=True):
         yield dict(zip(figures, values, strict=True))

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from iowbc.recipe.section import COSMETIC, ArtifactName, Section
 
-Rival = Literal["task", "follow", "lead", "ignore"]
+Rival = Literal["task", "follow", "lead", "clock"]
 """Rules of `iowbc.skill.plan.Plan` that act without a skill."""
 
 
@@ -17,7 +17,7 @@ class SkillEvaluation(Section):
     """Name of this recipe's skill in tables and figures."""
     rivals: tuple[Rival, ...] = ("task", "lead", "follow")
     """Rules that play beside it. `task`: the nominal command alone. `lead`: a scripted leader, who knows the path in
-    any case. `follow`: an admittance follower. `ignore`: the path by the clock."""
+    any case. `follow`: an admittance follower. `clock`: the path by the clock."""
     others: dict[str, tuple[ArtifactName, ...]] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """By label: recipes whose trained skills play, too, or keys of theirs. Under this recipe's own label they are
     further trainings of it, such as other seeds. What they are is part of the key, not what they are called."""

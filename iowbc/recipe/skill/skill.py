@@ -6,6 +6,8 @@ from pydantic import Field, model_validator
 
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.partner import BEHAVIOURS
+from iowbc.recipe.skill.evaluation import SkillEvaluation
+from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.recipe.skill.reward import GameReward
 from iowbc.recipe.skill.task import Tasks
 
@@ -42,16 +44,16 @@ class RobotAgent(Section):
 
 
 class HumanAgent(Section):
-    """The human: scales of its actions, and the scripted one's way along the path."""
+    """The learnt human: how far its action departs from the scripted way along the path."""
 
-    velocity: float = Field(default=0.6, gt=0.0)
-    """Largest horizontal velocity of the handle, per axis [m/s]."""
-    vertical_velocity: float = Field(default=0.15, gt=0.0)
-    """Largest vertical velocity of the handle [m/s]."""
+    velocity: float = Field(default=0.3, gt=0.0)
+    """Largest change of the horizontal velocity of the handle, per axis [m/s]: as fast as the script walks."""
+    vertical_velocity: float = Field(default=0.1, gt=0.0)
+    """Largest change of the vertical velocity of the handle [m/s], and the script's largest."""
     height: float = Field(default=0.1, gt=0.0)
     """Largest offset of the handle's height from what the vertical velocity has led to [m]."""
-    yaw_rate: float = Field(default=0.5, gt=0.0)
-    """Largest yaw rate that the human gives the object [rad/s]."""
+    yaw_rate: float = Field(default=0.3, gt=0.0)
+    """Largest change of the yaw rate that the human gives the object [rad/s]."""
 
 
 class Pursuit(Section):
@@ -128,3 +130,7 @@ class Skill(Section):
     """When a game ends."""
     reward: GameReward = GameReward()
     """The shared reward."""
+    learning: SkillLearning = SkillLearning()
+    """Multi-agent PPO of robot and human."""
+    eval: SkillEvaluation = SkillEvaluation()
+    """Games in which skills and rivals are compared."""
