@@ -9,13 +9,12 @@ import numpy as np
 import viser
 
 from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, VELOCITY
+from iowbc.control.command import COMMAND, VELOCITY, nominal_command
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drawing import Shown
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.drawing import nominal_command
 
 Button = Literal["pause", "reset", "push robot", "push object"]
 

@@ -6,12 +6,13 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
+from iowbc.control.hand_forces import HandForces
+from iowbc.control.skill_observation import joined, object_yaw, robot_observation
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
 from iowbc.skill.draws import EpisodeDraws
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
-from iowbc.skill.hands import HandForces
 from iowbc.skill.human import Human
 from iowbc.skill.lower_layer import LowerLayer
 from iowbc.skill.nominal import NominalCommand
@@ -169,7 +170,7 @@ class GameBatch:
     def _command(self) -> Array:
         """Nominal commands, (n, 11)."""
         rule, known = self.drawn.rule, self.drawn.known
-        yaw = seen.object_yaw(self.lower.measured) * self._sees_object
+        yaw = object_yaw(self.lower.measured) * self._sees_object
         leading = self._nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now)
         following = self._nominal.following(self._felt[:, -1].sum(axis=1), yaw)
         blind = self._nominal.leading(self._by_the_clock(), self.now)
@@ -196,7 +197,9 @@ class GameBatch:
         internal = internal_force(robot[:, :2], partner[:, :2])
         velocity = state.handle_velocity[:, :2]
         speed = np.linalg.norm(velocity, axis=1)
-        power = np.abs(np.vecdot(partner[:, :2], velocity) - drawn["partner_share"] * drawn["rolling_resistance"] * speed)
+        power = np.abs(
+            np.vecdot(partner[:, :2], velocity) - drawn["partner_share"] * drawn["rolling_resistance"] * speed
+        )
         heading = self.paths.heading(self.drawn.task, self.now.covered) + self.origin.heading
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         borne = [np.where(self._pushing, np.vecdot(f[:, :2], along), f[:, 2]) for f in (robot, robot + partner)]
@@ -224,26 +227,25 @@ class GameBatch:
     def _observe(self, time: str) -> None:
         """Writes what agents and critic see."""
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
-        known = drawn.known[:, None]
         path = seen.waypoints(self.paths, now, ahead, now.heading)
-        own = seen.sensed(lower.command, lower.measured, self._wrist_error, self._sees_object)
-        own |= {"pushing": self._pushing, "known": known, "waypoints": path * known}
-        own |= {"forces": self._felt.reshape(self.n, -1) / seen.FORCE}
-        force = self.origin.turned(lower.simulation.state.partner_force)
-        felt = seen.felt_by_human(
-            now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw)
+        robot = robot_observation(
+            *(lower.command, lower.measured, self._wrist_error, self._sees_object),
+            *(self._pushing, drawn.known, path, self._felt),
         )
+        force = self.origin.turned(lower.simulation.state.partner_force)
+        felt = seen.felt_by_human(now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw))
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
-        robot, human = seen.joined(own), seen.joined(felt)
+        human = joined(felt)
         self.buffers[f"{time}/robot"][:], self.buffers[f"{time}/human"][:] = robot, human
-        self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, seen.joined(secret)], axis=1)
+        self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
 
     def _write_figures(self, which: Indices, end: GameEnding) -> None:
         """Figures of the episodes that ended, (k,)."""
         drawn, simulation = self.drawn, self.lower.simulation
         values = self._figures.read(which, self.lower.period) | {
-            name: getattr(end, name)[which] for name in ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
+            name: getattr(end, name)[which]
+            for name in ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
         }
         values |= {
             "touched": self._touched[which] / self._skill.frequency,

@@ -62,7 +62,9 @@ class EpisodeDraws:
         if self._plans is not None:
             plans = [self._plans[row] for row in which]
             mass = np.array([own if plan.mass is None else plan.mass for own, plan in zip(mass, plans, strict=True)])
-            share = np.array([own if plan.share is None else plan.share for own, plan in zip(share, plans, strict=True)])
+            share = np.array(
+                [own if plan.share is None else plan.share for own, plan in zip(share, plans, strict=True)]
+            )
         self.acts[which] = kind == KINDS.index(AGENT)
         scripted = kind < len(BEHAVIOURS)
         return {

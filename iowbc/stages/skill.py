@@ -65,7 +65,17 @@ KINDS = ("scripted", "learnt")
 """Of humans."""
 GAME = tuple(
     f"skill.{part}"
-    for part in ("frequency", "tasks", "goal_known", "robot", "human", "pursuit", "finish", "reward", "partners.training")
+    for part in (
+        "frequency",
+        "tasks",
+        "goal_known",
+        "robot",
+        "human",
+        "pursuit",
+        "finish",
+        "reward",
+        "partners.training",
+    )
 )
 """Dotted recipe paths that decide how a game goes."""
 

@@ -168,7 +168,9 @@ def figure(games: pd.DataFrame) -> Figure:
                     capsize=2,
                 )
             panel.set_xticks(range(len(partners)), partners)
-            panel.set_title(f"{title}, {'both know the goal' if known else 'only the human knows the goal'}", fontsize=9)
+            panel.set_title(
+                f"{title}, {'both know the goal' if known else 'only the human knows the goal'}", fontsize=9
+            )
             panel.grid(alpha=0.3, axis="y")
     grid[0][0].legend(fontsize=8)
     return drawing

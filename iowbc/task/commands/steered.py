@@ -5,10 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.control.command import VELOCITY
+from iowbc.control.command import VELOCITY, nominal_command
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.commands.commander import Commander
-from iowbc.task.commands.drawing import nominal_command
 from iowbc.task.commands.script import CommandScript, CommandSegment
 from iowbc.task.guidance import Guidance
 from iowbc.task.memory import Memory
