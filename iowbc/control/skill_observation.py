@@ -16,15 +16,27 @@ SENSED = 44
 """Size of what the robot observes beside the estimated forces."""
 
 
-class Sensed(Protocol):
-    """Measurements of n robots, as `iowbc.control.sensors.Measured` has them with an object."""
+WAYPOINTS, OBJECT = 9, 10
+"""Sizes of the parts of a known path and of the object."""
+YAW = 3
+"""Place of the yaw in the part of the object."""
 
-    projected_gravity: Array
-    base_angular_velocity: Array
-    object_position: Array
-    object_quaternion: Array
-    object_linear_velocity: Array
-    object_angular_velocity: Array
+
+class Sensed(Protocol):
+    """Measurements of n robots, as `iowbc.control.sensors.Measured` has them."""
+
+    @property
+    def projected_gravity(self) -> Array: ...
+    @property
+    def base_angular_velocity(self) -> Array: ...
+    @property
+    def object_position(self) -> Array | None: ...
+    @property
+    def object_quaternion(self) -> Array | None: ...
+    @property
+    def object_linear_velocity(self) -> Array | None: ...
+    @property
+    def object_angular_velocity(self) -> Array | None: ...
 
 
 def robot_observation(
@@ -63,33 +75,32 @@ def sensed(command: Array, measured: Sensed, wrist_error: Array, sees_object: bo
         "rates": measured.base_angular_velocity,
         "wrist_error": 10.0 * wrist_error.reshape(-1, 6),
     }
-    level = leveling(measured.projected_gravity)
-    forward, up = _axes(measured)
-    vectors = [measured.object_position, forward, up, measured.object_linear_velocity, measured.object_angular_velocity]
-    place, forward, up, velocity, rates = (_turned(level, vector) for vector in vectors)
-    of_object = [place, _yaw(forward)[:, None], up[:, :2], velocity, rates[:, 2:]]
-    return parts | {"object": np.concatenate(of_object, axis=1) * sees_object}
+    return parts | {"object": of_object(measured) if sees_object else np.zeros((len(command), OBJECT))}
+
+
+def of_object(measured: Sensed) -> Array:
+    """Measured object in the heading frame, (n, OBJECT): its place from the base, yaw, upward axis, velocity and yaw
+    rate relative to the base. Raises ValueError where there is no measurement of it."""
+    quaternion = _given(measured, "object_quaternion")
+    forward, up = (rotations.rotate(quaternion, np.tile(axis, (len(quaternion), 1))) for axis in np.eye(3)[::2])
+    names = ("object_position", "object_linear_velocity", "object_angular_velocity")
+    level, vectors = leveling(measured.projected_gravity), [forward, up, *(_given(measured, name) for name in names)]
+    forward, up, place, velocity, rates = (np.einsum("nij,nj->ni", level, vector) for vector in vectors)
+    yaw = np.arctan2(forward[:, 1], forward[:, 0])
+    return np.concatenate([place, yaw[:, None], up[:, :2], velocity, rates[:, 2:]], axis=1)
 
 
 def object_yaw(measured: Sensed) -> Array:
     """Measured yaw of the object in the heading frame, (n,) [rad]."""
-    return _yaw(_turned(leveling(measured.projected_gravity), _axes(measured)[0]))
-
-
-def _axes(measured: Sensed) -> list[Array]:
-    """The object's forward and upward axes in the base frame, (n, 3) each."""
-    quaternion = measured.object_quaternion
-    return [rotations.rotate(quaternion, np.tile(axis, (len(quaternion), 1))) for axis in np.eye(3)[::2]]
-
-
-def _turned(rotation: Array, vectors: Array) -> Array:
-    turned: Array = np.einsum("nij,nj->ni", rotation, vectors)
-    return turned
-
-
-def _yaw(forward: Array) -> Array:
-    yaw: Array = np.arctan2(forward[:, 1], forward[:, 0])
+    yaw: Array = of_object(measured)[:, YAW]
     return yaw
+
+
+def _given(measured: Sensed, name: str) -> Array:
+    value: Array | None = getattr(measured, name)
+    if value is None:
+        raise ValueError(f"{name}: this skill observes the object; measure it")
+    return value
 
 
 def leveling(gravity: Array) -> Array:

@@ -191,6 +191,19 @@ class SkillTraining:
             losses.append(float(loss.detach()))
         return float(np.mean(losses))
 
+    def golden_observations(self, decisions: int) -> Array:
+        """Observations of the robots over the first decisions of all games, with mean actions, (decisions x n, k)."""
+        observed, found = self.game.reset(), []
+        for _ in range(decisions):
+            found.append(observed.observations[ROBOT])
+            with torch.inference_mode():
+                actions = {
+                    name: agent.network(torch.from_numpy(observed.observations[name])).clamp(-1.0, 1.0).numpy()
+                    for name, agent in self.agents.items()
+                }
+            observed = self.game.step(actions).observed
+        return np.concatenate(found)
+
     def arrays(self) -> Arrays:
         """Everything that a resumed training needs, between two updates."""
         networks = [prefixed(name, each.arrays()) for name, each in self.trained.items()]

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 
+from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
 from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
@@ -31,9 +32,11 @@ def run(job: Job) -> None:
     """Train robot and human; leave both policies, the exported skill, curves and the state of the training."""
     import torch
 
+    from iowbc.export.skill import write_skill
     from iowbc.learning.storage import save_network
     from iowbc.skill.game import TransportGame
     from iowbc.skill.learner import SkillTraining
+    from iowbc.skill.markov_game import ROBOT
     from iowbc.skill.student import load_student
     from iowbc.task.specification import Specification
 
@@ -45,6 +48,7 @@ def run(job: Job) -> None:
     with closing(TransportGame(world, student, n=settings.games, workers=job.workers, seed=seed)) as game:
         training = SkillTraining(settings, game, seed)
         curves = train(job, training, settings.checkpoint_every, _note)
+        observations = training.golden_observations(GOLDEN_DECISIONS)
     leave_extendable(job, training)
     for name, agent in training.agents.items():
         save_network(agent.finished(), agent.architecture, job.out, name, {"algorithm": settings.algorithm})
@@ -52,7 +56,14 @@ def run(job: Job) -> None:
     figures = curves.write_artifact(
         job.out, f"{recipe.name}: skill", PANELS, [name for name in terms if name not in PANELS]
     )
-    job.summarize(figures)
+    sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"skill": job.key}
+    parity = write_skill(job.out, training.agents[ROBOT].finished(), recipe, sources, observations)
+    if not parity <= recipe.export.parity_tolerance:
+        raise StageFailed(
+            f"parity: the action differs by {parity:.2e} between torch and onnxruntime, export.parity_tolerance is "
+            f"{recipe.export.parity_tolerance:.0e}; try another export.opset or raise it"
+        )
+    job.summarize(figures | {"parity": parity})
 
 
 def _note(values: Mapping[str, float]) -> str:
@@ -61,6 +72,8 @@ def _note(values: Mapping[str, float]) -> str:
     return ", ".join(parts)
 
 
+GOLDEN_DECISIONS = 10
+"""Decisions of all games whose observations are the golden vectors."""
 KINDS = ("scripted", "learnt")
 """Of humans."""
 GAME = tuple(
@@ -82,11 +95,11 @@ GAME = tuple(
 STAGE = Stage(
     name="skill",
     version=1,
-    slice=("seed", "rg.height", "simulation", "task", *GAME, "skill.learning"),
+    slice=("name", "seed", "rg.height", "simulation", "task", *GAME, "skill.learning", "export.opset"),
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
     problems=problems,
-    results=("robot.safetensors", "robot.json", "human.safetensors", "human.json"),
+    results=(*(f"{agent}.{end}" for agent in ("robot", "human") for end in ("safetensors", "json")), "skill.onnx", "skill_*"),
     extends="skill.learning.steps",
     extends_from=(STATE, TABLE),
     counts=("skill.learning.steps",),
