@@ -50,6 +50,11 @@ class SkillCommand:
         command[:, OFFSET] = wrists.reshape(-1, 6)
         return command
 
+    def action_of(self, command: Array, nominal: Array) -> Array:
+        """The action that departs from a nominal command towards another, (n, 11) in [-1, 1]."""
+        action: Array = ((command - nominal) / self._scale).clip(-1.0, 1.0)
+        return action
+
 
 def _ranges(ranges: object) -> Array:
     """Lower and upper ends of the velocities, (2, 3)."""

@@ -103,7 +103,7 @@ class GameBatch:
         action = {name: self.buffers[f"action/{name}"].astype(np.float64).clip(-1.0, 1.0) for name in self._action}
         jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
         self._action = action
-        lower.commander.wanted[:] = self._nominal.with_action(self._command(), action["robot"])
+        lower.commander.wanted[:] = self._nominal.with_action(self._nominals, action["robot"])
         self._human.intend(self._intentions(action["human"]))
         costs = np.zeros((3, self.n))
         for _ in range(self._substeps):
@@ -174,6 +174,7 @@ class GameBatch:
         leading = self._nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now)
         following = self._nominal.following(self._felt[:, -1].sum(axis=1), yaw)
         blind = self._nominal.leading(self._by_the_clock(), self.now)
+        self.buffers["privileged_action"][:] = self._nominal.action_of(leading, following) * ~known[:, None]
         follows = (rule == RULES.index("follow")) | ((rule == RULES.index("task")) & ~known)
         command = np.where(follows[:, None], following, leading)
         return np.where((rule == RULES.index("clock"))[:, None], blind, command)
@@ -237,6 +238,7 @@ class GameBatch:
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         human = joined(felt)
+        self._nominals = self._command()
         self.buffers[f"{time}/robot"][:], self.buffers[f"{time}/human"][:] = robot, human
         self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
 

@@ -120,6 +120,11 @@ class TransportGame:
         """Games whose human is that of the actions, in the episodes now played, (n,)."""
         return self._buffers["human_acts"].copy()
 
+    @property
+    def privileged_actions(self) -> Array:
+        """Actions with which the robots would do now what they do where they know the path, (n, 11): zero there."""
+        return self._buffers["privileged_action"].copy()
+
     def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
         """Begins every game anew. `draw`: number of the draw of everything random, the same episodes for the same one;
         `agent_share`: part of the episodes of drawn games whose human is that of the actions."""

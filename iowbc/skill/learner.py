@@ -69,11 +69,13 @@ class SkillTraining:
         inputs: dict[str, list[Array]] = {name: [] for name in self.trained}
         acted: dict[str, list[Array]] = {name: [] for name in self.agents}
         learnt: list[NDArray[np.bool_]] = []
+        privileged: list[Array] = []
         rewards, endings = [], []
         cut: list[tuple[int, NDArray[np.int64], Array]] = []
         episodes: list[dict[str, Array]] = []
         for step in range(settings.rollout):
             learnt.append(game.human_acts.copy())
+            privileged.append(game.privileged_actions)
             actions = self._explored(observed)
             for name in self.agents:
                 inputs[name].append(observed.observations[name])
@@ -97,7 +99,7 @@ class SkillTraining:
         advantage = advantages(reward, ended_at, value, last, settings.gamma, settings.gae_lambda)
         samples = {"advantage": torch.from_numpy(advantage), "target": torch.from_numpy(advantage + value)}
         samples |= {"value": torch.from_numpy(value), "learnt": torch.from_numpy(np.stack(learnt))}
-        samples["critic/input"] = prepared["critic"]
+        samples |= {"critic/input": prepared["critic"], "privileged": torch.from_numpy(np.stack(privileged))}
         for name, agent in self.agents.items():
             action = torch.from_numpy(np.stack(acted[name]))
             with torch.inference_mode():
@@ -125,6 +127,8 @@ class SkillTraining:
     def _learn(self, samples: Mapping[str, Tensor]) -> dict[str, float]:
         """Gradient steps on a rollout."""
         explained = {"train/explained_variance": explained_variance(samples["value"], samples["target"])}
+        if self.steps <= self.settings.imitation_steps:
+            return explained | {"train/imitation_error": self._imitate(samples), "train/value_loss": self._fit(samples)}
         learning = [ROBOT, HUMAN] if bool(samples["learnt"].any()) else [ROBOT]
         order = [learning[place] for place in torch.randperm(len(learning))]
         self._factor = torch.ones(len(samples["target"]))
@@ -189,6 +193,18 @@ class SkillTraining:
             loss = torch.nn.functional.mse_loss(value, samples["target"][batch])
             self.critic.descend(loss)
             losses.append(float(loss.detach()))
+        return float(np.mean(losses))
+
+    def _imitate(self, samples: Mapping[str, Tensor]) -> float:
+        """Gradient steps of the robot towards its privileged actions; the mean squared error of an action."""
+        robot, losses = self.agents[ROBOT], []
+        robot.rate, before = self.settings.imitation_rate, robot.rate
+        for batch in self._batches(len(samples["target"])):
+            action = robot.network.body(samples[f"{ROBOT}/input"][batch])
+            loss = torch.nn.functional.mse_loss(action, samples["privileged"][batch])
+            robot.descend(loss)
+            losses.append(float(loss.detach()))
+        robot.rate = before
         return float(np.mean(losses))
 
     def golden_observations(self, decisions: int) -> Array:

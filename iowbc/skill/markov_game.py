@@ -21,6 +21,10 @@ class Game(Protocol):
     def human_acts(self) -> Mask:
         """Games whose human is that of the actions, (n,)."""
 
+    @property
+    def privileged_actions(self) -> Array:
+        """What a robot that knew all would do now, (n, actions)."""
+
     def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
         """Begin every game anew."""
 

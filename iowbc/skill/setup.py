@@ -80,6 +80,7 @@ class GameSetup:
             **seen,
             "action/robot": ((11,), "float32"),
             "action/human": ((5,), "float32"),
+            "privileged_action": ((11,), "float32"),
             "reward": ((), "float32"),
             "terminated": ((), "bool"),
             "truncated": ((), "bool"),

@@ -13,7 +13,7 @@ from iowbc.stages.training import STATE, leave_extendable, train
 PANELS = (
     *(f"{kind}/{name}" for kind in ("scripted", "learnt") for name in ("success", "partner_force_p90", "reward")),
     *("robot/kl", "robot/std", "robot/learning_rate", "human/kl", "human/std", "human/learning_rate"),
-    *("train/explained_variance", "train/value_loss", "steps_per_second"),
+    *("train/imitation_error", "train/explained_variance", "train/value_loss", "steps_per_second"),
 )
 """Shown in the figure of the learning curves."""
 
@@ -68,7 +68,8 @@ def run(job: Job) -> None:
 
 def _note(values: Mapping[str, float]) -> str:
     parts = [f"{kind} {100 * values[f'{kind}/success']:.0f} %" for kind in KINDS if f"{kind}/success" in values]
-    parts += [f"KL {values['robot/kl']:.3f}", f"{values['steps_per_second']:,.0f} decisions/s"]
+    parts += [f"KL {values['robot/kl']:.3f}"] if "robot/kl" in values else []
+    parts += [f"{values['steps_per_second']:,.0f} decisions/s"]
     return ", ".join(parts)
 
 

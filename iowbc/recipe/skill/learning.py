@@ -24,8 +24,11 @@ class SkillLearning(Section):
     rollout: int = Field(default=100, ge=2, le=10_000)
     """Decisions of each game between two updates. All games begin anew with each rollout, so that a resumed training
     needs no state of the simulation; an episode should therefore fit into one."""
+    imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
+    """First decisions, in which the robot does not learn from the reward: it drives, and imitates what it would do if it
+    knew the path (DAgger), while the value learns. From the reward alone 80,000 decisions had changed nothing."""
     scripted_steps: int = Field(default=200_000, ge=0, le=10**12)
-    """First decisions, in which every human is a scripted one."""
+    """First decisions, those of the imitation included, in which every human is a scripted one."""
     learnt_share: float = Field(default=0.5, ge=0, le=1)
     """Part of the episodes in which the learnt human acts afterwards; the robot goes on meeting scripted ones in the
     others, so that it does not learn to rely on one partner."""
@@ -33,6 +36,8 @@ class SkillLearning(Section):
     """Parts into which a rollout is split for the gradient steps; must divide games x rollout."""
     epochs: int = Field(default=5, ge=1, le=1000)
     """Passes over a rollout."""
+    imitation_rate: float = Field(default=1e-3, gt=0)
+    """Adam's step size of the imitation."""
     hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
     """Hidden layers of the policies and of the value network."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
