@@ -42,8 +42,11 @@ class RobotAgent(Section):
 
 
 class HumanAgent(Section):
-    """The human: scales of its actions, and the scripted one's way along the path."""
+    """The human: its strength, and the scales of its actions."""
 
+    strongest: float = Field(default=50.0, gt=0.0)
+    """Bound on the force of spring and damper of its arms [N], in place of `simulation.partner.strongest`: with its
+    share of the resistance it does not move the crate alone."""
     velocity: float = Field(default=0.6, gt=0.0)
     """Largest horizontal velocity of the handle, per axis [m/s]."""
     vertical_velocity: float = Field(default=0.15, gt=0.0)
