@@ -7,8 +7,9 @@ from iowbc.control.gravity import ArmGravity
 from iowbc.control.references import ReferenceLayer
 from iowbc.robot.description import Robot
 
-DAMPING = 0.02
-"""Added to the squares of the Jacobian's singular values [m²]: arms at 0.3 m from the shoulder have some 0.05."""
+DAMPING = 0.002
+"""Added to the squares of the Jacobian's singular values [m²]. With 0.02 the forward force is underestimated by half
+(slope 0.4 against the true one), with 0.001 its error grows by a half."""
 
 
 class HandForces:

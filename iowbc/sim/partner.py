@@ -25,6 +25,8 @@ TINY = 1e-9
 """Keeps a division by a length from dividing by zero."""
 SLOW = 0.1
 """Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
+HESITANT = 0.03
+"""Speed below which a steered partner pushes a crate the less, the slower it wants it to roll [m/s]."""
 PATH, FOLLOWER, LEADER, STOPPING, TUGGING, LAGGING = range(len(BEHAVIOURS))
 REMEMBERED = (
     *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
@@ -68,7 +70,7 @@ class Partner:
         self._stop, self._halted = np.zeros((n, 2)), np.zeros(n)
         """Begin and end of a stop [s]; part of the commanded velocity that remains in it."""
         self._followed, self._slow = np.zeros((n, 2)), np.full(n, TINY)
-        self._turn_rate = np.zeros(n)
+        self._turn_rate, self._own_way = np.zeros(n), np.zeros((n, 2))
         self._keep = float(np.exp(-period / recipe.noise_time))
         self._keep_share = float(np.exp(-period / recipe.drift_time))
         self._derive()
@@ -152,6 +154,9 @@ class Partner:
         velocity = self._path(commanded)
         state.partner_velocity[:] = velocity * self._present[:, None]
         along = velocity[:, :2] / (_length(velocity) + self._slow)[:, None]
+        if self.steered.any():
+            own = self._own_way / (_length(self._own_way) + HESITANT)[:, None]
+            along = np.where(self.steered[:, None], own, along)
         lead = self._aim + velocity * self._period - self._at
         lead[:, :2] *= np.minimum(1.0, self._recipe.leash / (_length(lead) + TINY))[:, None]
         lead[:, 2] = lead[:, 2].clip(-self._recipe.leash, self._recipe.leash)
@@ -210,6 +215,7 @@ class Partner:
         velocity[:, 1] = sine * wanted[:, 0] + cosine * wanted[:, 1] + wanted[:, 2] * offset_x
         velocity[:, :2] *= self._pace[:, None]
         velocity[:, 2] = wanted[:, 3]
+        self._own_way = velocity[:, :2].copy()
         rate = np.where(self.steered, 0.0, wanted[:, 2])
         self._turn_rate = np.where(self.steered, wanted[:, 2], 0.0)
         if len(self._which[LEADER]):

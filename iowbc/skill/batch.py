@@ -169,15 +169,18 @@ class GameBatch:
 
     def _command(self) -> Array:
         """Nominal commands, (n, 11)."""
-        rule, known = self.drawn.rule, self.drawn.known
         yaw = object_yaw(self.lower.measured) * self._sees_object
-        leading = self._nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now)
-        following = self._nominal.following(self._felt[:, -1].sum(axis=1), yaw)
-        blind = self._nominal.leading(self._by_the_clock(), self.now)
-        self.buffers["privileged_action"][:] = self._nominal.action_of(leading, following) * ~known[:, None]
-        follows = (rule == RULES.index("follow")) | ((rule == RULES.index("task")) & ~known)
-        command = np.where(follows[:, None], following, leading)
-        return np.where((rule == RULES.index("clock"))[:, None], blind, command)
+        nominal, clock = self._nominal, self._by_the_clock()
+        by_rule = {
+            "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
+            "follow": nominal.following(self._felt[:, -1].sum(axis=1), yaw),
+            "clock": nominal.leading(clock, self.now),
+            "stand": nominal.standing(),
+        }
+        unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
+        self.buffers["privileged_action"][:] = nominal.action_of(by_rule["lead"], by_rule["follow"]) * unaware
+        command: Array = np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
+        return command
 
     def _intentions(self, action: Array) -> Array:
         """Intentions of the humans, (n, 5)."""

@@ -42,7 +42,6 @@ class EpisodeDraws:
         if plans is not None:
             self.task[:] = [list(names).index(plan.task) for plan in plans]
             self.kind[:] = [KINDS.index(plan.partner) for plan in plans]
-            self.rule[:] = [RULES.index(plan.rule) for plan in plans]
             self.known[:] = [plan.known for plan in plans]
 
     def draw(self, which: Indices, key: Keys) -> dict[str, Array]:
@@ -65,6 +64,10 @@ class EpisodeDraws:
             share = np.array(
                 [own if plan.share is None else plan.share for own, plan in zip(share, plans, strict=True)]
             )
+        self.rule[which] = np.where(self.known[which], RULES.index("lead"), RULES.index("follow"))
+        if self._plans is not None:
+            asked = {row: self._plans[row].rule for row in which.tolist()}
+            self.rule[which] = [self.rule[row] if rule is None else RULES.index(rule) for row, rule in asked.items()]
         self.acts[which] = kind == KINDS.index(AGENT)
         scripted = kind < len(BEHAVIOURS)
         return {

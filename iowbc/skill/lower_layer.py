@@ -1,6 +1,7 @@
 """The lower layer of the game: environments with the frozen student at the control frequency."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +26,7 @@ class LowerLayer(Batch):
         self, specification: Specification, environments: Indices, episodes: Sequence[Episode], block: int
     ) -> None:
         """`environments`: global numbers, (n,); `block`: see `iowbc.rollouts.blocks`."""
+        specification = _with_strength(specification)
         setup = Setup(specification, len(environments), 0, tuple(episodes))
         super().__init__(
             specification,
@@ -78,3 +80,11 @@ class LowerLayer(Batch):
         self.dropped |= ending.dropped
         self.diverged |= ending.diverged
         self._observe(self.moved)
+
+
+def _with_strength(specification: Specification) -> Specification:
+    """The world with the human's strength."""
+    recipe = specification.recipe
+    partner = recipe.simulation.partner.model_copy(update={"strongest": recipe.skill.human.strongest})
+    simulation = recipe.simulation.model_copy(update={"partner": partner})
+    return replace(specification, recipe=recipe.model_copy(update={"simulation": simulation}))

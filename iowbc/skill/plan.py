@@ -8,10 +8,10 @@ from iowbc.recipe.simulation.partner import BEHAVIOURS
 AGENT, ABSENT, CLOCK = "agent", "absent", "clock"
 KINDS = (*BEHAVIOURS, AGENT, ABSENT, CLOCK)
 """Humans: scripted ones with a behaviour; the one of the actions; nobody; one who walks the path by the clock."""
-Rule = Literal["task", "follow", "lead", "clock"]
+Rule = Literal["lead", "follow", "clock", "stand"]
 RULES: tuple[Rule, ...] = get_args(Rule)
-"""Nominal commands of the robot: the path where it knows it, else following; always following; always the path; the
-path by the clock, whatever the object does."""
+"""Nominal commands of the robot: along the path; with the forces on its hands; along the path by the clock, whatever
+the object does; standing."""
 
 
 @dataclass(frozen=True)
@@ -30,4 +30,5 @@ class Plan:
     """The human's share; empty draws it from the task's range."""
     seed: int | None = None
     """Seed of the environment's episodes; empty takes the game's seed and the environment's number."""
-    rule: Rule = "task"
+    rule: Rule | None = None
+    """Nominal command; empty leads where the robot knows the path and follows where it does not."""

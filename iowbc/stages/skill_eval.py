@@ -12,10 +12,11 @@ if TYPE_CHECKING:
     from iowbc.evaluation.skill.games import Competitor
 
 RIVALS = {
-    "task": "nominal",
+    "nominal": "nominal",
     "lead": "scripted leader",
     "follow": "admittance follower",
     "clock": "by the clock",
+    "stand": "standing",
 }
 """Labels of the rules that play without a skill."""
 
@@ -96,10 +97,12 @@ def _competitors(job: Job) -> "list[Competitor]":
         label, place = name.rsplit("/", 1)
         folders[label, place] = job.inputs[name]
     trained = [
-        Competitor(label, training, "task", read_network(folder, "robot")[0])
+        Competitor(label, training, None, read_network(folder, "robot")[0])
         for (label, training), folder in folders.items()
     ]
-    return trained + [Competitor(RIVALS[rule], "", rule, None) for rule in asked.rivals]
+    return trained + [
+        Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals
+    ]
 
 
 STAGE = Stage(

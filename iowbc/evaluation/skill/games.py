@@ -14,10 +14,9 @@ import torch
 from iowbc.arrays import Array
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.learning.networks import TeacherNetwork
-from iowbc.recipe.skill.evaluation import Rival
 from iowbc.recipe.skill.skill import Skill
 from iowbc.skill.game import TransportGame
-from iowbc.skill.plan import Plan
+from iowbc.skill.plan import Plan, Rule
 
 AGENT = "agent"
 """Name of the learnt human among partners."""
@@ -30,7 +29,7 @@ class Competitor:
     label: str
     training: str
     """What tells trainings under one label apart."""
-    rule: Rival
+    rule: Rule | None
     robot: TeacherNetwork | None
     """The trained policy; None acts as the rule says."""
 

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from iowbc.recipe.section import COSMETIC, ArtifactName, Section
 
-Rival = Literal["task", "follow", "lead", "clock"]
+Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
 """Rules of `iowbc.skill.plan.Plan` that act without a skill."""
 
 
@@ -15,8 +15,8 @@ class SkillEvaluation(Section):
 
     label: str = Field(default="MAPPO", min_length=1, max_length=40)
     """Name of this recipe's skill in tables and figures."""
-    rivals: tuple[Rival, ...] = ("task", "lead", "follow")
-    """Rules that play beside it. `task`: the nominal command alone. `lead`: a scripted leader, who knows the path in
+    rivals: tuple[Rival, ...] = ("nominal", "lead", "follow")
+    """Rules that play beside it. `nominal`: the nominal command alone. `lead`: a scripted leader, who knows the path in
     any case. `follow`: an admittance follower. `clock`: the path by the clock."""
     others: dict[str, tuple[ArtifactName, ...]] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """By label: recipes whose trained skills play, too, or keys of theirs. Under this recipe's own label they are

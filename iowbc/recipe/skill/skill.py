@@ -44,7 +44,11 @@ class RobotAgent(Section):
 
 
 class HumanAgent(Section):
-    """The learnt human: how far its action departs from the scripted way along the path."""
+    """The human: its strength, and how far the learnt one's action departs from the scripted way along the path."""
+
+    strongest: float = Field(default=50.0, gt=0.0)
+    """Bound on the force of spring and damper of its arms [N], in place of `simulation.partner.strongest`: with its
+    share of the resistance it does not move the crate alone."""
 
     velocity: float = Field(default=0.3, gt=0.0)
     """Largest change of the horizontal velocity of the handle, per axis [m/s]: as fast as the script walks."""

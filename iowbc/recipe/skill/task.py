@@ -86,7 +86,9 @@ VERTICAL = (
 
 def _push(path: tuple[Stretch, ...], duration: float) -> TransportTask:
     """A push of the paper's crate on wheels that resist more than the robot alone overcomes."""
-    return TransportTask(scene="push", path=path, mass=(60.0, 70.0), rolling_resistance=0.2, duration=duration)
+    return TransportTask(
+        scene="push", path=path, mass=(60.0, 70.0), share=(0.3, 0.45), rolling_resistance=0.16, duration=duration
+    )
 
 
 def _lift(path: tuple[Stretch, ...], duration: float) -> TransportTask:
