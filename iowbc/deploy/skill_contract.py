@@ -1,6 +1,5 @@
 """The contract of an exported skill: what a caller must know beside the controller's own contract."""
 
-from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal, Self
@@ -77,5 +76,3 @@ def read_skill_contract(folder: Path) -> SkillContract:
                 "the file was changed or lost after the export: export again"
             )
     return contract
-
-

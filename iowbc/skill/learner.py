@@ -22,6 +22,10 @@ from iowbc.skill.markov_game import HUMAN, ROBOT, Game
 Array = NDArray[np.float32]
 
 
+IMITATION_BATCH = 1024
+"""Samples of a gradient step of the imitation, drawn from all so far."""
+
+
 class SkillTraining:
     """A training of robot and human, one update at a time; see `iowbc.stages.training.Training`.
 
@@ -37,6 +41,12 @@ class SkillTraining:
         self.agents = {name: Trained(sizes[name], game.action_sizes[name], settings, 0.0) for name in (ROBOT, HUMAN)}
         self.critic = Trained(sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size, 1, settings, VALUE_GAIN)
         self._factor = torch.ones(0)
+        self.imitated = self._nothing_imitated()
+        """Observations and privileged actions of the robot while it imitates."""
+
+    def _nothing_imitated(self) -> dict[str, Tensor]:
+        sizes = {"observation": self.game.observation_sizes[ROBOT], "action": self.game.action_sizes[ROBOT]}
+        return {name: torch.zeros(0, size) for name, size in sizes.items()}
 
     @property
     def trained(self) -> dict[str, Trained]:
@@ -99,6 +109,7 @@ class SkillTraining:
         advantage = advantages(reward, ended_at, value, last, settings.gamma, settings.gae_lambda)
         samples = {"advantage": torch.from_numpy(advantage), "target": torch.from_numpy(advantage + value)}
         samples |= {"value": torch.from_numpy(value), "learnt": torch.from_numpy(np.stack(learnt))}
+        samples["robot/raw"] = torch.from_numpy(rows[ROBOT])
         samples |= {"critic/input": prepared["critic"], "privileged": torch.from_numpy(np.stack(privileged))}
         for name, agent in self.agents.items():
             action = torch.from_numpy(np.stack(acted[name]))
@@ -128,7 +139,10 @@ class SkillTraining:
         """Gradient steps on a rollout."""
         explained = {"train/explained_variance": explained_variance(samples["value"], samples["target"])}
         if self.steps <= self.settings.imitation_steps:
-            return explained | {"train/imitation_error": self._imitate(samples), "train/value_loss": self._fit(samples)}
+            found = {"imitation_error": self._imitate(samples), "value_loss": self._fit(samples)}
+            found["imitation_scale"] = float(samples["privileged"].square().mean())
+            return explained | {f"train/{name}": value for name, value in found.items()}
+        self.imitated = self._nothing_imitated()
         learning = [ROBOT, HUMAN] if bool(samples["learnt"].any()) else [ROBOT]
         order = [learning[place] for place in torch.randperm(len(learning))]
         self._factor = torch.ones(len(samples["target"]))
@@ -196,16 +210,23 @@ class SkillTraining:
         return float(np.mean(losses))
 
     def _imitate(self, samples: Mapping[str, Tensor]) -> float:
-        """Gradient steps of the robot towards its privileged actions; the mean squared error of an action."""
-        robot, losses = self.agents[ROBOT], []
-        robot.rate, before = self.settings.imitation_rate, robot.rate
-        for batch in self._batches(len(samples["target"])):
-            action = robot.network.body(samples[f"{ROBOT}/input"][batch])
-            loss = torch.nn.functional.mse_loss(action, samples["privileged"][batch])
-            robot.descend(loss)
-            losses.append(float(loss.detach()))
+        """Gradient steps of the robot towards its privileged actions in all rollouts so far; the mean squared error in
+        the newest, before them."""
+        robot, settings = self.agents[ROBOT], self.settings
+        seen, wanted = self.imitated["observation"], self.imitated["action"]
+        with torch.inference_mode():
+            error = float(torch.nn.functional.mse_loss(samples[f"{ROBOT}/mean"], samples["privileged"]))
+        self.imitated = {
+            "observation": torch.cat([seen, samples[f"{ROBOT}/raw"]]),
+            "action": torch.cat([wanted, samples["privileged"]]),
+        }
+        robot.rate, before = settings.imitation_rate, robot.rate
+        for _ in range(settings.imitation_gradient_steps):
+            batch = torch.randint(len(self.imitated["action"]), (IMITATION_BATCH,))
+            action = robot.network(self.imitated["observation"][batch])
+            robot.descend(torch.nn.functional.mse_loss(action, self.imitated["action"][batch]))
         robot.rate = before
-        return float(np.mean(losses))
+        return error
 
     def golden_observations(self, decisions: int) -> Array:
         """Observations of the robots over the first decisions of all games, with mean actions, (decisions x n, k)."""
@@ -224,6 +245,7 @@ class SkillTraining:
         """Everything that a resumed training needs, between two updates."""
         networks = [prefixed(name, each.arrays()) for name, each in self.trained.items()]
         whole: Arrays = {"steps": np.array([self.steps]), **prefixed("random", checkpoint.random_arrays())}
+        whole |= prefixed("imitated", {name: values.numpy() for name, values in self.imitated.items()})
         for arrays in networks:
             whole |= arrays
         return whole
@@ -233,6 +255,7 @@ class SkillTraining:
         for name, each in self.trained.items():
             each.restore(under(name, arrays))
         self.steps = int(arrays["steps"][0])
+        self.imitated = {name: torch.from_numpy(np.array(of)) for name, of in under("imitated", arrays).items()}
         checkpoint.restore_random(under("random", arrays))
 
 

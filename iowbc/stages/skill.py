@@ -100,7 +100,11 @@ STAGE = Stage(
     reads=lambda recipe: (*generator_stage(recipe), policy_stage(recipe)),
     run=run,
     problems=problems,
-    results=(*(f"{agent}.{end}" for agent in ("robot", "human") for end in ("safetensors", "json")), "skill.onnx", "skill_*"),
+    results=(
+        *(f"{agent}.{end}" for agent in ("robot", "human") for end in ("safetensors", "json")),
+        "skill.onnx",
+        "skill_*",
+    ),
     extends="skill.learning.steps",
     extends_from=(STATE, TABLE),
     counts=("skill.learning.steps",),

@@ -100,9 +100,7 @@ def _competitors(job: Job) -> "list[Competitor]":
         Competitor(label, training, None, read_network(folder, "robot")[0])
         for (label, training), folder in folders.items()
     ]
-    return trained + [
-        Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals
-    ]
+    return trained + [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]
 
 
 STAGE = Stage(

@@ -1,6 +1,7 @@
 """The smallest game of a robot and a human: both pull a mass along a line to a place that only the human knows."""
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,8 @@ PERIOD, FRICTION, DECISIONS = 0.2, 0.6, 25
 class PullingGame:
     """Masses of 1 kg; robot and human pull with up to 1 N each against viscous friction."""
 
-    action_sizes = {ROBOT: 1, HUMAN: 1}
-    observation_sizes = {ROBOT: 2, HUMAN: 3}
+    action_sizes: ClassVar = {ROBOT: 1, HUMAN: 1}
+    observation_sizes: ClassVar = {ROBOT: 2, HUMAN: 3}
     state_size = 4
 
     def __init__(self, n: int) -> None:
@@ -25,6 +26,15 @@ class PullingGame:
     @property
     def human_acts(self) -> NDArray[np.bool_]:
         return self._human_acts
+
+    @property
+    def privileged_actions(self) -> Array:
+        return self._script()[:, None].astype(np.float32)
+
+    def _script(self) -> Array:
+        """Pull of who knows the goal."""
+        pull: Array = np.clip(1.5 * (self.goal - self.place) - self.speed, -1.0, 1.0)
+        return pull
 
     def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
         self.generator, self.agent_share = np.random.default_rng(draw), agent_share
@@ -49,8 +59,7 @@ class PullingGame:
 
     def step(self, actions: Mapping[str, Array]) -> Outcome:
         robot = actions[ROBOT][:, 0].astype(np.float64)
-        script = 1.5 * (self.goal - self.place) - self.speed
-        human = np.clip(np.where(self._human_acts, actions[HUMAN][:, 0], script), -1.0, 1.0)
+        human = np.where(self._human_acts, actions[HUMAN][:, 0], self._script())
         self.force = human
         self.speed = self.speed + PERIOD * (robot + human - FRICTION * self.speed)
         before, self.place = np.abs(self.goal - self.place), self.place + PERIOD * self.speed

@@ -15,9 +15,10 @@ class SkillEvaluation(Section):
 
     label: str = Field(default="MAPPO", min_length=1, max_length=40)
     """Name of this recipe's skill in tables and figures."""
-    rivals: tuple[Rival, ...] = ("nominal", "lead", "follow")
-    """Rules that play beside it. `nominal`: the nominal command alone. `lead`: a scripted leader, who knows the path in
-    any case. `follow`: an admittance follower. `clock`: the path by the clock."""
+    rivals: tuple[Rival, ...] = ("lead", "follow")
+    """Rules that play beside it. `nominal`: the nominal command alone, which leads or follows. `lead`: a scripted
+    leader, who knows the path in any case. `follow`: an admittance follower. `clock`: the path by the clock. `stand`:
+    nothing."""
     others: dict[str, tuple[ArtifactName, ...]] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """By label: recipes whose trained skills play, too, or keys of theirs. Under this recipe's own label they are
     further trainings of it, such as other seeds. What they are is part of the key, not what they are called."""

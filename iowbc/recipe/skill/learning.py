@@ -25,7 +25,7 @@ class SkillLearning(Section):
     """Decisions of each game between two updates. All games begin anew with each rollout, so that a resumed training
     needs no state of the simulation; an episode should therefore fit into one."""
     imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
-    """First decisions, in which the robot does not learn from the reward: it drives, and imitates what it would do if it
+    """First decisions, in which the robot does not learn from the reward: it acts, and imitates what it would do if it
     knew the path (DAgger), while the value learns. From the reward alone 80,000 decisions had changed nothing."""
     scripted_steps: int = Field(default=200_000, ge=0, le=10**12)
     """First decisions, those of the imitation included, in which every human is a scripted one."""
@@ -36,6 +36,8 @@ class SkillLearning(Section):
     """Parts into which a rollout is split for the gradient steps; must divide games x rollout."""
     epochs: int = Field(default=5, ge=1, le=1000)
     """Passes over a rollout."""
+    imitation_gradient_steps: int = Field(default=200, ge=1, le=100_000)
+    """Gradient steps of the imitation after each rollout."""
     imitation_rate: float = Field(default=1e-3, gt=0)
     """Adam's step size of the imitation."""
     hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
