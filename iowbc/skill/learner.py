@@ -72,8 +72,8 @@ class SkillTraining:
     def _collect(self) -> tuple[dict[str, Tensor], dict[str, float]]:
         """A rollout: samples by name, flattened, and figures of its episodes."""
         settings, game = self.settings, self.game
-        for each in self.trained.values():
-            each.normalization.move(each.network.normalizer)
+        if self.steps:
+            self._move()
         self.critic.normalization.discounted[:] = 0.0
         observed = game.reset(self.steps // game.n, self.agent_share)
         inputs: dict[str, list[Array]] = {name: [] for name in self.trained}
@@ -99,6 +99,9 @@ class SkillTraining:
             episodes.append({**outcome.figures, "learnt": learnt[-1][endings[-1]]})
             observed = outcome.observed
         rows = {name: np.stack(values) for name, values in inputs.items()}
+        if not self.steps:  # policies with an output of zero do not depend on it
+            self._take_in(rows)
+            self._move()
         prepared = {name: each.prepared(rows[name]) for name, each in self.trained.items()}
         reward, ended_at = np.stack(rewards), np.stack(endings)
         for step, places, behind in cut:
@@ -118,9 +121,19 @@ class SkillTraining:
                 density = log_density(action, mean, agent.log_std)
             own = {"input": prepared[name], "action": action, "mean": mean, "log_density": density}
             samples |= {f"{name}/{part}": values for part, values in own.items()}
+        if self.steps:
+            self._take_in(rows)
+        return {name: values.flatten(0, 1).clone() for name, values in samples.items()}, _of_episodes(episodes)
+
+    def _take_in(self, rows: Mapping[str, Array]) -> None:
+        """Take what networks saw, (T, n, k) each, into their statistics."""
         for name, each in self.trained.items():
             each.normalization.observe(rows[name].reshape(-1, rows[name].shape[-1]))
-        return {name: values.flatten(0, 1).clone() for name, values in samples.items()}, _of_episodes(episodes)
+
+    def _move(self) -> None:
+        """Let the networks' normalisers use their statistics."""
+        for each in self.trained.values():
+            each.normalization.move(each.network.normalizer)
 
     def _explored(self, observed: Observed) -> dict[str, Array]:
         """An action of each agent, drawn from its Gaussian."""
