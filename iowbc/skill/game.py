@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Keys, Mask
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.figures import FIGURES
 from iowbc.skill.observation import sizes
@@ -106,9 +106,11 @@ class TransportGame:
         """Games whose human is that of the actions, in the episodes now played, (n,)."""
         return self._buffers["human_acts"].copy()
 
-    def reset(self) -> Observed:
-        """Begins the first episode of every game, the same one each time."""
-        self._call(Reset())
+    def reset(self, seeds: Keys | None = None) -> Observed:
+        """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds."""
+        groups = self._workers.groups
+        self._workers.ask([Reset(None if seeds is None else seeds[first:last]) for first, last in groups])
+        self._workers.answers()
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> Outcome:
