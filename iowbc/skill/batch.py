@@ -87,11 +87,13 @@ class GameBatch:
         """The student that controls from now on."""
         self.lower.take(student)
 
-    def reset(self, seeds: Keys | None = None, draw: int = 0) -> None:
-        """Begins an episode everywhere, the same one for the same `draw`, from which episodes are counted."""
-        del seeds
-        for counter in (self._episode, self.lower.memory.episode, self.lower.simulation.episode):
-            counter[:] = draw
+    def reset(self, seeds: Keys | None = None) -> None:
+        """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
+        from them."""
+        if seeds is not None:
+            self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
+        self.lower.rewind(self._keys)
+        self._episode[:] = 0
         for name in ("reward", "terminated", "truncated"):
             self.buffers[name][:] = 0
         self._begin(np.arange(self.n))
@@ -170,11 +172,11 @@ class GameBatch:
     def _command(self) -> Array:
         """Nominal commands, (n, 11)."""
         yaw = object_yaw(self.lower.measured) * self._sees_object
-        nominal, clock = self._nominal, self._by_the_clock()
+        nominal = self._nominal
         by_rule = {
             "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
             "follow": nominal.following(self._felt[:, -1].sum(axis=1), yaw),
-            "clock": nominal.leading(clock, self.now),
+            "clock": nominal.leading(self._by_the_clock(1.0), self.now),
             "stand": nominal.standing(),
         }
         unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
@@ -185,13 +187,13 @@ class GameBatch:
     def _intentions(self, action: Array) -> Array:
         """Intentions of the humans, (n, 5)."""
         led = self._human.of_script(pursue(self._skill.pursuit, self.paths, self.now), self.now)
-        blind = self._human.of_script(self._by_the_clock(), self.now)
+        blind = self._human.of_script(self._by_the_clock(self.drawn.pace), self.now)
         scripted = np.where((self.drawn.kind == KINDS.index(CLOCK))[:, None], blind, led)
         acting = led + self._human.of_action(action, self.now)
         return np.where(self.drawn.acts[:, None], acting, scripted)
 
-    def _by_the_clock(self) -> Wanted:
-        return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency)
+    def _by_the_clock(self, pace: Array | float) -> Wanted:
+        return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
 
     def _costs(self) -> Array:
         """Internal force [N], size of the human's power beyond its share [W] and tilt [rad], (3, n)."""

@@ -10,6 +10,8 @@ from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.skill.plan import ABSENT, AGENT, KINDS, RULES, Plan
 
+CLOCK_PACE = (0.5, 1.5)
+"""Range of the pace of a human who ignores the robot: the simulation's leaders go half as fast again at most."""
 FOLLOWER = BEHAVIOURS.index("follower")
 
 
@@ -37,6 +39,8 @@ class EpisodeDraws:
         self._resistance = np.array(resistance)
         self.task, self.kind, self.rule = np.zeros((3, n), np.int64)
         """Number of the task, of the human among `KINDS`, of the nominal command among `RULES`, (n,)."""
+        self.pace = np.ones(n)
+        """Of a human who walks the path by the clock, as a part of the nominal speed, (n,)."""
         self.known, self.acts = np.zeros((2, n), np.bool_)
         """Whether the robot knows the path, and whether the human of the actions plays, (n,)."""
         if plans is not None:
@@ -68,6 +72,8 @@ class EpisodeDraws:
         if self._plans is not None:
             asked = {row: self._plans[row].rule for row in which.tolist()}
             self.rule[which] = [self.rule[row] if rule is None else RULES.index(rule) for row, rule in asked.items()]
+        slow, fast = CLOCK_PACE
+        self.pace[which] = slow + (fast - slow) * chance[:, 5]
         self.acts[which] = kind == KINDS.index(AGENT)
         scripted = kind < len(BEHAVIOURS)
         return {

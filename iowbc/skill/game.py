@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Keys, Mask
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.figures import FIGURES
 from iowbc.skill.observation import sizes
@@ -14,7 +14,7 @@ from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.setup import GameSetup
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
-from iowbc.task.vector.messages import MakeStep, Message
+from iowbc.task.vector.messages import MakeStep, Message, Reset
 from iowbc.task.vector.workers import InProcess, WorkerProcesses
 
 PATIENCE = 60.0
@@ -64,17 +64,15 @@ class TakeStudent:
 
 
 @dataclass(frozen=True)
-class Begin:
-    """Message: begin every game anew; see `TransportGame.reset`."""
+class MeetAgent:
+    """Message: part of the drawn episodes whose human is that of the actions."""
 
-    draw: int
-    agent_share: float
+    share: float
     changes: ClassVar[bool] = True
 
     def carry_out(self, batch: Any) -> None:
         """See `Message`."""
-        batch.drawn.agent_share = self.agent_share
-        batch.reset(draw=self.draw)
+        batch.drawn.agent_share = self.share
 
 
 class TransportGame:
@@ -125,10 +123,14 @@ class TransportGame:
         """Actions with which the robots would do now what they do where they know the path, (n, 11): zero there."""
         return self._buffers["privileged_action"].copy()
 
-    def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
-        """Begins every game anew. `draw`: number of the draw of everything random, the same episodes for the same one;
-        `agent_share`: part of the episodes of drawn games whose human is that of the actions."""
-        self._call(Begin(draw, agent_share))
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
+        """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
+
+        `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
+        self._call(MeetAgent(agent_share))
+        groups = self._workers.groups
+        self._workers.ask([Reset(None if seeds is None else seeds[first:last]) for first, last in groups])
+        self._workers.answers()
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> Outcome:

@@ -75,7 +75,8 @@ class SkillTraining:
         if self.steps:
             self._move()
         self.critic.normalization.discounted[:] = 0.0
-        observed = game.reset(self.steps // game.n, self.agent_share)
+        seeds = np.random.default_rng([self.seed, self.steps]).integers(2**63, size=game.n, dtype=np.uint64)
+        observed = game.reset(seeds, self.agent_share)
         inputs: dict[str, list[Array]] = {name: [] for name in self.trained}
         acted: dict[str, list[Array]] = {name: [] for name in self.agents}
         learnt: list[NDArray[np.bool_]] = []

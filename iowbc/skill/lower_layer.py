@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.rollouts.blocks import in_blocks
 from iowbc.rollouts.history import History
 from iowbc.skill.student import Student
@@ -53,6 +53,12 @@ class LowerLayer(Batch):
         self._student = student.policy
         self._history = History(self.n, student.history, student.observation)
 
+    def rewind(self, seeds: Keys) -> None:
+        """Lets all that is random start anew from seeds (n,)."""
+        self._schedule.reseed(seeds)
+        self.simulation.reseed(self._schedule.key)
+        self.memory.episode[:] = 0
+
     def start(self, which: Indices) -> None:
         """Begins new episodes in some environments, (k,)."""
         self.moved = self.begin(which)
@@ -68,6 +74,9 @@ class LowerLayer(Batch):
         self.buffers["action"][:] = in_blocks(self._student, self._block, seen)
         self._starts[:] = False
         self.step()
+
+    def record(self, judgement: Judgement, action: Array) -> None:
+        """Nobody reads the signals of a trial."""
 
     def feed_partner(self, feed: Array) -> None:
         """See `Batch`."""

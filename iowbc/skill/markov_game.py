@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from iowbc.arrays import Array, Mask
+from iowbc.arrays import Array, Keys, Mask
 from iowbc.skill.game import Observed, Outcome
 
 ROBOT, HUMAN = "robot", "human"
@@ -25,7 +25,7 @@ class Game(Protocol):
     def privileged_actions(self) -> Array:
         """What a robot that knew all would do now, (n, actions)."""
 
-    def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
         """Begin every game anew."""
 
     def step(self, actions: Mapping[str, Array]) -> Outcome:

@@ -30,10 +30,10 @@ def pursue(settings: Pursuit, paths: Paths, now: Situation) -> Wanted:
     return _along(settings, paths, now, now.covered, speed, -settings.lateral * now.lateral)
 
 
-def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array) -> Wanted:
-    """The path at the nominal speed, whatever the object does; `seconds` (n,) since the start."""
-    covered = settings.speed * seconds
-    speed = settings.speed * (covered < paths.length[now.path])
+def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array, pace: Array | float = 1.0) -> Wanted:
+    """The path at a pace (n,) times the nominal speed, whatever the object does; `seconds` (n,) since the start."""
+    covered = settings.speed * pace * seconds
+    speed = settings.speed * pace * (covered < paths.length[now.path])
     return _along(settings, paths, now, covered, speed, np.zeros(len(seconds)))
 
 

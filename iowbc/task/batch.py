@@ -146,12 +146,17 @@ class Batch:
             disturbed=simulation.disturbed,
             resistance=simulation.drawn["rolling_resistance"],
         )
-        write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
-        if self._schedule.repeats:
-            write_trial_signals(self.buffers, simulation, action * self._scale)
+        self.record(judgement, action)
         memory.earlier_action[:], memory.action[:] = memory.action, action
         self.guidance.advance(memory, self._schedule.episode_key)
         self.finish(judgement)
+
+    def record(self, judgement: Judgement, action: Array) -> None:
+        """Writes the signals of the step just made with an action (n, 15)."""
+        simulation, ending = self.simulation, judgement.ending
+        write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
+        if self._schedule.repeats:
+            write_trial_signals(self.buffers, simulation, action * self._scale)
 
     def feed_partner(self, feed: Array) -> None:
         """Writes what the partner hears of the command, (n, 4)."""

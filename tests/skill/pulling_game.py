@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Keys
 from iowbc.skill.game import Observed, Outcome
 from iowbc.skill.markov_game import HUMAN, ROBOT
 
@@ -36,8 +36,8 @@ class PullingGame:
         pull: Array = np.clip(1.5 * (self.goal - self.place) - self.speed, -1.0, 1.0)
         return pull
 
-    def reset(self, draw: int = 0, agent_share: float = 0.0) -> Observed:
-        self.generator, self.agent_share = np.random.default_rng(draw), agent_share
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
+        self.generator, self.agent_share = np.random.default_rng(seeds), agent_share
         self.place, self.speed, self.force, self.goal, self.total = np.zeros((5, self.n))
         self._human_acts, self.age = np.zeros(self.n, np.bool_), np.zeros(self.n, np.int64)
         self._begin(np.ones(self.n, np.bool_))

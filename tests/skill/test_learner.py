@@ -36,7 +36,7 @@ def finish(some: SkillTraining) -> list[dict[str, float]]:
 def returns(some: SkillTraining, agent_share: float) -> float:
     """Mean return of the mean actions."""
     game = PullingGame(256)
-    observed = game.reset(99, agent_share)
+    observed = game.reset(np.arange(256, dtype=np.uint64), agent_share)
     for _ in range(DECISIONS):
         with torch.inference_mode():
             actions = {

@@ -49,7 +49,6 @@ class HumanAgent(Section):
     strongest: float = Field(default=50.0, gt=0.0)
     """Bound on the force of spring and damper of its arms [N], in place of `simulation.partner.strongest`: with its
     share of the resistance it does not move the crate alone."""
-
     velocity: float = Field(default=0.3, gt=0.0)
     """Largest change of the horizontal velocity of the handle, per axis [m/s]: as fast as the script walks."""
     vertical_velocity: float = Field(default=0.1, gt=0.0)
