@@ -12,7 +12,7 @@ import numpy as np
 import onnxruntime
 
 from iowbc.arrays import Array, Mask
-from iowbc.control.command import nominal_command
+from iowbc.control.command import approach, nominal_command, rate_limits
 from iowbc.control.hand_forces import HandForces
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
@@ -41,6 +41,7 @@ class Skill:
         self._every = round(controller.frequency / contract.frequency)
         self._references, self._hands = references, HandForces(controller.robot, references, n)
         self._grasp = np.tile(both_wrists(base_grasp(controller.contract.references.grasps, scene)), (n, 1, 1))
+        self._largest_step = rate_limits(contract.commands.rates) / controller.frequency
         self._pushing: Mask = np.full(n, pushing)
         self._rule = SkillCommand(contract.robot, contract.commands, self._pushing)
         self.observation = np.zeros((n, contract.observation), np.float32)
@@ -98,7 +99,9 @@ class Skill:
                 *(state[name].astype(np.float64) for name in ("posture", "command")), self._grasp
             )
             self._wrist_error = wrists - wanted
-        command = state["command"].astype(np.float64) if self._passed else self._command
+        command = self._command
+        if self._passed:
+            command = approach(state["command"].astype(np.float64), command, self._largest_step)
         n, sees_object = len(command), self.contract.sees_object
         unknown, no_path = np.zeros(n, np.bool_), np.zeros((n, WAYPOINTS))
         self.observation = robot_observation(

@@ -30,9 +30,10 @@ from iowbc.task.specification import Specification
 ROOT = Path(__file__).parents[2]
 PUBLISHED = ROOT / "runs" / "published"
 DECISIONS = 4
-ONE_PERIOD = 0.05
-"""What a control period may change in an observation, 2.5 N or 5 mm, and in a command: the deployed skill sees the command that was in force, the game's
-the one that comes into force."""
+ONE_PERIOD = 0.1
+"""What a control period may change in an observation, 5 N or 1 cm, and in a command: the deployed skill sees the
+command that was in force, the game
+that which comes into force."""
 
 
 @pytest.fixture(scope="module")
