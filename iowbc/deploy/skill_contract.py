@@ -23,8 +23,6 @@ class SkillContract(Section):
 
     format: Literal[1] = 1
     """Raised when a reader of the old format would misread the new one."""
-    recipe: str
-    """Name of the recipe that was exported."""
     frequency: float = Field(gt=0)
     """Decisions a second [Hz]; a whole part of the controller's frequency."""
     observation: int = Field(ge=1)

@@ -44,7 +44,6 @@ def write_skill(
     sources: artifact keys of what went into the skill, by stage.
     """
     contract = SkillContract(
-        recipe=recipe.name,
         frequency=recipe.skill.frequency,
         observation=observations.shape[1],
         sees_object=recipe.task.observation.observe_object and recipe.distill.observe_object,
@@ -54,7 +53,7 @@ def write_skill(
         versions={name: version(name) for name in PACKAGES},
     )
     program = SkillProgram(network)
-    about = {"recipe": recipe.name, "contract": contract.model_dump_json(exclude={"files"}), **sources}
+    about = {"contract": contract.model_dump_json(exclude={"files"}), **sources}
     write_onnx(program, out / GRAPH, recipe.export.opset, about)
     inputs = {"observation": np.ascontiguousarray(observations, np.float32)}
     expected = run_torch(program, inputs)

@@ -17,7 +17,7 @@ SKILL = {"skill", "skill-eval"}
 SIMULATING = {"teacher", "distill", "eval", "export", *SKILL}
 ALL = {"rg-dataset", "rg-fit", *SIMULATING}
 MOVED = {
-    "name": {"export", "skill"},
+    "name": {"export"},
     "seed": {"rg-dataset", "rg-fit", "teacher", "distill", "export", "skill"},
     "rg.method": {"rg-dataset"},
     "rg.height": ALL,
