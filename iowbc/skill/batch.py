@@ -1,6 +1,6 @@
 """The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -81,6 +81,8 @@ class GameBatch:
         self._action = {"robot": np.zeros((n, ROBOT_ACTIONS)), "human": np.zeros((n, HUMAN_ACTIONS))}
         self.now: Situation
         """The games after the last control step."""
+        self.watch: Callable[[], None] = lambda: None
+        """Called after every control step."""
 
     def take(self, student: Student) -> None:
         """The student that controls from now on."""
@@ -113,6 +115,7 @@ class GameBatch:
             self._hands.add(simulation.target, simulation.measured.joint_position, simulation.measured.joint_velocity)
             self.now = self._situation(self.now.covered)
             costs += self._costs()
+            self.watch()
         self._decisions += 1
         self._feel()
         self._judge(costs * lower.period, jerk)

@@ -32,7 +32,8 @@ class NominalCommand:
     def leading(self, wanted: Wanted, now: Situation) -> Array:
         """Commands that move the object as wanted: the base goes round the object's centre as it turns.
 
-        v_base = v_object - ω × (object - base), in the heading frame.
+        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the height of the path, and
+        once more by what the object lacks of it.
         """
         command = self.standing()
         rate = wanted.yaw_rate + self._skill.pursuit.yaw * wrapped(wanted.heading - now.heading)
@@ -41,7 +42,7 @@ class NominalCommand:
         command[:, 0] += rate * arm[:, 1]
         command[:, 1] -= rate * arm[:, 0]
         command[:, YAW_RATE] = rate
-        self._raise(command, wanted.height)
+        self._raise(command, 2.0 * wanted.height - now.position[:, 2])
         return command
 
     def following(self, force: Array, object_yaw: Array) -> Array:
