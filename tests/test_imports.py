@@ -34,6 +34,7 @@ MAY_IMPORT = {
     "learning": SHARED | {"rollouts"},
     "task": WORLD | {"rollouts"},
     "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "results"},
+    "skill": WORLD | {"task", "rollouts", "learning", "evaluation"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},

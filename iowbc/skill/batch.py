@@ -202,7 +202,8 @@ class GameBatch:
         internal = internal_force(robot[:, :2], partner[:, :2])
         velocity = state.handle_velocity[:, :2]
         speed = np.linalg.norm(velocity, axis=1)
-        power = np.abs(np.vecdot(partner[:, :2], velocity) - drawn["partner_share"] * drawn["rolling_resistance"] * speed)
+        needed = drawn["partner_share"] * drawn["rolling_resistance"] * speed
+        power = np.abs(np.vecdot(partner[:, :2], velocity) - needed)
         heading = self.paths.heading(self.drawn.task, self.now.covered) + self.origin.heading
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         borne = [np.where(self._pushing, np.vecdot(f[:, :2], along), f[:, 2]) for f in (robot, robot + partner)]
@@ -236,9 +237,7 @@ class GameBatch:
         own |= {"pushing": self._pushing, "known": known, "waypoints": path * known}
         own |= {"forces": self._felt.reshape(self.n, -1) / seen.FORCE}
         force = self.origin.turned(lower.simulation.state.partner_force)
-        felt = seen.felt_by_human(
-            now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw)
-        )
+        felt = seen.felt_by_human(now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw))
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         robot, human = seen.joined(own), seen.joined(felt)
@@ -248,9 +247,8 @@ class GameBatch:
     def _write_figures(self, which: Indices, end: GameEnding) -> None:
         """Figures of the episodes that ended, (k,)."""
         drawn, simulation = self.drawn, self.lower.simulation
-        values = self._figures.read(which, self.lower.period) | {
-            name: getattr(end, name)[which] for name in ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
-        }
+        ends = ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
+        values = self._figures.read(which, self.lower.period) | {name: getattr(end, name)[which] for name in ends}
         values |= {
             "touched": self._touched[which] / self._skill.frequency,
             "covered": self.now.covered[which],

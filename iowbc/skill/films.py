@@ -45,8 +45,9 @@ def film_game(
         game.reset()
         simulation = batch.lower.simulation
         azimuth = float(np.degrees(batch.origin.heading[0])) + VIEW
-        size = {"width": video.width, "height": video.height}
-        with SceneRenderer(simulation, 0, **size, distance=3.6, azimuth=azimuth, elevation=-22.0) as renderer:
+        with SceneRenderer(
+            simulation, width=video.width, height=video.height, distance=3.6, azimuth=azimuth, elevation=-22.0
+        ) as renderer:
             renderer.lines = path_lines(batch, 0)
             frames = 0
 

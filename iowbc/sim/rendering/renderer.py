@@ -13,7 +13,6 @@ from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS, forces
 from iowbc.sim.rendering.offscreen import Image, Offscreen
 from iowbc.sim.simulation import Simulation
 
-
 LINE_RADIUS = 0.012
 """Of lines on the ground [m]."""
 
