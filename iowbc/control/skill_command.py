@@ -38,7 +38,7 @@ class SkillCommand:
 
     def with_action(self, nominal: Array, action: Array) -> Array:
         """Nominal command and scaled action (n, 11) in [-1, 1], within the ranges of training."""
-        command = nominal + self._scale * action
+        command: Array = nominal + self._scale * action
         command[:, VELOCITY] = command[:, VELOCITY].clip(self._low, self._high)
         low, high = self._commands.height
         command[:, HEIGHT] = command[:, HEIGHT].clip(low, high)

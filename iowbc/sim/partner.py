@@ -1,8 +1,8 @@
 """The second carrier: a spring, a damper and a preload at the object's far handle, on a path of its own.
 
 The path is that of the command, integrated from where the episode began, and changed by the partner's behaviour; a
-follower goes where the handle goes. A steered partner has a velocity of its own instead, and turns the object. All is real sums, products and roots, which round alike however many environments
-there are; NumPy's complex products do not.
+follower goes where the handle goes. A steered partner has a velocity of its own instead, and turns the object. All is
+real sums, products and roots, which round alike however many environments there are; NumPy's complex products do not.
 """
 
 import numpy as np
@@ -56,8 +56,9 @@ class Partner:
         self._resistance, self._bound, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
         self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)
         self.steered = np.zeros(n, np.bool_)
-        """Partners whose feed is their own: velocity of the handle in the frame of the heading at the start, yaw rate of
-        the object, and height of the handle from any origin; from the next reset on, (n,). Not part of snapshots."""
+        """Partners whose feed is their own: velocity of the handle in the frame of the heading at the start, yaw rate
+        of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of
+        snapshots."""
         self._turning_inertia = np.array([measured(thing).about_axes[2] if thing else 0.0 for thing in things])
         self._yaw_stiffness, self._yaw_damping, self._yaw_lead = np.zeros(n), np.zeros(n), np.zeros(n)
         self._present, self._height = np.zeros(n), np.full(n, np.nan)
@@ -87,7 +88,9 @@ class Partner:
         self._resistance[which] = (present & pushing) * resistance
         strongest, steered = self._recipe.strongest, self.steered[which]
         self._bound[which] = np.where(
-            pushing & ~steered, np.minimum(self._recipe.push_yielding * np.abs(share) * resistance, strongest), strongest
+            pushing & ~steered,
+            np.minimum(self._recipe.push_yielding * np.abs(share) * resistance, strongest),
+            strongest,
         )
         self._behave(which, drawn)
         turning = self._recipe.stability * mass * self._turning_inertia[which] / self._period

@@ -8,13 +8,13 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.skill.episodes import nominal, play_once
 from iowbc.skill.game import TransportGame
-from iowbc.skill.plan import ABSENT, CLOCK, Plan
+from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2
 """Success of the reference pair, at least, and of a lone robot, at most: four of five trials."""
-PAIRS = {
+PAIRS: dict[str, tuple[str, Rule]] = {
     "reference": ("path", "lead"),
     "lone robot": (ABSENT, "lead"),
     "passive robot": ("path", "stand"),
@@ -44,7 +44,8 @@ class Admission:
             if self.success[pair] > UNSOLVED:
                 found.append(f"with a {pair} {self.success[pair]:.0%} succeed, expected {UNSOLVED:.0%} or less")
         if self.reward["ignoring"] >= self.reward["reference"]:
-            found.append(f"a pair that ignores each other earns {self.reward['ignoring']:.2f}, no less than the reference")
+            earned = self.reward["ignoring"]
+            found.append(f"a pair that ignores each other earns {earned:.2f}, no less than the reference")
         return tuple(found)
 
 

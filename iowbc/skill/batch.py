@@ -1,6 +1,6 @@
 """The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -82,6 +82,8 @@ class GameBatch:
         self._action = {"robot": np.zeros((n, ROBOT_ACTIONS)), "human": np.zeros((n, HUMAN_ACTIONS))}
         self.now: Situation
         """The games after the last control step."""
+        self.watch: Callable[[], None] = lambda: None
+        """Called after every control step."""
 
     def take(self, student: Student) -> None:
         """The student that controls from now on."""
@@ -114,6 +116,7 @@ class GameBatch:
             self._hands.add(simulation.target, simulation.measured.joint_position, simulation.measured.joint_velocity)
             self.now = self._situation(self.now.covered)
             costs += self._costs()
+            self.watch()
         self._decisions += 1
         self._feel()
         self._judge(costs * lower.period, jerk)
@@ -203,9 +206,8 @@ class GameBatch:
         internal = internal_force(robot[:, :2], partner[:, :2])
         velocity = state.handle_velocity[:, :2]
         speed = np.linalg.norm(velocity, axis=1)
-        power = np.abs(
-            np.vecdot(partner[:, :2], velocity) - drawn["partner_share"] * drawn["rolling_resistance"] * speed
-        )
+        needed = drawn["partner_share"] * drawn["rolling_resistance"] * speed
+        power = np.abs(np.vecdot(partner[:, :2], velocity) - needed)
         heading = self.paths.heading(self.drawn.task, self.now.covered) + self.origin.heading
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         borne = [np.where(self._pushing, np.vecdot(f[:, :2], along), f[:, 2]) for f in (robot, robot + partner)]
@@ -250,10 +252,8 @@ class GameBatch:
     def _write_figures(self, which: Indices, end: GameEnding) -> None:
         """Figures of the episodes that ended, (k,)."""
         drawn, simulation = self.drawn, self.lower.simulation
-        values = self._figures.read(which, self.lower.period) | {
-            name: getattr(end, name)[which]
-            for name in ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
-        }
+        ends = ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
+        values = self._figures.read(which, self.lower.period) | {name: getattr(end, name)[which] for name in ends}
         values |= {
             "touched": self._touched[which] / self._skill.frequency,
             "covered": self.now.covered[which],

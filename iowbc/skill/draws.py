@@ -64,10 +64,8 @@ class EpisodeDraws:
         )
         if self._plans is not None:
             plans = [self._plans[row] for row in which]
-            mass = np.array([own if plan.mass is None else plan.mass for own, plan in zip(mass, plans, strict=True)])
-            share = np.array(
-                [own if plan.share is None else plan.share for own, plan in zip(share, plans, strict=True)]
-            )
+            held = np.array([[plan.mass, plan.share] for plan in plans], np.float64)
+            mass, share = np.where(np.isnan(held.T), (mass, share), held.T)
         self.rule[which] = np.where(self.known[which], RULES.index("lead"), RULES.index("follow"))
         if self._plans is not None:
             asked = {row: self._plans[row].rule for row in which.tolist()}

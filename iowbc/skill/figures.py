@@ -11,23 +11,11 @@ TINY = 1e-9
 FIGURES = (
     *("success", "time", "path_error", "path_error_max", "yaw_error", "height_error", "tilt", "internal_force"),
     *("partner_force_mean", "partner_force_p90", "partner_work", "load_share", "fallen", "dropped", "touched"),
-    *(
-        "strayed",
-        "diverged",
-        "time_out",
-        "covered",
-        "reward",
-        "known",
-        "mass",
-        "share",
-        "task",
-        "partner",
-        "environment",
-        "episode",
-    ),
+    *("strayed", "diverged", "time_out", "covered", "reward", "known", "mass", "share"),
+    *("task", "partner", "environment", "episode"),
 )
-"""Figures of an episode: seconds, metres, radians, newtons, joules; the largest tilt, means of the internal force and of
-the size of yaw and height error; task and partner by number."""
+"""Figures of an episode: seconds, metres, radians, newtons, joules; the largest tilt, means of the internal force and
+of the size of yaw and height error, seconds in a wall; task and partner by number."""
 
 
 class EpisodeFigures:

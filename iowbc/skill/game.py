@@ -15,7 +15,7 @@ from iowbc.skill.setup import GameSetup
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 from iowbc.task.vector.messages import MakeStep, Message, Reset
-from iowbc.task.vector.workers import InProcess, WorkerProcesses
+from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 
 PATIENCE = 60.0
 """Time for a decision of all games before a worker counts as hung [s]."""
@@ -101,7 +101,7 @@ class TransportGame:
         found = dict(sizes(skill))
         self.state_size = found.pop("state")
         self.observation_sizes = found
-        self._workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
+        self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
         self._buffers = self._workers.buffers
         self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
         self._call(TakeStudent(student))
@@ -111,7 +111,8 @@ class TransportGame:
         """The games themselves, where they are played in this process."""
         if not isinstance(self._workers, InProcess):
             raise AttributeError("the games live in worker processes; make the game with workers=0")
-        return self._workers.batch
+        batch: GameBatch = self._workers.batch
+        return batch
 
     @property
     def human_acts(self) -> Mask:

@@ -20,7 +20,8 @@ class NominalCommand(SkillCommand):
     def leading(self, wanted: Wanted, now: Situation) -> Array:
         """Commands that move the object as wanted: the base goes round the object's centre as it turns.
 
-        v_base = v_object - ω × (object - base), in the heading frame.
+        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the height of the path, and
+        once more by what the object lacks of it.
         """
         command = self.standing()
         rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.heading)
@@ -29,7 +30,7 @@ class NominalCommand(SkillCommand):
         command[:, 0] += rate * arm[:, 1]
         command[:, 1] -= rate * arm[:, 0]
         command[:, YAW_RATE] = rate
-        self._raise(command, wanted.height)
+        self._raise(command, 2.0 * wanted.height - now.position[:, 2])
         return command
 
     def _raise(self, command: Array, height: Array) -> None:

@@ -21,7 +21,12 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
     metadata: ClassVar[Values] = {"name": "iowbc_transport_v0", "is_parallelizable": True, "render_modes": []}
 
     def __init__(
-        self, specification: Specification, student: Student, *, plan: Plan | None = None, partners: tuple[str, ...] = (AGENT,)
+        self,
+        specification: Specification,
+        student: Student,
+        *,
+        plan: Plan | None = None,
+        partners: tuple[str, ...] = (AGENT,),
     ) -> None:
         """`plan`: what is held in every episode; without, tasks and humans (`partners`) are drawn."""
         plans = None if plan is None else (plan,)

@@ -66,6 +66,14 @@ class Paths:
         width: Array = self._half_width[path, index]
         return width
 
+    def outline(self, path: int) -> tuple[Array, Array]:
+        """Points of one path, (k, 2) [m], and of its walls on both sides, (2, k, 2), NaN where there are none."""
+        last = self._last[path] + 1
+        points, heading, half = self.points[path, :last], self._heading[path, :last], self._half_width[path, :last]
+        normal = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        away = np.where(np.isfinite(half), half, np.nan)[:, None] * normal
+        return points, np.stack([points + away, points - away])
+
     def point(self, path: Indices, covered: Array) -> Array:
         """Points at ways along paths, (n, 2) [m]."""
         return np.stack([self._read(self.points[..., axis], path, covered) for axis in (0, 1)], axis=1)

@@ -47,9 +47,8 @@ def ending(
     strayed = (np.abs(now.lateral) > finish.stray) & sound & ~walls
     success = reached & sound & ~walls & ~strayed
     over = ~sound | walls | strayed | success
-    return GameEnding(
-        success, fallen & ~diverged, dropped & ~(fallen | diverged), walls, strayed, diverged, late & ~over
-    )
+    fell, lost = fallen & ~diverged, dropped & ~(fallen | diverged)
+    return GameEnding(success, fell, lost, walls, strayed, diverged, late & ~over)
 
 
 def potential(skill: Skill, now: Situation, held: Mask) -> Array:

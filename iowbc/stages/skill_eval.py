@@ -9,7 +9,7 @@ from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 from iowbc.stages.skill import GAME
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.skill.games import Competitor
+    from iowbc.skill.evaluation.games import Competitor
 
 RIVALS = {
     "nominal": "nominal",
@@ -47,11 +47,11 @@ def run(job: Job) -> None:
     import pandas as pd
     import torch
 
-    from iowbc.evaluation.skill.games import Evaluation, cases
-    from iowbc.evaluation.skill.tables import figure, headline, tables
     from iowbc.learning.storage import read_network
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
+    from iowbc.skill.evaluation.games import Evaluation, cases
+    from iowbc.skill.evaluation.tables import figure, headline, tables
     from iowbc.skill.game import TransportGame
     from iowbc.skill.student import load_student
     from iowbc.task.specification import Specification
@@ -88,8 +88,8 @@ def run(job: Job) -> None:
 
 def _competitors(job: Job) -> "list[Competitor]":
     """This recipe's skill, those of others, and rivals."""
-    from iowbc.evaluation.skill.games import Competitor
     from iowbc.learning.storage import read_network
+    from iowbc.skill.evaluation.games import Competitor
 
     asked = job.recipe.skill.eval
     folders = {(asked.label, "own"): job.inputs["skill"]} if "skill" in job.inputs else {}

@@ -11,8 +11,8 @@ def scene_of(count: int, shares: Iterable[tuple[str, float]]) -> list[str]:
     Environments of one scene follow one another: most worker processes then hold one scene alone, and their arrays are
     copied as a block.
     """
-    names, weights = zip(*shares, strict=True)
-    weights = np.array(weights)
+    names, given = zip(*shares, strict=True)
+    weights = np.array(given)
     wanted = count * weights / weights.sum()
     whole = np.floor(wanted + 1e-9).astype(int)
     short = np.argsort(-(wanted - whole), kind="stable")[: count - whole.sum()]

@@ -27,7 +27,8 @@ def same(first: Outcome, second: Outcome) -> bool:
     pairs = [(getattr(first, name), getattr(second, name)) for name in ("reward", "terminated", "truncated")]
     for one, other in ((first.observed, second.observed), (first.final, second.final)):
         pairs += [(one.state, other.state), *zip(one.observations.values(), other.observations.values(), strict=True)]
-    pairs += [(first.figures[name], second.figures[name]) for name in first.figures if first.figures[name].dtype != object]
+    figures = [name for name, values in first.figures.items() if values.dtype != object]
+    pairs += [(first.figures[name], second.figures[name]) for name in figures]
     return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
@@ -106,5 +107,5 @@ def test_wrong_games_are_refused_with_what_is_known(make: Make) -> None:
         make(n=2, plans=[Plan("lift_straight", "path", True)])
     game = make(n=1)
     game.reset()
-    with pytest.raises(ValueError, match=r"actions of human have shape \(1, 4\); expected finite ones of shape \(1, 5\)"):
+    with pytest.raises(ValueError, match=r"actions of human have shape \(1, 4\); expected .* shape \(1, 5\)"):
         game.step({"robot": np.zeros((1, 11)), "human": np.zeros((1, 4))})

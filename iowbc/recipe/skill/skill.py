@@ -87,7 +87,7 @@ class Finish(Section):
     """Largest distance from the path at the end [m]."""
     yaw: float = Field(default=0.3, gt=0.0)
     """Largest deviation from the path's heading at the end [rad]."""
-    height: float = Field(default=0.06, gt=0.0)
+    height: float = Field(default=0.08, gt=0.0)
     """Largest distance from the path's height at the end [m], for an object that is carried."""
     walls: Literal["end", "cost"] = "cost"
     """Consequence of an object's corner in a wall: the end of the game, or a cost by time."""

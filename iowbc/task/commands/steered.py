@@ -17,7 +17,7 @@ class SteeredCommander(Commander):
     """What is `wanted` in n environments is approached at the recipe's rates and clamped to what is feasible, as every
     command is. An episode begins in the wanted posture, standing."""
 
-    def __init__(self, recipe: Recipe, guidance: Guidance, scenes: Sequence[str], period: float) -> None:
+    def __init__(self, recipe: Recipe, guidance: Guidance, scenes: Sequence[str] | Array, period: float) -> None:
         """Takes over from the commander of `guidance`; `scenes`: name of each environment's."""
         kinds = [getattr(recipe.simulation.scenes, name).kind for name in scenes]
         nominal = nominal_command(recipe.task.commands)
