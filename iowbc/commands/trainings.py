@@ -1,7 +1,7 @@
 """What stands behind a comparison: how long each policy was trained, with which seed, and what is still missing."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from iowbc.results.table import ABSENT, Table, heads
 from iowbc.stages.registry import STAGES
@@ -16,7 +16,10 @@ def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> T
     """A row for each run; `missing`: recipes that belong to the comparison and have not run."""
     import pandas as pd
 
-    methods = {name: stage.presentation.trained_by for name, stage in STAGES.items() if stage.presentation.trained_by}
+    named = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
+    named |= {"teacher", "distill"}
+    methods = {name: STAGES[name].presentation.trained_by for name in STAGES if name in named}
+    methods = {name: method for name, method in methods.items() if method}
     rows: list[tuple[str, ...]] = []
     numbers: list[dict[str, object]] = []
     for group in groups:
@@ -35,8 +38,10 @@ def steps_of(run: "Run", stage: str) -> int | None:
     """Environment steps of a stage that trains; None where the run has no such stage."""
     if stage not in run.recipe.get("stages", ()):
         return None
-    made = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
-    return int(made[stage]["steps"])
+    made: Any = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
+    for part in STAGES[stage].counts[0].split("."):
+        made = made[part]
+    return int(made)
 
 
 def _caption(numbers: Sequence[dict[str, object]], missing: Sequence[str]) -> str:
