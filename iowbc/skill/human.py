@@ -27,7 +27,8 @@ class Human:
         self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
 
     def of_action(self, action: Array, now: Situation) -> Array:
-        """What actions (n, 5) add to the script's intentions (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the height [m]."""
+        """What actions (n, 5) add to the script's intentions, (n, 5): velocity in space [m/s], yaw rate [rad/s], offset
+        of the height [m]."""
         s = self._settings
         scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
         return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)
