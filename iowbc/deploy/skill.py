@@ -95,9 +95,8 @@ class Skill:
         if self._passed:
             force, wrists = self._hands.read(measured.projected_gravity)
             self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
-            wanted = self._references.wrist_target(
-                *(state[name].astype(np.float64) for name in ("posture", "command")), self._grasp
-            )
+            posture, last = (state[name].astype(np.float64) for name in ("posture", "command"))
+            wanted = self._references.wrist_target(posture, last, self._grasp)
             self._wrist_error = wrists - wanted
         command = self._command
         if self._passed:
@@ -110,4 +109,5 @@ class Skill:
         action = run(self._session, {"observation": self.observation})["action"]
         yaw = object_yaw(measured) if sees_object else np.zeros(n)
         decided = self._rule.with_action(self._rule.following(self._felt[:, -1].sum(axis=1), yaw), action)
-        self._command = np.where(np.isfinite(decided).all(axis=1)[:, None], decided, self._command)
+        whole: Mask = np.isfinite(decided).all(axis=1, keepdims=True)
+        self._command = np.where(whole, decided, self._command)

@@ -49,3 +49,10 @@ def load_teacher(folder: Path) -> tuple[TeacherNetwork, dict[str, Any]]:
     network, about = load_network(folder)
     assert isinstance(network, TeacherNetwork)
     return network, about
+
+
+def read_teacher(folder: Path, name: str) -> TeacherNetwork:
+    """The network of one observation that `save_network` wrote under a name."""
+    network, _ = read_network(folder, name)
+    assert isinstance(network, TeacherNetwork)
+    return network

@@ -83,7 +83,7 @@ class SkillTraining:
         privileged: list[Array] = []
         rewards, endings = [], []
         cut: list[tuple[int, NDArray[np.int64], Array]] = []
-        episodes: list[dict[str, Array]] = []
+        episodes: list[dict[str, NDArray[Any]]] = []
         for step in range(settings.rollout):
             learnt.append(game.human_acts.copy())
             privileged.append(game.privileged_actions)
@@ -273,7 +273,7 @@ class SkillTraining:
         checkpoint.restore_random(under("random", arrays))
 
 
-def _of_episodes(ended: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+def _of_episodes(ended: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, float]:
     """Means over the episodes that ended, by who was the human."""
     columns = {name: np.concatenate([np.asarray(each[name]) for each in ended]) for name in ended[0]}
     columns = {name: values.astype(np.float64) for name, values in columns.items() if values.dtype.kind in "fib"}

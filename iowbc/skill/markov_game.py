@@ -13,9 +13,15 @@ class Game(Protocol):
     """n games that are played side by side; see `TransportGame`."""
 
     n: int
-    observation_sizes: dict[str, int]
-    action_sizes: dict[str, int]
     state_size: int
+
+    @property
+    def observation_sizes(self) -> Mapping[str, int]:
+        """Of each agent."""
+
+    @property
+    def action_sizes(self) -> Mapping[str, int]:
+        """Of each agent."""
 
     @property
     def human_acts(self) -> Mask:

@@ -47,7 +47,7 @@ def run(job: Job) -> None:
     import pandas as pd
     import torch
 
-    from iowbc.learning.storage import read_network
+    from iowbc.learning.storage import read_teacher
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
     from iowbc.skill.evaluation.games import Evaluation, cases
@@ -60,7 +60,7 @@ def run(job: Job) -> None:
     recipe, skill = job.recipe, job.recipe.skill
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
     student = load_student(job.inputs[policy_stage(recipe)])
-    human = read_network(job.inputs["skill"], "human")[0] if "skill" in job.inputs else None
+    human = read_teacher(job.inputs["skill"], "human") if "skill" in job.inputs else None
     evaluation = Evaluation(
         lambda plans: TransportGame(world, student, n=len(plans), workers=job.workers, seed=0, plans=plans),
         human,
@@ -88,7 +88,7 @@ def run(job: Job) -> None:
 
 def _competitors(job: Job) -> "list[Competitor]":
     """This recipe's skill, those of others, and rivals."""
-    from iowbc.learning.storage import read_network
+    from iowbc.learning.storage import read_teacher
     from iowbc.skill.evaluation.games import Competitor
 
     asked = job.recipe.skill.eval
@@ -97,7 +97,7 @@ def _competitors(job: Job) -> "list[Competitor]":
         label, place = name.rsplit("/", 1)
         folders[label, place] = job.inputs[name]
     trained = [
-        Competitor(label, training, None, read_network(folder, "robot")[0])
+        Competitor(label, training, None, read_teacher(folder, "robot"))
         for (label, training), folder in folders.items()
     ]
     return trained + [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]

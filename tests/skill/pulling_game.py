@@ -53,7 +53,11 @@ class PullingGame:
     def observed(self) -> Observed:
         way = self.goal - self.place
         robot, human = [self.speed, self.force], [way, self.speed, self.force]
-        rows = {ROBOT: robot, HUMAN: human, "state": [way, self.speed, self.force, self._human_acts]}
+        rows: dict[str, list[Array]] = {
+            ROBOT: robot,
+            HUMAN: human,
+            "state": [way, self.speed, self.force, self._human_acts],
+        }
         found = {name: np.stack(columns, axis=1).astype(np.float32) for name, columns in rows.items()}
         return Observed({name: found[name] for name in (ROBOT, HUMAN)}, found["state"])
 

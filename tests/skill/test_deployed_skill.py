@@ -83,7 +83,12 @@ def test_skill_and_controller_do_what_the_game_does(
     with closing(game_of(recipe, controller)) as game:
         seen, lower, measurements = game.reset(), game.batch.lower, []
         control = lower.control
-        lower.control = lambda: (measurements.append(copied(lower.measured)), control())  # type: ignore[method-assign]
+
+        def watched() -> None:
+            measurements.append(copied(lower.measured))
+            control()
+
+        lower.control = watched  # type: ignore[method-assign]
         controller.reset(scene="lift")
         human = np.zeros((1, 5), np.float32)
         for decision in range(DECISIONS):
@@ -113,7 +118,7 @@ def test_golden_vectors_are_those_of_the_graph(folder: Path, network: TeacherNet
 def test_measurements_that_are_no_numbers_leave_the_command(folder: Path, controller: Controller) -> None:
     skill = Skill.load(folder, controller)
     upright = np.array([[0.0, 0.0, -1.0]])
-    some = {
+    some: dict[str, Any] = {
         field.name: np.zeros(shape)
         for field, shape in zip(
             fields(Measured),

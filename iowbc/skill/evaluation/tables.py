@@ -89,9 +89,12 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", told: str) -
 def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> tuple[float, float, float]:
     """Interquartile mean, or the mean where `whole`, with the ends of its interval."""
     values = by_training(games, figure)
-    mean = np.mean if whole else interquartile_mean
     drawn = np.stack([values[trainings][:, units].ravel() for trainings, units in _resamples(*values.shape)])
-    return float(mean(values.ravel())), *percentile_interval(np.asarray(mean(drawn, axis=-1) if whole else mean(drawn)))
+
+    def mean(rows: Values) -> Values:
+        return np.asarray(rows.mean(axis=-1)) if whole else interquartile_mean(rows)
+
+    return float(mean(values.ravel())), *percentile_interval(mean(drawn))
 
 
 def by_training(games: pd.DataFrame, figure: str) -> Values:
@@ -99,7 +102,8 @@ def by_training(games: pd.DataFrame, figure: str) -> Values:
     wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
         index="training", columns=UNIT, values=figure
     )
-    return wide.to_numpy(np.float64)
+    found: Values = wide.to_numpy(np.float64)
+    return found
 
 
 def worst_partner(games: pd.DataFrame) -> tuple[float, float, float]:
@@ -131,7 +135,7 @@ def _cell(ends: tuple[float, ...], form: str) -> Cell:
 
 def headline(games: pd.DataFrame) -> dict[str, float]:
     """Force, worst partner and success of each competitor, in games that only the human knows and in the others."""
-    found = {}
+    found: dict[str, float] = {}
     for (label, known), own in games.groupby(["label", "known"], sort=False):
         name = f"{label}/{'known' if known else 'human_only'}".replace(" ", "_")
         values: Mapping[str, float] = {
