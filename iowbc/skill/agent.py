@@ -19,8 +19,8 @@ from iowbc.recipe.skill.learning import SkillLearning
 class Trained:
     """A network that learns, with the running statistics of its inputs and its optimiser."""
 
-    def __init__(self, inputs: int, outputs: int, settings: SkillLearning, gain: float) -> None:
-        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start."""
+    def __init__(self, inputs: int, outputs: int, settings: SkillLearning, gain: float, rate: float) -> None:
+        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's step size."""
         self.architecture: dict[str, Any] = {
             "inputs": inputs,
             "actions": outputs,
@@ -31,7 +31,7 @@ class Trained:
         self.network = TeacherNetwork(**self.architecture)
         self.network.body.initialize(HIDDEN_GAIN, gain)
         self.normalization = Normalization(inputs, settings.games, settings.gamma, None)
-        self.rate, self.gradient_norm = settings.learning_rate, settings.gradient_norm
+        self.rate, self.gradient_norm = rate, settings.gradient_norm
         self.log_std = nn.Parameter(torch.full((outputs,), float(np.log(settings.initial_std))))
         """Of a policy; a value has no use for it."""
         self.parameters = [*self.network.body.parameters(), self.log_std]

@@ -38,8 +38,12 @@ class SkillTraining:
         self.settings, self.game, self.seed = settings, game, seed
         self.steps, self.planned = 0, settings.steps
         sizes = game.observation_sizes
-        self.agents = {name: Trained(sizes[name], game.action_sizes[name], settings, 0.0) for name in (ROBOT, HUMAN)}
-        self.critic = Trained(sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size, 1, settings, VALUE_GAIN)
+        rate = settings.learning_rate
+        self.agents = {
+            name: Trained(sizes[name], game.action_sizes[name], settings, 0.0, rate) for name in (ROBOT, HUMAN)
+        }
+        seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
+        self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
         self._factor = torch.ones(0)
         self.imitated = self._nothing_imitated()
         """Observations and privileged actions of the robot while it imitates."""

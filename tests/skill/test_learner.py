@@ -19,6 +19,7 @@ SETTINGS = SkillLearning(
     rollout=ROLLOUT,
     hidden=(32, 32),
     learning_rate=1e-3,
+    value_learning_rate=1e-3,
 )
 
 

@@ -46,11 +46,14 @@ class SkillLearning(Section):
     """Activation of the hidden layers."""
     normalization_clip: float = Field(default=5.0, gt=0)
     """Normalised inputs are clipped to this many standard deviations."""
-    learning_rate: float = Field(default=3e-4, gt=0)
-    """Adam's step size at the start."""
+    learning_rate: float = Field(default=6e-5, gt=0)
+    """Adam's step size of the policies at the start; at 3e-4 the first update after the imitation had a KL divergence
+    of 0.35."""
+    value_learning_rate: float = Field(default=3e-4, gt=0)
+    """Adam's step size of the value."""
     desired_kl: float | None = Field(default=0.012, gt=0)
     """KL divergence that an update of a policy should have; moves its step size as in `teacher.desired_kl`."""
-    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (3e-5, 1e-3)
+    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (1e-5, 1e-3)
     """Least and largest step size, where `desired_kl` moves it."""
     gamma: float = Field(default=0.98, gt=0, lt=1)
     """Discount factor of a decision; 0.98 looks ten seconds ahead at 5 Hz."""
