@@ -11,7 +11,8 @@ from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 from iowbc.stages.training import STATE, leave_extendable, train
 
 PANELS = (
-    *(f"{kind}/{name}" for kind in ("scripted", "learnt") for name in ("success", "partner_force_p90", "reward")),
+    *(f"scripted/{name}" for name in ("success", "partner_force_p90", "reward", "fallen", "partner_work", "path_error")),
+    *(f"learnt/{name}" for name in ("success", "partner_force_p90", "reward")),
     *("robot/kl", "robot/std", "robot/learning_rate", "human/kl", "human/std", "human/learning_rate"),
     *("train/imitation_error", "train/explained_variance", "train/value_loss", "steps_per_second"),
 )
@@ -52,10 +53,7 @@ def run(job: Job) -> None:
     leave_extendable(job, training)
     for name, agent in training.agents.items():
         save_network(agent.finished(), agent.architecture, job.out, name, {"algorithm": settings.algorithm})
-    terms = sorted({name for row in curves.rows for name in row if name.startswith(("scripted/", "learnt/"))})
-    figures = curves.write_artifact(
-        job.out, f"{recipe.name}: skill", PANELS, [name for name in terms if name not in PANELS]
-    )
+    figures = curves.write_artifact(job.out, f"{recipe.name}: skill", PANELS)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"skill": job.key}
     parity = write_skill(job.out, training.agents[ROBOT].finished(), recipe, sources, observations)
     if not parity <= recipe.export.parity_tolerance:
