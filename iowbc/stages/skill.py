@@ -11,7 +11,10 @@ from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 from iowbc.stages.training import STATE, leave_extendable, train
 
 PANELS = (
-    *(f"scripted/{name}" for name in ("success", "partner_force_p90", "reward", "fallen", "partner_work", "path_error")),
+    *(
+        f"scripted/{name}"
+        for name in ("success", "partner_force_p90", "reward", "fallen", "partner_work", "path_error")
+    ),
     *(f"learnt/{name}" for name in ("success", "partner_force_p90", "reward")),
     *("robot/kl", "robot/std", "robot/learning_rate", "human/kl", "human/std", "human/learning_rate"),
     *("train/imitation_error", "train/explained_variance", "train/value_loss", "steps_per_second"),
