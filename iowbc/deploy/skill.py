@@ -109,5 +109,5 @@ class Skill:
         action = run(self._session, {"observation": self.observation})["action"]
         yaw = object_yaw(measured) if sees_object else np.zeros(n)
         decided = self._rule.with_action(self._rule.following(self._felt[:, -1].sum(axis=1), yaw), action)
-        whole: Mask = np.isfinite(decided).all(axis=1, keepdims=True)
+        whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
         self._command = np.where(whole, decided, self._command)
