@@ -1,4 +1,4 @@
-"""What acts in the trials of a recipe: a trained policy, or the model-based rival."""
+"""The acting policy in the trials of a recipe: a trained one, or the model-based rival."""
 
 from pathlib import Path
 

@@ -148,7 +148,7 @@ class Batch:
         )
         self.record(judgement, action)
         memory.earlier_action[:], memory.action[:] = memory.action, action
-        self.guidance.advance(memory, self._schedule.episode_key)
+        self.guidance.advance(memory, self._schedule.episode_key, simulation.measured)
         self.finish(judgement)
 
     def record(self, judgement: Judgement, action: Array) -> None:
