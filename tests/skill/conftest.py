@@ -11,9 +11,7 @@ from changes import with_changes
 from iowbc.control.observation import observation_layout
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.rollouts.encoders import Whole
-from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
-from iowbc.rollouts.policies import HistoryPolicy
+from iowbc.rollouts.policies import HistoryPolicy, Linear, Normal, Perceptron, Whole
 from iowbc.skill.game import TransportGame
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
