@@ -11,7 +11,7 @@ from changes import with_changes
 from iowbc.control.observation import observation_layout
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.rollouts.policies import HistoryPolicy, Linear, Normal, Perceptron, Whole
+from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal
 from iowbc.skill.game import TransportGame
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
@@ -48,9 +48,9 @@ def student() -> Student:
 
     policy = HistoryPolicy(
         normal=Normal(np.zeros(size, np.float32), np.ones(size, np.float32), 5.0),
-        encoder=Whole(layer(size, WIDTH), layer(HISTORY * WIDTH, WIDTH), "elu"),
+        encoder=HistoryEncoder(layer(size, WIDTH), layer(HISTORY * WIDTH, WIDTH), "elu"),
         estimate=None,
-        body=Perceptron((layer(size + WIDTH, WIDTH), layer(WIDTH, len(robot.support))), "elu"),
+        body=Layers((layer(size + WIDTH, WIDTH), layer(WIDTH, len(robot.support))), "elu"),
     )
     return Student(policy, HISTORY, size)
 
