@@ -36,13 +36,15 @@ MAY_IMPORT = {
     "twin": WORLD | {"onboard"},
     "task": WORLD | {"rollouts"},
     "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "results"},
+    "skill": WORLD | {"task", "rollouts", "learning", "evaluation", "results"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
     "report": {"learning", "pipeline", "recipe", "results", "stages", "errors", "control", "onboard"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD
-    | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
+    | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"}
+    | {"skill", "results"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
     | {"live", "web", "stages", "results", "onboard", "twin"},

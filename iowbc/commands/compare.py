@@ -234,7 +234,9 @@ def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> T
     comparison and have not run."""
     import pandas as pd
 
-    methods = {name: stage.presentation.trained_by for name, stage in STAGES.items() if stage.presentation.trained_by}
+    used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
+    named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
+    methods = {stage.name: stage.presentation.trained_by for stage in named if stage.presentation.trained_by}
     rows: list[tuple[str, ...]] = []
     numbers: list[dict[str, object]] = []
     for group in groups:
@@ -255,8 +257,10 @@ def _steps_of(run: "Run", stage: str) -> int | None:
     """Environment steps of a stage that trains; None where the run has no such stage."""
     if stage not in run.recipe.get("stages", ()):
         return None
-    made = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
-    return int(made[stage]["steps"])
+    made: Any = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
+    for part in STAGES[stage].counts[0].split("."):
+        made = made[part]
+    return int(made)
 
 
 def film_together(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:

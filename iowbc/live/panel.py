@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, VELOCITY
+from iowbc.control.command import COMMAND, VELOCITY, nominal_command
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drawing import ShownParts
@@ -19,7 +19,6 @@ from iowbc.live.moment import Moment
 from iowbc.live.track import WINDOW, TrackFigures
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.drawing import nominal_command
 
 Button = Literal["pause", "reset", "push robot", "push object"]
 

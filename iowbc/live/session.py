@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.control.command import nominal_command
 from iowbc.errors import Damaged
 from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
@@ -13,7 +14,6 @@ from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.moment import Witness
 from iowbc.live.track import track_of
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.task.commands.drawing import nominal_command
 
 Pushed = Literal["robot", "object"]
 

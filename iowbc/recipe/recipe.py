@@ -12,15 +12,17 @@ from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import misnamed
 from iowbc.recipe.section import Section, Unfitting
 from iowbc.recipe.simulation.simulation import SimulationSettings
+from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
-StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export", "skill", "skill-eval"]
 PIPELINE: tuple[StageName, ...] = get_args(StageName)
 """All stages, in the order in which they run."""
+CONTROLLER: tuple[StageName, ...] = PIPELINE[:6]
+"""Stages of the controller, without those of the skill layer above it."""
 
-
-SEEDS = ("seed", "teacher.seed", "distill.seed")
+SEEDS = ("seed", "teacher.seed", "distill.seed", "skill.learning.seed")
 """Dotted paths that tell repetitions of one experiment apart."""
 NAME = "[a-z0-9][a-z0-9_-]*"
 """Pattern of the name of an experiment; it names files."""
@@ -37,8 +39,9 @@ class Recipe(Section):
     """Seed of everything that is drawn at random."""
     robot: str = "g1"
     """Folder under `robots/` that describes the robot."""
-    stages: tuple[StageName, ...] = Field(default=PIPELINE, min_length=1)
-    """Stages of this experiment; they run in the order of the pipeline."""
+    stages: tuple[StageName, ...] = Field(default=CONTROLLER, min_length=1)
+    """Stages of this experiment; they run in the order of the pipeline. `skill` and `skill-eval` are only run where
+    they are named."""
     rg: ReferenceGenerator = ReferenceGenerator()
     """The reference generator: its dataset and its network."""
     simulation: SimulationSettings = SimulationSettings()
@@ -53,6 +56,8 @@ class Recipe(Section):
     """Trials of the trained policy."""
     export: Export = Export()
     """The ONNX graph and its checks."""
+    skill: Skill = Skill()
+    """The skill layer: the Markov game of a robot and a human, its training and evaluation."""
     execution: Execution = Execution()
     """Execution on this machine; never changes a result, and is not part of any key."""
 

@@ -167,6 +167,16 @@ class Simulation:
         return acting
 
     @property
+    def steered(self) -> NDArray[np.bool_]:
+        """Partners that take `feed` as their own motion, to be written before a reset, (n,); see `Partner.steered`."""
+        return self._partner.steered
+
+    @property
+    def handle_position(self) -> Array:
+        """The objects' far handles, (n, 3) [m]."""
+        return self._partner.at
+
+    @property
     def soles(self) -> dict[str, Array]:
         """What the left and right sole do, by name, (n, 2) each; see `iowbc.sim.soles.Soles`."""
         parts = [(world.place, world.soles.arrays()) for world in self.worlds]
@@ -383,7 +393,8 @@ class Simulation:
 
     def partner_handle(self, env: int) -> Array:
         """Where the partner takes hold, (3,) [m]."""
-        return self._partner.handle(env)
+        place: Array = self._partner.at[env]
+        return place
 
     def impulse_force(self, env: int) -> Array:
         """The impulse that acts on the object in this control period, world frame, (3,) [N]."""

@@ -8,6 +8,7 @@ import pytest
 from exported_policies import made_up_generator
 from standing_still import StandingStill
 
+from iowbc.control.command import nominal_command
 from iowbc.evaluation.play import Source
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.live import session as driven
@@ -17,7 +18,6 @@ from iowbc.live.session import Session
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot, robot_folder
 from iowbc.sim.rendering import appearance
-from iowbc.task.commands.drawing import nominal_command
 from iowbc.task.specification import Specification
 
 

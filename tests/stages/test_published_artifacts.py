@@ -31,6 +31,7 @@ PUBLISHED_TO = {
     "wo_distill": "eval",
     "blind": "export",
     "compliant": "export",
+    "transport": "skill-eval",
 }
 
 

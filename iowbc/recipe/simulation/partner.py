@@ -133,6 +133,9 @@ class PartnerSettings(Section):
     one another."""
     strongest: float = Field(default=80.0, ge=0.0)
     """Bound on the force of spring and damper, horizontal and vertical [N]."""
+    hand_distance: float = Field(default=0.25, gt=0.0, json_schema_extra=LATER)
+    """Distance of the partner's hands from the middle between them [m], at which their springs turn the object; used
+    where the partner is steered."""
     push_yielding: float = Field(default=0.5, ge=0.0)
     """Bound on that force in a push, as a part of the partner's share of the resistance: who helps does not do it
     all."""

@@ -6,10 +6,10 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
-from iowbc.control.command import COMMAND, VELOCITY, approach, rate_limits
+from iowbc.control.command import COMMAND, VELOCITY, approach, nominal_command, rate_limits
 from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.task.task import Task
-from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpolate, nominal_command
+from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpolate
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty
 from iowbc.task.memory import Memory
