@@ -1,5 +1,7 @@
 """Kinematics of both arms, many rows at once: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace
@@ -60,19 +62,26 @@ class ArmKinematics(Constants):
 
     def _wrists(self, position: Array) -> tuple[Array, Array]:
         """Wrists (3, 2, n) [m] and their Jacobian (3, joints, 2, n), of positions (joints, 2, n) [rad]."""
-        frames = self._chain.frames(position)
+        return self._reached(self._chain.frames(position))
+
+    def _reached(self, frames: Sequence[Frame]) -> tuple[Array, Array]:
         wrist = frames[-1].origin + rotated(frames[-1].rotation, self._grip)
         return wrist, jacobian(frames, wrist)
 
-    def solve_step(self, arm_position: Array, target: Array, dt: float) -> Array:
+    def frames(self, arm_position: Array) -> list[Frame]:
+        """The hinges of both arms, of `arm_position` (n, arm joints) [rad]."""
+        return self._chain.frames(by_arm(arm_position))
+
+    def solve_step(self, arm_position: Array, target: Array, dt: float, frames: Sequence[Frame] | None = None) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
-        `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s].
+        `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s];
+        `frames` at `arm_position`, where they are known.
         next = q + J⁺e + (1 - J⁺J) k (rest - q) dt with J⁺ = Jᵀ(JJᵀ + λ² + ρ|e|)⁻¹ and e = x - FK(q), cut to its
         longest; kept to the joint ranges and the joint speed.
         """
         xp, settings, position = namespace(arm_position), self.settings, by_arm(arm_position)
-        wrist, columns = self._wrists(position)
+        wrist, columns = self._reached(frames or self._chain.frames(position))
         error = xp.swapaxes(target, 0, 2) - wrist
         distance = xp.sqrt((error * error).sum(0))
         error = error * (settings.longest_step / distance.clip(settings.longest_step, None))

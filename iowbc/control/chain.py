@@ -68,8 +68,12 @@ def crossed(a: Array, b: Array) -> Array:
 
 def turned(rotation: Rotation, axis: int, angle: Array) -> Rotation:
     """The rotation followed outward by one about a coordinate axis by angles (chains, n) [rad]."""
-    xp, columns, (first, second) = namespace(angle), list(rotation), PLANES[axis]
-    cosine, sine = xp.cos(angle), xp.sin(angle)
+    xp = namespace(angle)
+    return _mixed(rotation, axis, xp.cos(angle), xp.sin(angle))
+
+
+def _mixed(rotation: Rotation, axis: int, cosine: Array, sine: Array) -> Rotation:
+    columns, (first, second) = list(rotation), PLANES[axis]
     columns[first] = cosine * rotation[first] + sine * rotation[second]
     columns[second] = cosine * rotation[second] - sine * rotation[first]
     return columns[0], columns[1], columns[2]
@@ -113,13 +117,14 @@ class Chain(Constants):
         rows, found = 0.0 * angle[0], list[Frame]()
         first, second, third = base or self._base
         rotation: Rotation = (first + rows, second + rows, third + rows)
-        for hinge, value in zip(self._hinges, angle, strict=True):
+        xp = namespace(angle)
+        for hinge, cosine, sine in zip(self._hinges, xp.cos(angle), xp.sin(angle), strict=True):
             place = combined(rotation, hinge.offset)
             origin = found[-1].origin + place if found else place
             if hinge.before is not None:
                 rotation = _composed(rotation, hinge.before)
             axis = rotation[hinge.axis] if hinge.sign is None else rotation[hinge.axis] * hinge.sign
-            rotation = turned(rotation, hinge.axis, value if hinge.sign is None else value * hinge.sign)
+            rotation = _mixed(rotation, hinge.axis, cosine, sine if hinge.sign is None else sine * hinge.sign)
             if hinge.after is not None:
                 rotation = _composed(rotation, hinge.after)
             found.append(Frame(origin, axis, rotation))

@@ -1,10 +1,12 @@
 """Torques with which the arms carry their own weight, and a load in the hands: a feed-forward for their motors."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace
 from iowbc.control.arms import arm_chains, by_arm, by_row
-from iowbc.control.chain import Chain, combined, crossed, entries, rotated, rotated_back
+from iowbc.control.chain import Chain, Frame, combined, crossed, entries, rotated, rotated_back
 from iowbc.robot.description import GRAVITY, Robot
 
 
@@ -23,17 +25,24 @@ class ArmGravity(Constants):
         self._outward = np.cumsum(mass[::-1], axis=0)[::-1].copy()
         self._grip = robot.grip_offset.T[:, :, None]
 
-    def torque(self, arms: Array, waist: Array, gravity: Array, load: Array | None = None) -> Array:
+    def torque(
+        self,
+        arms: Array,
+        waist: Array,
+        gravity: Array,
+        load: Array | None = None,
+        frames: Sequence[Frame] | None = None,
+    ) -> Array:
         """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
 
         `arms` (n, arms) and `waist` (n, waist joints) positions [rad], measured or referred to; `gravity` (n, 3): its
         direction in the base frame, (0, 0, -1) when upright; `load` (n, 2), or (n, 1) where it is the same on both:
-        mass that hangs on each grip point [kg].
+        mass that hangs on each grip point [kg]; `frames` of `arms`, where they are known.
 
         The torque of hinge i is -(a_i × Σ_k m_k (c_k - o_i))·g over the links k from i outward, with its axis a_i and
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
         """
-        xp, frames = namespace(arms), self._arms.frames(by_arm(arms))
+        xp, frames = namespace(arms), frames or self._arms.frames(by_arm(arms))
         torso = self._waist.frames(waist.T[:, None])[-1].rotation
         down = GRAVITY * rotated_back(torso, gravity.T[:, None])
         moments, mass = [0.0 * frames[-1].origin], self._outward

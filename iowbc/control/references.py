@@ -3,12 +3,14 @@
 Pure arrays over n environments; the exported graph is traced from the same lines.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from iowbc.arrays import Array, Constants, Mask, as_slice, namespace
 from iowbc.control.arms import ArmKinematics
+from iowbc.control.chain import Frame
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.gait import is_falling, wants_to_move
 from iowbc.control.gravity import ArmGravity
@@ -80,9 +82,17 @@ class ReferenceLayer(Constants):
             arms, support = self.advance(arms, support, command, grasp, self._start.refining_time)
         return arms, support
 
-    def advance(self, arms: Array, support: Array, command: Array, grasp: Array, dt: float) -> tuple[Array, Array]:
-        """References one control period later; shapes as in `start`."""
-        arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt)
+    def advance(
+        self,
+        arms: Array,
+        support: Array,
+        command: Array,
+        grasp: Array,
+        dt: float,
+        frames: Sequence[Frame] | None = None,
+    ) -> tuple[Array, Array]:
+        """References one control period later; shapes as in `start`. `frames` of `arms`, where they are known."""
+        arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt, frames)
         return arms, self.support(arms, command)
 
     def support(self, arms: Array, command: Array) -> Array:
@@ -128,13 +138,16 @@ class ReferenceLayer(Constants):
         wrists: Array = grasp + command[:, OFFSET].reshape(-1, 2, 3) + lean[:, None, None] * self._ahead
         return wrists
 
-    def arm_target(self, arms: Array, support: Array, command: Array, load: Array) -> Array:
+    def arm_target(
+        self, arms: Array, support: Array, command: Array, load: Array, frames: Sequence[Frame] | None = None
+    ) -> Array:
         """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references and what balances the weight of
-        the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references."""
+        the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references. `frames` of
+        `arms`, where they are known."""
         if self._gravity is None:
             return arms
         xp, pitch = namespace(command), self.pelvis_pitch(support, command)
         down = xp.stack([xp.sin(pitch), 0.0 * pitch, -xp.cos(pitch)], 1)
-        torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None])
+        torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None], frames)
         target: Array = arms + torque * self._compliance
         return target

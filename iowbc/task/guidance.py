@@ -8,6 +8,7 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
+from iowbc.control.chain import Frame
 from iowbc.control.command import HEIGHT, YAW_RATE
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
@@ -43,6 +44,8 @@ class Guidance:
         self.grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])
+        self._frames: Sequence[Frame] | None = None
+        """Of the arms' references in the step being made: from its targets to the references of the next."""
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)
 
@@ -66,7 +69,10 @@ class Guidance:
         height = memory.command[:, HEIGHT].copy()
         self.commander.advance(memory, key)
         memory.height_rate[:] = (memory.command[:, HEIGHT] - height) / period
-        arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self.grasp, period)
+        arms, posture = self.references.advance(
+            memory.arms, memory.posture, memory.command, self.grasp, period, self._frames
+        )
+        self._frames = None
         memory.arms[:], memory.posture[:] = arms, posture
         moving = self.references.wants_steps(measured, posture, memory.command)
         phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
@@ -84,7 +90,10 @@ class Guidance:
         """
         target = np.empty((len(action), self._joints))
         target[:, self._support] = memory.support + self._scale * action
-        target[:, self._arms] = self.references.arm_target(memory.arms, memory.posture, memory.command, self._load)
+        self._frames = self.references.arms.frames(memory.arms)
+        target[:, self._arms] = self.references.arm_target(
+            memory.arms, memory.posture, memory.command, self._load, self._frames
+        )
         return target
 
     def object_place(self, memory: Memory) -> Array:
