@@ -89,7 +89,7 @@ class Recipe(Section):
 
     @model_validator(mode="after")
     def _scenes_are_known(self) -> Self:
-        problems = list(misnamed(self.simulation, self.task, self.teacher, self.eval, self.export))
+        problems = list(misnamed(self.simulation, self.task, self.teacher, self.eval, self.export, self.skill))
         if problems:
             raise Unfitting(problems)
         return self

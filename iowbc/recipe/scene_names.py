@@ -9,12 +9,13 @@ from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.holding import WITH_OBJECT
 from iowbc.recipe.simulation.scene import Scenes
 from iowbc.recipe.simulation.simulation import SimulationSettings
+from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
 
 def misnamed(
-    simulation: SimulationSettings, task: Task, teacher: Teacher, evaluation: Evaluation, export: Export
+    simulation: SimulationSettings, task: Task, teacher: Teacher, evaluation: Evaluation, export: Export, skill: Skill
 ) -> Iterator[tuple[str, str]]:
     """Dotted paths, and the problem there."""
     worlds = {"simulation.scenes": simulation.scenes}
@@ -29,7 +30,7 @@ def misnamed(
         for name in scenes.own:
             yield from _incomplete(f"{path}.{name}", name, scenes, task)
     others = ((f"teacher.check.others.{name}", name) for name in teacher.check.others)
-    for place, name in (*others, *_object_scenes(export, "export")):
+    for place, name in (*others, *_object_scenes(export, "export"), *_object_scenes(skill, "skill")):
         yield from _without_object(place, name, "simulation.scenes", simulation.scenes)
     path, scenes = list(worlds.items())[-1]
     if evaluation.scenes:
@@ -72,9 +73,10 @@ def _without_object(path: str, name: str, where: str, scenes: Scenes) -> Iterato
 
 def _object_scenes(section: Section, path: str) -> Iterator[tuple[str, str]]:
     """Dotted path and value of every field below a section that names a scene with an object."""
-    for name, field in type(section).model_fields.items():
+    fields = type(section).model_fields
+    for name in (*fields, *(section.model_extra or ())):
         value, here = getattr(section, name), f"{path}.{name}"
-        if WITH_OBJECT in field.metadata:
+        if name in fields and WITH_OBJECT in fields[name].metadata:
             yield here, value
         elif isinstance(value, Section):
             yield from _object_scenes(value, here)

@@ -49,7 +49,7 @@ class Paths:
         rows = np.arange(len(path))
         index, away = near[rows, nearest], away[rows, nearest]
         cosine, sine = np.cos(self._heading[path, index]), np.sin(self._heading[path, index])
-        covered = index * SPACING + cosine * away[:, 0] + sine * away[:, 1]
+        covered = index * SPACING + (cosine * away[:, 0] + sine * away[:, 1]).clip(-SPACING, SPACING)
         return Place(covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0])
 
     def heading(self, path: Indices, covered: Array) -> Array:

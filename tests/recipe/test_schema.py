@@ -27,7 +27,7 @@ def test_unknown_keys_are_refused_everywhere_and_extends_is_known() -> None:
     schema = recipe_schema()
     assert schema["properties"]["extends"]["type"] == "string"
     others = {name: model["additionalProperties"] for name, model in schema["$defs"].items() if "properties" in model}
-    named = {name: others.pop(name) for name in ("Scenes", "SceneShares", "Grasps", "Loads")}
+    named = {name: others.pop(name) for name in ("Scenes", "SceneShares", "Grasps", "Loads", "Tasks")}
     assert set(others.values()) == {False}
     assert all("type" in entry or "$ref" in entry for entry in named.values())
     assert "required" not in schema

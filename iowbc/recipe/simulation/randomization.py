@@ -35,6 +35,8 @@ class Distribution(Section):
 LATENCIES = ("action_latency", "sensor_latency", "object_latency")
 SIGNED = ("object_com_offset", "encoder_bias", "imu_tilt", "heading_drift", "gyro_bias", "start_yaw")
 """Quantities that may be negative."""
+POSITIVE = ("link_mass_scale", "link_inertia_scale")
+"""Quantities that must not be zero."""
 
 
 class Randomization(Section):
@@ -111,6 +113,11 @@ class Randomization(Section):
                 )
                 ends = ((end, getattr(values, end)) for end in ("low", "high", "nominal"))
                 problems += [(f"{name}.{end}", text) for end, value in ends if not 0 <= value <= most]
+        for name in POSITIVE:
+            ends = ((end, getattr(getattr(self, name), end)) for end in ("low", "high", "nominal"))
+            problems += [
+                (f"{name}.{end}", "should be positive: no link is without mass") for end, v in ends if v == 0.0
+            ]
         if problems:
             raise Unfitting(problems)
         return self

@@ -6,6 +6,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.section import NamedEntries, Section
+from iowbc.recipe.simulation.holding import ObjectScene
 
 Range = tuple[float, float]
 
@@ -28,7 +29,7 @@ class Stretch(Section):
 class TransportTask(Section):
     """An object, its load, and the path on which it is to be transported."""
 
-    scene: str
+    scene: ObjectScene
     """Scene in which it is played, one with an object."""
     path: tuple[Stretch, ...] = Field(min_length=1, max_length=64)
     """Stretches in order, from the object's centre at the start, along the robot's heading."""
