@@ -31,6 +31,7 @@ class AdaptedPolicy:
         self._default = adapter.default[[adapter.joints.index(name) for name in support]]
         self._own, self._scale = adapter.scale[self._acted], action_scale(robot, task.action)
         self._arms_hidden = controller.arms == "default"
+        self._heading_gain = controller.heading_gain
         self._period = 1.0 / task.control_frequency
         self._bounds = adapter.bounds()
         self._blank(0)
@@ -75,7 +76,10 @@ class AdaptedPolicy:
         position, rates = position[:, self._joints], parts["joint_velocity"][:, self._joints]
         if self._arms_hidden:
             position[:, self._arms], rates[:, self._arms] = self.adapter.default[self._arms], 0.0
-        velocity = command[:, VELOCITY].clip(*self._bounds)
+        velocity = command[:, VELOCITY].copy()
+        asked = np.abs(velocity).max(axis=1) > self.adapter.standing
+        velocity[:, YAW_RATE] -= self._heading_gain * parts["heading_error"][:, 0] * asked
+        velocity = velocity.clip(*self._bounds)
         speed = np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), np.abs(velocity[:, YAW_RATE]))
         walking = speed > self.adapter.standing
         went_on = walking & self._walking & ~self._starts

@@ -25,6 +25,9 @@ class PublicController(Section):
     """How it observes the arms, which this project moves: as they are, or at rest in its default posture. A walker that
     moves arms of its own may take a grasp for a disturbance; which of the two is better is tried on trials of the
     development split."""
+    heading_gain: float = Field(default=0.5, ge=0.0)
+    """Commanded yaw rate against each radian of heading error [1/s]: such a controller follows rates and drifts, where
+    learnt policies of this project observe the error. Velocity tasks of Isaac Lab train with 0.5."""
 
     @model_validator(mode="after")
     def _module_where_it_is_read(self) -> Self:
