@@ -34,7 +34,9 @@ MAY_IMPORT = {
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts"},
     "task": WORLD | {"rollouts"},
-    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters"} | {"results"},
+    "evaluation": WORLD
+    | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters"}
+    | {"results"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
@@ -44,7 +46,7 @@ MAY_IMPORT = {
     | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
-    | {"live", "web", "stages", "results"},
+    | {"live", "web", "stages", "results", "adapters"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""

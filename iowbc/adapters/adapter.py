@@ -140,7 +140,8 @@ def _naming(adapter: Adapter, robot: Robot) -> list[str]:
 def _require_answer(adapter: Adapter, where: str) -> None:
     """One step of a robot that stands in the default posture."""
     try:
-        past = tuple(np.repeat(np.float64(term(standing(adapter)))[:, None], adapter.history, 1) for term in adapter.terms)
+        parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
+        past = tuple(np.repeat(values, adapter.history, 1) for values in parts)
         observation = adapter.observed(past).astype(np.float32)
         answer = np.asarray(adapter.network(observation))
     except Exception as error:

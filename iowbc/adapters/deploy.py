@@ -16,15 +16,12 @@ from iowbc.files import read_limited
 CONFIGURATION = "deploy.yaml"
 LARGEST = 1 << 20
 """Bytes of a configuration at most."""
-MOTORS = tuple(
-    f"{side}_{part}_joint"
-    for side in ("left", "right")
-    for part in ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
-) + tuple(f"waist_{part}_joint" for part in ("yaw", "roll", "pitch"))
-MOTORS += tuple(
-    f"{side}_{part}_joint"
-    for side in ("left", "right")
-    for part in ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw")
+LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
+ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw")
+MOTORS = (
+    *(f"{side}_{part}_joint" for side in ("left", "right") for part in LEG),
+    *(f"waist_{part}_joint" for part in ("yaw", "roll", "pitch")),
+    *(f"{side}_{part}_joint" for side in ("left", "right") for part in ARM),
 )
 """The G1's 29 joints in the order of its motors."""
 FIELDS = {
@@ -54,8 +51,8 @@ def adapter(policy: Path) -> Adapter:
     try:
         return _described(said, policy)
     except (KeyError, TypeError, IndexError, ValueError) as error:
-        text = f"{type(error).__name__}: {error}"
-        raise StageFailed(f"{policy}: its {CONFIGURATION} describes no controller of joint positions: {text}") from error
+        text = f"its {CONFIGURATION} describes no controller of joint positions that is read here"
+        raise StageFailed(f"{policy}: {text}: {type(error).__name__}: {error}") from error
 
 
 def _described(said: Mapping[str, Any], policy: Path) -> Adapter:
@@ -109,7 +106,7 @@ def _only(folder: Path, pattern: str) -> Path:
 
 def _configuration(path: Path) -> Mapping[str, Any]:
     try:
-        said = yaml.load(read_limited(path, LARGEST), _Loader)  # noqa: S506 - a loader of plain YAML
+        said = yaml.load(read_limited(path, LARGEST), _Loader)
     except (yaml.YAMLError, OSError, ValueError, RecursionError) as error:
         raise StageFailed(f"{path}: cannot be read: {error}") from error
     if not isinstance(said, Mapping):

@@ -61,7 +61,7 @@ class AdaptedPolicy:
         for index in np.flatnonzero(filled):
             self._output[index] = self.adapter.network(inputs[index : index + 1])[0]
         if not np.isfinite(self._output).all():
-            raise StageFailed("eval.public: the network's output is not finite; hold its observation against training's")
+            raise StageFailed("eval.public: its network's output is not finite; compare its inputs with training's")
         self._starts[filled] = False
         target = self._default + self._own * self._output[:, self._acted]
         reference = rows[:, self._places["support_reference"]]

@@ -11,7 +11,14 @@ import typer
 
 from iowbc.cli.comparing import compare, diff, report, ui
 from iowbc.cli.listing import gc, list_, show, status
-from iowbc.cli.measuring import bench_control, bench_reference, bench_scale, bench_simulation, bench_training
+from iowbc.cli.measuring import (
+    bench_carry,
+    bench_control,
+    bench_reference,
+    bench_scale,
+    bench_simulation,
+    bench_training,
+)
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
@@ -46,6 +53,7 @@ BENCHMARKS: dict[str, Callable[..., None]] = {
     "rg": bench_reference,
     "scale": bench_scale,
     "control": bench_control,
+    "carry": bench_carry,
 }
 
 app = typer.Typer(
@@ -55,7 +63,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"max_content_width": 120},
 )
-bench = typer.Typer(help="Measure the speed of this machine.", no_args_is_help=True, rich_markup_mode=None)
+bench = typer.Typer(
+    help="Measure the speed of this machine, or a public controller.", no_args_is_help=True, rich_markup_mode=None
+)
 app.add_typer(bench, name="bench")
 
 
