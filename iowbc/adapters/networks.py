@@ -57,7 +57,8 @@ def _torchscript(path: Path) -> Callable[..., Array]:
     import torch
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores
-    module = torch.jit.load(str(path), map_location="cpu").eval()
+    load: Any = torch.jit.load
+    module = load(str(path), map_location="cpu").eval()
 
     def run(*inputs: Array) -> Array:
         with torch.inference_mode():

@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from pages import write
 from stage_jobs import make_job
-from stand_ins import holosoma_file
+from stand_ins import holosoma_file, linear
 from typer.testing import CliRunner
 
-from iowbc.adapters.source import policy_digest
+from iowbc.adapters.source import load_adapter, policy_digest
 from iowbc.cli import app
 from iowbc.commands.bench_carry import carry, suite_digest
 from iowbc.control.references import ReferenceLayer
@@ -121,13 +122,21 @@ def test_upright_references_leave_out_height_and_pitch(robot: Robot) -> None:
     np.testing.assert_allclose(clamped[0, 5:], 0.01)
 
 
-def test_the_bench_writes_a_page_with_the_digests_of_controller_adapter_and_suite(file: Path, tmp_path: Path) -> None:
-    adapter, suite = tmp_path / "mine.py", tmp_path / "suite.yaml"
-    adapter.write_text("from iowbc.adapters.holosoma import adapter\n")
+@pytest.fixture
+def suite(tmp_path: Path) -> Path:
+    """The suite of the bench at the smallest size."""
     lifting = SHORT["lifting"] | {"undisturbed": [], "with_share": []}
     changes = SHORT | {"lifting": lifting, "scripts": None, "pushing": None}
-    suite.write_text(yaml.safe_dump({"extends": str(RECIPES / "public" / "carry.yaml"), "eval": changes}))
-    page = tmp_path / "page.md"
+    written = tmp_path / "suite.yaml"
+    written.write_text(yaml.safe_dump({"extends": str(RECIPES / "public" / "carry.yaml"), "eval": changes}))
+    return written
+
+
+def test_the_bench_writes_a_page_with_the_digests_of_controller_adapter_and_suite(
+    file: Path, suite: Path, tmp_path: Path
+) -> None:
+    adapter, page = tmp_path / "mine.py", tmp_path / "page.md"
+    adapter.write_text("from iowbc.adapters.holosoma import adapter\n")
     carry(str(file), str(adapter), arms="measured", posture=False, workers=1, out=page, suite=suite)
     text = page.read_text()
     assert f"walker.onnx, SHA-256 {policy_digest(file)}" in text
@@ -135,6 +144,22 @@ def test_the_bench_writes_a_page_with_the_digests_of_controller_adapter_and_suit
     assert f"SHA-256 {suite_digest(load_recipe(suite).recipe)}" in text
     assert "| lifting | no object | 1/1 |" in text
     assert "| 2, 1 a cell;" in text
+
+
+def test_the_tutorial_plays_a_controller_of_ones_own(
+    suite: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write("tutorials/controller.md", tmp_path)
+    policy = linear(tmp_path / "walker.onnx", np.zeros((15, 55), np.float32), np.zeros(15, np.float32))
+    carry("walker.onnx", "my_adapter.py", arms="measured", posture=True, workers=1, out=Path("page.md"), suite=suite)
+    assert "height and pitch" in Path("page.md").read_text()
+    (tmp_path / "recipes" / "public").symlink_to(RECIPES / "public")
+    (tmp_path / "recipes" / "full.yaml").symlink_to(RECIPES / "full.yaml")
+    digest = hashlib.sha256(policy.read_bytes()).hexdigest()
+    own = load_recipe(tmp_path / "recipes" / "walker.yaml", [f"eval.public.sha256={digest}"]).recipe
+    assert own.eval.public is not None
+    assert load_adapter(own.eval.public).frequency == 50.0
 
 
 def test_the_digest_of_a_suite_changes_with_its_trials_alone() -> None:

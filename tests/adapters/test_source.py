@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stand_ins import deploy_folder, holosoma_file
+import torch
+from stand_ins import deploy_folder, holosoma_file, linear
 
 from iowbc.adapters.deploy import MOTORS
 from iowbc.adapters.networks import network
@@ -117,6 +118,18 @@ def test_a_folder_with_two_networks_is_refused(tmp_path: Path) -> None:
     holosoma_file(folder / "second.onnx")
     with pytest.raises(StageFailed, match=r"should be a folder with one \*.onnx, found .*policy.onnx, .*second.onnx"):
         load_adapter(controller(folder, adapter="deploy"))
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_torchscript_and_onnx_of_one_network_answer_alike(tmp_path: Path) -> None:
+    random = np.random.default_rng(2)
+    weight, bias = random.normal(size=(4, 6)).astype(np.float32), random.normal(size=4).astype(np.float32)
+    layer = torch.nn.Linear(6, 4)
+    layer.load_state_dict({"weight": torch.from_numpy(weight), "bias": torch.from_numpy(bias)})
+    torch.jit.save(torch.jit.trace(layer, torch.zeros(1, 6)), tmp_path / "walker.pt")
+    given = random.normal(size=(1, 6)).astype(np.float32)
+    for path in (tmp_path / "walker.pt", linear(tmp_path / "walker.onnx", weight, bias)):
+        np.testing.assert_allclose(network(path)(given), given @ weight.T + bias, atol=1e-6)
 
 
 def test_a_network_that_is_none_is_refused(tmp_path: Path) -> None:
