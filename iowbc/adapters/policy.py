@@ -56,7 +56,7 @@ class AdaptedPolicy:
         rows = observation.astype(np.float64)
         seen = self._seen({name: rows[:, place] for name, place in self._places.items()})
         self._remember(seen)
-        filled = rows.any(axis=1)
+        filled = np.asarray(rows.any(axis=1))
         inputs = self.adapter.observed(self._past).astype(np.float32)
         for index in np.flatnonzero(filled):
             self._output[index] = self.adapter.network(inputs[index : index + 1])[0]
