@@ -4,6 +4,7 @@
 # make measure   makes the figures of the README anew, those of published artifacts from their trials
 # make chaos   disturbs runs 240 times and counts what is lost (docs/reliability.md)
 # make chaos-nodes   kills nodes of a Ray cluster ten times over a run and a sweep (docs/cluster.md)
+# make scale   measures labels, trials and rollouts on one node of Ray and on two (docs/cluster.md)
 # make docs   builds the documentation's site into build/site, to be opened without a network
 # make leaks   watches memory and descriptors of a training for an hour
 PYTHON ?= python3.11
@@ -11,7 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup check test lint types run measure docs chaos chaos-nodes leaks image clean
+.PHONY: setup check test lint types run measure docs chaos chaos-nodes scale leaks image clean
 
 setup: $(READY)
 
@@ -62,6 +63,9 @@ chaos: setup
 chaos-nodes: setup
 	$(BIN)/python tests/chaos/nodes.py --kills 10 --actors 3 --gap 8
 	$(BIN)/python tests/chaos/nodes.py --vary seed=0..1 --until teacher --kills 10
+
+scale: setup
+	$(BIN)/python tests/scaling.py
 
 leaks: setup
 	$(BIN)/python tests/chaos/leaks.py

@@ -13,13 +13,27 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.observation import ObservationLayout, observation_layout
 from iowbc.control.references import ReferenceLayer
+from iowbc.deploy.session import Values
+from iowbc.deploy.timing import INPUT
 from iowbc.export.folder import write_folder
+from iowbc.export.golden import OUTPUT
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 
 HISTORY = 25
+
+
+def read_golden(path: Path) -> tuple[Values, Values]:
+    """Inputs and outputs of golden vectors by name."""
+    with np.load(path, allow_pickle=False) as file:
+        arrays = {name: file[name] for name in file.files}
+    inputs, outputs = (
+        {name.removeprefix(start): value for name, value in arrays.items() if name.startswith(start)}
+        for start in (INPUT, OUTPUT)
+    )
+    return inputs, outputs
 
 
 def made_up_generator(robot: Robot, folder: Path) -> Path:

@@ -65,8 +65,7 @@ class Remade:
         self.states: list[Any] = [None for _ in made]
         self.found: list[Any] = []
 
-    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
-        assert patience > 0.0
+    def ask(self, messages: Sequence[Any], *, changes: bool = True) -> None:
         self.found = []
         for index, (make, own) in enumerate(zip(self.made, messages, strict=True)):
             member = make()

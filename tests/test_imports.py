@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "deploy": SHARED,
     "pipeline": {"recipe", "errors", "files", "processes", "full_disk"},
     "sim": SHARED,
-    "reference": WORLD,
+    "reference": WORLD | {"results"},
     "model_based": SHARED | {"reference"},
     "adapters": SHARED | {"task"},
     "rollouts": {"arrays"},

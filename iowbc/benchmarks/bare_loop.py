@@ -1,10 +1,10 @@
 """The yardstick: a bare loop of `mj_step` over the models and states of a vector environment, and nothing else."""
 
 import time
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import Any, Self
 
 import mujoco
@@ -25,7 +25,7 @@ def wander(step: int, rows: int, columns: int) -> Array:
 
 @dataclass
 class RecordedSteps:
-    """What environments asked of MuJoCo in some control periods: models, and states with controls and forces."""
+    """Requests of environments to MuJoCo in some control periods: models, and states with controls and forces."""
 
     models: list[Any]
     states: Array
@@ -53,73 +53,61 @@ def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
     batch.reset(np.arange(first, last, dtype=np.uint64) + np.uint64(setup.seed))
     (world,) = batch.simulation.worlds
     models = [batch.simulation.physics_model(index)[0] for index in range(batch.n)]
-    physics = setup.specification.recipe.simulation.physics
-    substeps = round(batch.period / physics.timestep)
+    substeps = round(batch.period / setup.specification.recipe.simulation.physics.timestep)
     states = np.empty((periods, *world.batch.state.shape))
+    asked = mujoco.mjtState.mjSTATE_CTRL.value | mujoco.mjtState.mjSTATE_XFRC_APPLIED.value
+    data, now = mujoco.MjData(world.model), np.empty(mujoco.mj_stateSize(world.model, asked))
     for period in range(periods):
         batch.buffers["action"][:] = wander(period, setup.count, batch.buffers["action"].shape[1])[first:last]
         batch.step()
         states[period] = world.before
-        _with_forces(world, states[period])
+        for after, state in zip(world.batch.state, states[period], strict=True):  # add controls and applied forces
+            mujoco.mj_setState(world.model, data, after, STATE)
+            mujoco.mj_getState(world.model, data, now, asked)
+            mujoco.mj_setState(world.model, data, state, STATE)
+            mujoco.mj_setState(world.model, data, now, asked)
+            mujoco.mj_getState(world.model, data, state, STATE)
     return RecordedSteps(models, states, substeps)
 
 
-def _with_forces(world: Any, states: Array) -> None:
-    """Adds the controls and applied forces of the period to the states at its start."""
-    model = world.model
-    part = mujoco.mjtState.mjSTATE_CTRL.value | mujoco.mjtState.mjSTATE_XFRC_APPLIED.value
-    data = mujoco.MjData(model)
-    size = mujoco.mj_stateSize(model, part)
-    now = np.empty(size)
-    for row, state in zip(world.batch.state, states, strict=True):
-        mujoco.mj_setState(model, data, row, STATE)
-        mujoco.mj_getState(model, data, now, part)
-        mujoco.mj_setState(model, data, state, STATE)
-        mujoco.mj_setState(model, data, now, part)
-        mujoco.mj_getState(model, data, state, STATE)
-
-
-def _serve(pipe: Connection, setup: Setup, first: int, last: int, periods: int) -> None:
-    recorded = record(setup, first, last, periods)
-    recorded.run()
-    pipe.send(0.0)
-    while pipe.recv():
-        pipe.send(recorded.run())
-
-
 class BareLoops:
-    """The bare loop in several processes at once, each over its share of the environments."""
+    """The bare loop in several processes at once, each over its share of the environments; use as a context manager."""
 
     def __init__(self, setup: Setup, groups: list[tuple[int, int]], periods: int) -> None:
-        self._count, self._periods = setup.count, periods
+        """Raises BrokenProcessPool where a process cannot record its steps."""
+        self._steps = setup.count * periods
         context = get_context("spawn")
-        self._pipes: list[Connection] = []
-        self._processes = []
-        for first, last in groups:
-            ours, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs, setup, first, last, periods), daemon=True)
-            with single_threaded():
-                process.start()
-            theirs.close()
-            self._pipes.append(ours)
-            self._processes.append(process)
-        for pipe in self._pipes:
-            pipe.recv()
+        self._stack = ExitStack()
+        with single_threaded(), ExitStack() as stack:
+            self._loops = [
+                stack.enter_context(
+                    ProcessPoolExecutor(1, context, initializer=_prepare, initargs=(setup, first, last, periods))
+                )
+                for first, last in groups
+            ]
+            self.rate()
+            self._stack = stack.pop_all()
 
     def rate(self) -> float:
         """Environment steps a second of all processes together, the slowest counting."""
-        for pipe in self._pipes:
-            pipe.send(True)
-        slowest: float = max(pipe.recv() for pipe in self._pipes)
-        return self._count * self._periods / slowest
+        running = [loop.submit(_run) for loop in self._loops]
+        return self._steps / max(one.result() for one in running)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        for pipe in self._pipes:
-            pipe.send(False)
-        for process in self._processes:
-            process.join()
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+
+_recorded: RecordedSteps
+"""The steps of a process of `BareLoops`."""
+
+
+def _prepare(setup: Setup, first: int, last: int, periods: int) -> None:
+    global _recorded
+    _recorded = record(setup, first, last, periods)
+
+
+def _run() -> float:
+    return _recorded.run()

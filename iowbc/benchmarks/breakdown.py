@@ -1,4 +1,4 @@
-"""Where the time of a step of the vector environment goes."""
+"""The parts of a step of the vector environment, and the time of each."""
 
 import time
 from collections.abc import Callable
@@ -47,14 +47,6 @@ class _Timed:
         return getattr(self._batch, name)
 
 
-def watch_physics(batch: Any, watch: Stopwatch) -> None:
-    """Times MuJoCo in the environments of a batch, as `physics`."""
-    for world in batch.simulation.worlds:
-        world.batch = _Timed(world.batch)
-        watch.watch(world.batch, "step", "physics")
-        watch.watch(world.batch, "forward", "physics")
-
-
 def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     """Processor time of each part of a step of `setup.count` environments [ms]: medians over rounds from a reset.
 
@@ -63,7 +55,10 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     workers = InProcess(setup)
     batch, watch = workers.batch, Stopwatch()
     watch.watch(batch, "step", "step")
-    watch_physics(batch, watch)
+    for world in batch.simulation.worlds:
+        world.batch = _Timed(world.batch)
+        watch.watch(world.batch, "step", "physics")
+        watch.watch(world.batch, "forward", "physics")
     watch.watch(batch.simulation, "step", "simulation")
     watch.watch(batch.guidance, "advance", "references")
     watch.watch(batch.judge, "judge", "reward")
@@ -80,18 +75,13 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
         row["simulation"] -= row["physics"]
         row["rest"] = row.pop("step") - sum(row.values())
         rows.append(row)
-    parts = {name: float(np.median([row[name] for row in rows])) for name in PARTS}
-    return parts | {"reset": _reset_time(batch)}
-
-
-def _reset_time(batch: Any) -> float:
-    """Processor time to begin one episode anew [ms]."""
-    times = []
+    resets = []
     for index in range(batch.n):
         begin = time.thread_time()
         batch.begin(np.array([index]))
-        times.append(time.thread_time() - begin)
-    return 1e3 * float(np.median(times))
+        resets.append(1e3 * (time.thread_time() - begin))
+    parts = {name: float(np.median([row[name] for row in rows])) for name in PARTS}
+    return parts | {"reset": float(np.median(resets))}
 
 
 def transfer_time(workers: Workers, rounds: int) -> float:

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -12,12 +11,10 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from iowbc.benchmarks.bare_loop import BareLoops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
-from iowbc.benchmarks.other_physics import compare
-from iowbc.benchmarks.standing_generator import generator_of
+from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.task import SceneShares
-from iowbc.robot.description import robot_folder
+from iowbc.robot.description import load_robot
 from iowbc.task.gym.environment import Environment
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
@@ -31,8 +28,6 @@ EPISODE = 10.0
 
 def main(
     recipe: Recipe | None = None,
-    robot: Path | None = None,
-    rg: Path | None = None,
     *,
     scene: str = "lift",
     environments: int = 48,
@@ -46,18 +41,13 @@ def main(
     `environments` a worker; `workers`: counts to measure, by default 1, 2 and the number of cores. The bare loop and
     the vector environment take turns. Rates are those of the best turn, which other programs disturbed least; the ratio
     is the median over turns, each of the environment's against the bare loop's before it.
-    `rg`: folder of a fitted reference generator; without one a stand-in that costs as much.
     `others`: also measure stable-baselines3's and gymnasium's vector environments.
     """
-    recipe = recipe or Recipe(name="bench")
-    folder = robot or robot_folder(recipe.robot)
     cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})
-    only = SceneShares.only(scene)
-    recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
-    say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
-    with generator_of(rg, folder, recipe) as generator:
-        specification = Specification(recipe, folder, generator)
+    with benchmark_world(recipe, scene) as specification:
+        recipe = specification.recipe
+        say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
         parts = step_breakdown(Setup(specification, environments, recipe.seed), PERIODS, turns // 2 + 1)
         say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
         figures: dict[str, float] = {}
@@ -72,8 +62,6 @@ def main(
         for name in (*PARTS, "transfer"):
             say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
         say(f"  an episode's end adds {parts['reset']:.2f} ms")
-        compared = compare(Setup(specification, environments, recipe.seed), PERIODS, turns // 5 + 1, say)
-        figures |= {f"variant_{name}": value for name, value in compared.items()}
         return figures | {f"step_{name}_ms": value for name, value in parts.items()}
 
 
@@ -119,35 +107,25 @@ def _rate(env: VectorEnv) -> float:
 def _others(
     specification: Specification, scene: str, count: int, own: float, say: Callable[[str], None]
 ) -> dict[str, float]:
-    """Rates of the usual vector environments: one environment a process, `count` processes."""
+    """Rates of the usual vector environments, the best of five: one environment a process, `count` processes."""
     make = partial(Environment, scene, specification.recipe, specification.robot, specification.rg)
+    width = load_robot(specification.robot).support.size
     figures = {}
     for name, label, build in (
         ("sb3", "SB3 SubprocVecEnv", partial(SubprocVecEnv, start_method="forkserver")),
         ("gymnasium", "gymnasium AsyncVectorEnv", partial(gymnasium.vector.AsyncVectorEnv, context="forkserver")),
     ):
         env: Any = build([make] * count)
+        rates = []
         try:
-            rate = _rate_of_other(env, count)
+            for _ in range(5):
+                env.reset()
+                begin = time.perf_counter()
+                for period in range(PERIODS):
+                    env.step(wander(period, count, width))
+                rates.append(count * PERIODS / (time.perf_counter() - begin))
         finally:
             env.close()
-        figures[f"{name}_{count}"] = rate
+        rate = figures[f"{name}_{count}"] = max(rates)
         say(f"{f'{label}, {count} process(es)':34}{rate:10.0f}{'':12}vector environment {own / rate:.1f} times as fast")
     return figures
-
-
-def _rate_of_other(env: Any, count: int) -> float:
-    width = env.get_attr("action_space")[0].shape[0] if hasattr(env, "get_attr") else env.single_action_space.shape[0]
-    env.reset()
-    rates = []
-    for _ in range(5):
-        begin = time.perf_counter()
-        for period in range(PERIODS):
-            env.step(wander(period, count, width))
-        rates.append(count * PERIODS / (time.perf_counter() - begin))
-        env.reset()
-    return max(rates)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""A reference generator that answers every command with the default posture, at the cost of a fitted one."""
+"""The world of a benchmark: one scene, and a stand-in for the reference generator at the cost of a fitted one."""
 
 import itertools
 import tempfile
@@ -12,7 +12,9 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork, input_names
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import Robot, load_robot
+from iowbc.recipe.task.task import SceneShares
+from iowbc.robot.description import Robot, load_robot, robot_folder
+from iowbc.task.specification import Specification
 
 
 def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenerator) -> None:
@@ -41,11 +43,18 @@ def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenera
 
 
 @contextmanager
-def generator_of(rg: Path | None, robot: Path, recipe: Recipe) -> Iterator[Path]:
-    """The folder of a fitted reference generator, or while needed that of a stand-in."""
-    if rg is not None:
-        yield rg
-        return
+def generator_of(robot: Path, recipe: Recipe) -> Iterator[Path]:
+    """The folder of a stand-in for a fitted reference generator, while needed."""
     with tempfile.TemporaryDirectory() as place:
         write_standing_generator(Path(place), load_robot(robot), recipe.rg)
         yield Path(place)
+
+
+@contextmanager
+def benchmark_world(recipe: Recipe | None, scene: str) -> Iterator[Specification]:
+    """The world of a recipe, or of the default one, with a single scene and a stand-in for the generator."""
+    recipe = recipe or Recipe(name="bench")
+    only = {"task": recipe.task.model_copy(update={"scenes": SceneShares.only(scene)})}
+    recipe, folder = recipe.model_copy(update=only), robot_folder(recipe.robot)
+    with generator_of(folder, recipe) as generator:
+        yield Specification(recipe, folder, generator)

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
 
-from iowbc.benchmarks.standing_generator import generator_of
+from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.control.action import action_mirror
 from iowbc.learning.activations import ACTIVATIONS
-from iowbc.learning.side_by_side import prepare_process
+from iowbc.learning.computing import prepare_process
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.processes import available_cores
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.task import SceneShares
-from iowbc.robot.description import load_robot, robot_folder
+from iowbc.robot.description import load_robot
 from iowbc.task.gym.environment import Environment
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -31,7 +29,6 @@ PARTS = ("simulation", "inference", "learning", "rest")
 
 def main(
     recipe: Recipe | None = None,
-    robot: Path | None = None,
     *,
     scene: str = "lift",
     turns: int = 6,
@@ -44,17 +41,13 @@ def main(
     Rates are those of the best turn, which other programs disturbed least; the ratio is the median over turns.
     `others`: processes of stable-baselines3, each with one environment; by default one a core. 0 leaves it out.
     """
-    recipe = recipe or Recipe(name="bench")
-    folder, cores = robot or robot_folder(recipe.robot), available_cores()
-    only = SceneShares.only(scene)
-    recipe = recipe.model_copy(update={"task": recipe.task.model_copy(update={"scenes": only})})
-    settings = recipe.teacher
-    samples, count = settings.environments * settings.rollout, cores if others is None else others
-    say(f"{recipe.name}: scene {scene}, networks {list(settings.hidden)}, {settings.environments} environments")
-    with generator_of(None, folder, recipe) as rg:
-        specification = Specification(recipe, folder, rg)
+    cores = available_cores()
+    with benchmark_world(recipe, scene) as specification:
+        recipe, settings = specification.recipe, specification.recipe.teacher
+        samples, count = settings.environments * settings.rollout, cores if others is None else others
+        say(f"{recipe.name}: scene {scene}, networks {list(settings.hidden)}, {settings.environments} environments")
         environments = VectorEnv(specification, num_envs=settings.environments, workers=cores, seed=recipe.seed)
-        mirrors = environments.layout.mirror, action_mirror(load_robot(folder))
+        mirrors = environments.layout.mirror, action_mirror(load_robot(specification.robot))
         other = _plain(specification, scene, count, samples) if count else None
         try:
             prepare_process()

@@ -11,14 +11,7 @@ import typer
 
 from iowbc.cli.comparing import compare, diff, report, ui
 from iowbc.cli.listing import gc, list_, show, status
-from iowbc.cli.measuring import (
-    bench_carry,
-    bench_control,
-    bench_reference,
-    bench_scale,
-    bench_simulation,
-    bench_training,
-)
+from iowbc.cli.measuring import bench_carry, bench_control, bench_reference, bench_simulation, bench_training
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
@@ -51,7 +44,6 @@ BENCHMARKS: dict[str, Callable[..., None]] = {
     "sim": bench_simulation,
     "train": bench_training,
     "rg": bench_reference,
-    "scale": bench_scale,
     "control": bench_control,
     "carry": bench_carry,
 }

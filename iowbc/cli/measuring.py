@@ -1,15 +1,12 @@
-"""The benchmarks: `bench sim`, `train`, `rg`, `scale` and `control` of this machine, `carry` of a public controller."""
+"""The benchmarks: `bench sim`, `train`, `rg` and `control` of this machine, `carry` of a public controller."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from iowbc.cli.options import BenchRecipe, BenchWorkers, RunsFolder, SceneName, runs_folder
 from iowbc.commands import completion
-
-if TYPE_CHECKING:
-    from iowbc.recipe.recipe import Recipe
 
 
 def bench_simulation(
@@ -47,22 +44,6 @@ def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, ru
     from iowbc.commands.bench import reference
 
     reference(runs_folder(runs), recipe, workers=workers or ())
-
-
-def bench_scale(
-    recipe: BenchRecipe = None,
-    turns: Annotated[int, typer.Option(help="Number of repetitions.", min=1)] = 3,
-    runs: RunsFolder = None,
-) -> None:
-    """Measure labels and trials on one node of Ray and on two, and what its engine costs; the figures go to MLflow."""
-    from iowbc.commands.bench import scale
-
-    def measure(recipe: "Recipe | None") -> dict[str, float]:
-        from iowbc.stages import scaling
-
-        return scaling.main(recipe, turns=turns)
-
-    scale(runs_folder(runs), recipe, measure)
 
 
 def bench_control(

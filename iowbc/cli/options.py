@@ -53,9 +53,7 @@ Engine = Annotated[
 ]
 Address = Annotated[
     str | None,
-    typer.Option(
-        help="Ray cluster: local, local:NODES (both here), auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"
-    ),
+    typer.Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"),
 ]
 Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Show what would run, as `plan` does.")]

@@ -154,7 +154,7 @@ def request_of(
     address: str | None = None,
 ) -> "Request":
     from iowbc.commands.request import Request
-    from iowbc.pipeline.step import Options
+    from iowbc.pipeline.stage_plan import Options
 
     options = Options(until, frozenset(force or ()), on_code_change, workers, engine, address)
     return Request(recipe, tuple(overrides or ()), runs_folder(runs), options)

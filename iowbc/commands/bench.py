@@ -1,6 +1,6 @@
 """`iowbc bench`: the speed of this machine; the figures go to MLflow."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from iowbc.commands.training import require_training
@@ -38,12 +38,6 @@ def reference(runs: Runs, file: Path | None, *, workers: Sequence[int]) -> None:
     from iowbc.benchmarks import reference
 
     record_figures(runs, "bench-rg", reference.main(recipe, workers=tuple(workers)))
-
-
-def scale(runs: Runs, file: Path | None, measure: Callable[[Recipe | None], Mapping[str, float]]) -> None:
-    """Measure Ray on one node and on two, with the default recipe or one in a file. Raises `UsageError`."""
-    recipe = _recipe(runs, file)
-    record_figures(runs, "bench-scale", measure(recipe))
 
 
 def _recipe(runs: Runs, file: Path | None, scene: str | None = None) -> Recipe | None:

@@ -27,7 +27,7 @@ from iowbc.stages.registry import STAGES
 if TYPE_CHECKING:
     import pandas as pd
 
-    from iowbc.report.curves import Panel
+    from iowbc.report.curves import CurvePanel
     from iowbc.report.runs import Group
 
 CURVE_WIDTH = 40
@@ -110,7 +110,7 @@ def _groups(found: Sequence[Named]) -> "list[Group]":
     return grouped([Run(run.word, run.artifacts, run.recipe or {}) for run in found])
 
 
-def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[Panel]]":
+def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[CurvePanel]]":
     """The main learning curves of all recipes by stage; also drawn under `output`, a picture a stage."""
     from iowbc.report.curves import PICTURE_POINTS, learning_figure, learning_panels
     from iowbc.results.picture import write_figure
@@ -122,7 +122,7 @@ def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[Pa
     return curves
 
 
-def _print_curves(curves: "Mapping[str, Sequence[Panel]]", console: Console) -> None:
+def _print_curves(curves: "Mapping[str, Sequence[CurvePanel]]", console: Console) -> None:
     """The main learning curves of each recipe, one line each; `iowbc report` has them to look into."""
     for stage, panels in curves.items():
         for panel in panels:

@@ -13,7 +13,7 @@ from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned, time
 from iowbc.pipeline.console.wording import KEY_LENGTH, short
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Step
+from iowbc.pipeline.stage_plan import StagePlan
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
@@ -56,7 +56,7 @@ def _print_several(found: Planned, request: Request, console: Console) -> None:
         tell(console, text)
 
 
-def _print(steps: Sequence[Step], console: Console) -> None:
+def _print(steps: Sequence[StagePlan], console: Console) -> None:
     """What is planned for each stage, the reasons below it, and the time in all."""
     widest = max((len(step.stage.name) for step in steps), default=0)
     for step in steps:
@@ -76,7 +76,7 @@ def _print(steps: Sequence[Step], console: Console) -> None:
         console.print(f"{count}: {', and '.join(parts)}", highlight=False)
 
 
-def _planned(step: Step) -> Text:
+def _planned(step: StagePlan) -> Text:
     """Whether it is cached, and by which key, or would run, and for how long."""
     if step.cached:
         published = step.artifact is not None and step.artifact.published
@@ -88,12 +88,12 @@ def _planned(step: Step) -> Text:
     return Text.assemble(("run", "bold yellow"), takes)
 
 
-def _why(step: Step) -> Sequence[str]:
+def _why(step: StagePlan) -> Sequence[str]:
     """A line for each reason and note."""
     return step.notes if step.cached else (*short(step.reasons, REASONS_SHOWN).splitlines(), *step.notes)
 
 
-def _data(step: Step) -> dict[str, Any]:
+def _data(step: StagePlan) -> dict[str, Any]:
     """The same for other programs."""
     return {
         "stage": step.stage.name,

@@ -21,7 +21,7 @@ from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Options
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall, require_whole
 from iowbc.pipeline.store.store import Store

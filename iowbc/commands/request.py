@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from iowbc.errors import Problem, RecipeError
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Options
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.digests import folder_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store

@@ -19,7 +19,7 @@ from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Options
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures
@@ -129,8 +129,7 @@ def run_recipe(
     try:
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
-            load = (lambda: "") if cluster is None else lambda: cluster.load
-            display = _display(loaded, console, lambda: stop.text, load, manner)
+            display = _display(loaded, console, lambda: stop.text, manner)
             runner = Runner(
                 planner,
                 robot,
@@ -153,7 +152,7 @@ def run_recipe(
         finally:
             if tracker is not None:
                 wait = within is None and bool(_made(runner)) and not stop()
-                delivered = tracker.close(status, wait) or not wait
+                delivered = tracker.close(status, wait=wait) or not wait
     except KeyboardInterrupt:
         ending, closing = RunEnding(INTERRUPTED), _resumption(request, runner)
     if ending.code == DONE and runner is not None and manner != "quiet":
@@ -179,13 +178,11 @@ def _rest(request: Request, made: Sequence[str]) -> str:
     return request.command([name for name in request.options.force if name not in made])
 
 
-def _display(
-    loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], load: Callable[[], str], manner: Manner
-) -> Display:
+def _display(loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], manner: Manner) -> Display:
     if manner == "quiet":
         return Display()
     if manner == "verbose":
         return PlainDisplay(0.0, console.file)
     if console.is_terminal:
-        return LiveTable(console, stopping, load)
-    return PlainDisplay(loaded.recipe.execution.line_interval, console.file, load)
+        return LiveTable(console, stopping)
+    return PlainDisplay(loaded.recipe.execution.line_interval, console.file)

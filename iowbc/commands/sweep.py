@@ -23,7 +23,7 @@ from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.tracking.family import Family
+from iowbc.pipeline.tracking.tracker import SweepRecord
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
@@ -125,7 +125,7 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
         console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
     execution = found.points[0].loaded.recipe.execution
     endings: Endings = {}
-    family: Family | None = None
+    record: SweepRecord | None = None
     status = "KILLED"
     try:
         with (
@@ -137,13 +137,12 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
             jobs, workers = _shared_out(points, asked, cluster)
             if execution.track and not _all_cached(before):
                 settings = {point.name: point.settings for point in found.points}
-                family = Family(runs, found.name, execution.experiment, settings, execution.tracking_patience)
-                family.send()
-            origin = None if family is None else family.origin
+                record = SweepRecord(runs, found.name, execution.experiment, settings, execution.tracking_patience)
+                record.send()
+            origin = None if record is None else record.origin
             tasks = [_task(one, stop, folder, origin, cluster, workers) for one in points]
-            views = {task.name: RunView(task.name, task.log) for task in tasks}
-            load = (lambda: "") if cluster is None else lambda: cluster.load
-            with Board(console, execution.line_interval, quiet, lambda: stop.text, views, load) as board:
+            views = {task.name: RunView(task.name, log=task.log) for task in tasks}
+            with Board(console, execution.line_interval, quiet, lambda: stop.text, views) as board:
                 if cluster is None:
                     endings = run_processes(tasks, jobs, stop, board)
                 else:
@@ -154,10 +153,10 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
     try:
         if code != INTERRUPTED:
-            _conclude(found, endings, runs, folder, console, family, quiet)
+            _conclude(found, endings, runs, folder, console, record, quiet)
     finally:
-        if family is not None:
-            family.close(status)
+        if record is not None:
+            record.close(status, wait=status != "KILLED")
     _tell_rest(asked, endings, folder, code)
     return code
 
@@ -209,7 +208,7 @@ def _conclude(
     runs: Runs,
     folder: Path,
     console: Console,
-    family: Family | None,
+    record: SweepRecord | None,
     quiet: bool,
 ) -> None:
     """Write and print what the finished points came to."""
@@ -224,9 +223,9 @@ def _conclude(
     made = outcomes(found, finished)
     results = table(found, made)
     paths = write_results(found, made, finished, states, folder)
-    if family is not None:
+    if record is not None:
         figures = {f"{line.label}/{name}": value for line in made.lines for name, value in line.means.items()}
-        family.describe(markdown(results), figures, [folder / FIGURE, folder / TABLE])
+        record.describe(markdown(results), figures, [folder / FIGURE, folder / TABLE])
     if quiet:
         return
     console.print(drawn(results, console.width))

@@ -12,7 +12,7 @@ from iowbc.commands.printed import plain_table, print_json
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.ingredients import key_values
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.step import Step
+from iowbc.pipeline.stage_plan import StagePlan
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.reading.sweep import Sweep
 
@@ -21,7 +21,7 @@ from iowbc.recipe.reading.sweep import Sweep
 class PlannedStage:
     """A stage of a point."""
 
-    step: Step
+    step: StagePlan
     shared_with: str
     """The earlier recipe that makes it; empty where this one does, or where it is cached."""
 
@@ -45,7 +45,7 @@ def planned(planners: Sequence[Planner]) -> Planned:
     return found
 
 
-def _identity(planner: Planner, step: Step, before: Mapping[str, str]) -> str:
+def _identity(planner: Planner, step: StagePlan, before: Mapping[str, str]) -> str:
     """What stands for a stage's key while those of the stages that it reads are not known."""
     if step.key is not None:
         return step.key
@@ -75,7 +75,7 @@ def in_all(found: Planned, what: str = "points") -> str:
     return f"{head}; {time_of(made)} one after another{unknown}"
 
 
-def time_of(steps: Sequence[Step]) -> str:
+def time_of(steps: Sequence[StagePlan]) -> str:
     """The time that stages take together, as far as it is known: a range, or a guess where one of them has no more."""
     known = [step for step in steps if step.guess is not None]
     if any(step.expected is None for step in known):

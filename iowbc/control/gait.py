@@ -3,7 +3,8 @@
 import numpy as np
 
 from iowbc.arrays import Array, Mask, namespace
-from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.control.sensors import Measured
+from iowbc.recipe.task.joint_references import GaitPrior, Recovery
 from iowbc.robot.mirror import in_place
 
 TINY = 1e-6
@@ -18,6 +19,18 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
     moving: Mask = (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
     return moving
+
+
+def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
+    """Whether the base is felt to tip over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
+
+    Pitch and roll of the measured gravity, less the reference's, and their rates by the gyroscope.
+    """
+    xp, gravity, rate = namespace(pelvis_pitch), measured.projected_gravity, measured.base_angular_velocity
+    pitch = gravity[:, 0] - xp.sin(pelvis_pitch) + recovery.horizon * rate[:, 1]
+    roll = -gravity[:, 1] + recovery.horizon * rate[:, 0]
+    falling: Mask = pitch * pitch + roll * roll > recovery.tilt**2
+    return falling
 
 
 def foot_phase(phase: Array) -> Array:

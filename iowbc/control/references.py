@@ -10,7 +10,9 @@ import numpy as np
 from iowbc.arrays import Array, Constants, Mask, as_slice, namespace
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.control.gait import is_falling, wants_to_move
 from iowbc.control.gravity import ArmGravity
+from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot
@@ -47,6 +49,7 @@ class ReferenceLayer(Constants):
         self.default_support = robot.default_position[robot.support]
         self.default_height = robot.default_height
         self.waist, self._waist_pitch = as_slice(robot.waist), as_slice(robot.waist_pitch)
+        self._settings = references.gait
         self._stride = Stride.of(robot, references.gait)
 
     def clamp(self, command: Array) -> Array:
@@ -97,6 +100,14 @@ class ReferenceLayer(Constants):
         if self._stride is None:
             return support
         return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping)
+
+    def wants_steps(self, measured: Measured, support: Array, command: Array) -> Mask:
+        """Whether the gait clock has a reason to run, (n,): a commanded velocity, or a fall to be caught."""
+        moving, recovery = wants_to_move(command, self._settings), self._settings.recovery
+        if recovery is None:
+            return moving
+        caught: Mask = moving | is_falling(measured, self.start_pitch(support, command), recovery)
+        return caught
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

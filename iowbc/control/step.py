@@ -122,7 +122,7 @@ class ControlStep(Constants):
         command = xp.where(begun, limited, state.command)
         arms, posture = self.references.advance(state.arms, state.posture, command, grasp, self._period)
         arms, posture = xp.where(begun, arms, state.arms), xp.where(begun, posture, state.posture)
-        phase, stepping = self._clock(state, command, begun[:, 0])
+        phase, stepping = self._clock(state, measured, command, posture)
         support = self.references.with_stride(posture, command, phase, stepping)
         sensed = Sensed(
             measured=measured,
@@ -144,10 +144,10 @@ class ControlStep(Constants):
         after = State(command, arms, posture, turned, phase[:, None], clock, one, action, history)
         return Step(self._joints(support + self.scale * action, held), action, support, after)
 
-    def _clock(self, state: State, command: Array, begun: Mask) -> tuple[Array, Mask]:
+    def _clock(self, state: State, measured: Measured, command: Array, posture: Array) -> tuple[Array, Mask]:
         """The gait clock of this step: phase (n,) and whether it runs (n,)."""
         xp, phase, stepping = namespace(command), state.phase[:, 0], state.stepping[:, 0] > 0.5
-        moving = gait.wants_to_move(command, self._gait)
+        begun, moving = state.begun[:, 0] > 0.5, self.references.wants_steps(measured, posture, command)
         advanced, runs = gait.advance(phase, stepping, moving, self._gait, self._period)
         return xp.where(begun, advanced, phase), (begun & runs) | (~begun & stepping)
 

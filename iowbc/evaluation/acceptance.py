@@ -1,14 +1,17 @@
-"""The trials that accept an exported controller: it, not the torch student, carries the load in the simulation."""
+"""Rollouts of an exported controller in place of the torch student: acceptance trials, golden vectors."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import itertools
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.deploy.controller import Controller
+from iowbc.deploy.session import Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import Measure, trial_metrics
@@ -28,10 +31,20 @@ from iowbc.task.vector.vector_env import VectorEnv
 TINY = 1e-9
 """No error is smaller, in its unit, where errors are compared in parts of each other."""
 
+GOLDEN_PARTS: tuple[dict[str, Any], ...] = (
+    {},
+    {"velocity": (0.3, 0.1, 0.3)},
+    {"velocity": (-0.2, 0.0, 0.0), "height": 0.66},
+    {"height": 0.66, "pitch": 0.3, "wrists": (0.03, 0.02, 0.02, 0.03, -0.02, 0.02)},
+)
+"""Commands of the equal parts of the rollout whose inputs become the golden vectors, in the terms of a segment."""
+RAMP = 0.5
+"""Part of each over which the command moves."""
+
 
 @dataclass(frozen=True)
 class Accepted:
-    """How the trials of one `export.acceptance` went."""
+    """Result of the trials of one `export.acceptance`."""
 
     asked: Acceptance
     survived: int
@@ -47,12 +60,12 @@ class Accepted:
 
     @property
     def enough(self) -> bool:
-        """Whether as many trials passed as the recipe asks for."""
+        """True where as many trials passed as the recipe asks for."""
         return self.passed >= self.asked.minimum
 
     @property
     def sentence(self) -> str:
-        """What was asked and how it went."""
+        """The request and its result in words."""
         asked, last = self.asked, sum(segment.duration for segment in self.asked.sequence)
         held = "" if np.isnan(self.weight_in_hands) else f", {self.weight_in_hands:.0%} of its weight in the hands"
         way = "" if np.isnan(self.transport) else f", {self.transport:.0%} of the way covered"
@@ -89,54 +102,68 @@ def try_out(
 
     Returns the driver, which holds the difference of targets, and how the trials went.
     """
-    with acceptance_environment(world) as environment:
+    with closing(_environment(world)) as environment:
         policy = ExportedPolicy(Controller.load(exported, robots=environment.num_envs), environment)
-        return policy, played(world, environment, policy, interrupted)
+        return policy, _played(world, environment, policy, interrupted)
 
 
 def try_out_network(world: Specification, policy: Acting, interrupted: Callable[[], bool]) -> list[Accepted]:
     """Let the policy that was exported play the same trials, as it was trained. Raises Interrupted when interrupted."""
-    with acceptance_environment(world) as environment:
-        return played(world, environment, policy, interrupted)
+    with closing(_environment(world)) as environment:
+        return _played(world, environment, policy, interrupted)
 
 
-@contextmanager
-def acceptance_environment(world: Specification) -> Iterator[VectorEnv]:
+def _environment(world: Specification) -> VectorEnv:
     """An environment in this process that plays the trials."""
     episodes = acceptance_episodes(world.recipe)
-    environment = VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)
-    try:
-        yield environment
-    finally:
-        environment.close()
+    return VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)
 
 
-def played(
+def _played(
     world: Specification, environment: VectorEnv, policy: Acting, interrupted: Callable[[], bool]
 ) -> list[Accepted]:
-    """How the trials went, for each `export.acceptance`."""
+    """The result of each `export.acceptance`."""
     outcomes = play_in(environment, policy, interrupted)
     trials = iter(zip(acceptance_episodes(world.recipe), outcomes, strict=True))
-    asked = world.recipe.export.acceptance
     measure = measure_of(world.recipe, load_robot(world.robot))
-    return [judged(world.recipe, measure, one, [next(trials) for _ in range(one.trials)]) for one in asked]
+    asked = world.recipe.export.acceptance
+    return [judged(world.recipe, measure, one, list(itertools.islice(trials, one.trials))) for one in asked]
 
 
 def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
-    """Which of the trials that were asked for pass: survived, weight in the hands, object not lost, way covered."""
-    hands, ways, errors, passed = [], [], [], 0
-    for episode, outcome in trials:
-        assert episode.script is not None
-        metrics = trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
-        hands.append(metrics["weight_in_hands"])
-        ways.append(metrics["transport_robot"])
-        errors.append([metrics[name] for name in ERRORS])
-        passed += outcome.survived and carried_along(asked, metrics)
+    """The trials that pass: survived, weight in the hands, object not lost, way covered."""
+    metrics = [
+        trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
+        for episode, outcome in trials
+        if episode.script is not None
+    ]
+    survived = [outcome.survived for _, outcome in trials]
     return Accepted(
         asked,
-        survived=sum(outcome.survived for _, outcome in trials),
-        passed=passed,
-        weight_in_hands=float(np.mean(hands)),
-        transport=float(np.mean(ways)),
-        errors=np.mean(errors, axis=0),
+        survived=sum(survived),
+        passed=sum(alive and carried_along(asked, one) for alive, one in zip(survived, metrics, strict=True)),
+        weight_in_hands=float(np.mean([one["weight_in_hands"] for one in metrics])),
+        transport=float(np.mean([one["transport_robot"] for one in metrics])),
+        errors=np.mean([[one[name] for name in ERRORS] for one in metrics], axis=0),
     )
+
+
+def golden_episode(recipe: Recipe) -> Episode:
+    """An undisturbed episode without an object that lasts `export.golden_steps`."""
+    duration = recipe.export.golden_steps / recipe.task.control_frequency / len(GOLDEN_PARTS)
+    sequence = [
+        Segment.model_validate({"duration": duration, "ramp": RAMP * duration, **part}) for part in GOLDEN_PARTS
+    ]
+    return Condition(FREE, command_script(sequence, recipe.task.commands), UNDISTURBED).episode(0.0, recipe.seed)
+
+
+def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:
+    """The inputs of each control step, without the state; fewer than asked for where the robot falls.
+
+    Raises Interrupted.
+    """
+    steps, episodes = world.recipe.export.golden_steps, (golden_episode(world.recipe),)
+    with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment:
+        policy = ExportedPolicy(Controller.load(exported), environment, golden_steps=steps)
+        play_in(environment, policy, interrupted)
+    return policy.inputs

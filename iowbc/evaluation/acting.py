@@ -1,4 +1,4 @@
-"""What acts in the trials of a recipe: a trained policy, the model-based rival, or a public controller."""
+"""The acting policy in the trials of a recipe: a trained one, the model-based rival, or a public controller."""
 
 from pathlib import Path
 

@@ -1,9 +1,9 @@
-"""Films of episodes: writes an mp4 file frame by frame, with lines of text in a corner, and plays trials again."""
+"""Films of episodes: an mp4 file frame by frame, with lines of text in a corner, and trials played again."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import imageio.v2
 import numpy as np
@@ -44,60 +44,18 @@ def with_text(frame: Frame, lines: Sequence[str]) -> Frame:
     return np.asarray(image)
 
 
-class Film:
-    """An mp4 file that is written frame by frame; it appears under its name when the block ends without an error."""
-
-    def __init__(self, path: Path, fps: int) -> None:
-        self.path = path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._unfinished = path.with_suffix(".part.mp4")
-        self._writer = imageio.v2.get_writer(
-            self._unfinished, format="FFMPEG", fps=fps, codec="libx264", quality=QUALITY, pixelformat="yuv420p"
-        )
-
-    def add(self, frame: Frame) -> None:
-        """Append a frame (H, W, 3)."""
-        self._writer.append_data(frame)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            self._writer.close()
-            if kind is None:
-                self._unfinished.replace(self.path)
-        finally:
-            self._unfinished.unlink(missing_ok=True)
-
-
-class Pictures:
-    """Frames that are kept as files in a folder, to make a film of several later."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self._count = folder, 0
-        folder.mkdir(parents=True, exist_ok=True)
-
-    def add(self, frame: Frame) -> None:
-        """Keep a frame (H, W, 3)."""
-        Image.fromarray(frame).save(self.folder / f"{self._count:06}.png", compress_level=1)
-        self._count += 1
-
-    def frames(self) -> Iterator[Frame]:
-        """Those kept so far, in order."""
-        for path in sorted(self.folder.glob("*.png")):
-            with Image.open(path) as image:
-                yield np.asarray(image)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """What was kept stays."""
+@contextmanager
+def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
+    """A function that appends a frame (H, W, 3) to an mp4 file, which appears when the block ends without an error."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".part.mp4")
+    settings = {"fps": fps, "codec": "libx264", "quality": QUALITY, "pixelformat": "yuv420p"}
+    try:
+        with imageio.v2.get_writer(unfinished, format="FFMPEG", **settings) as writer:
+            yield writer.append_data
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
@@ -121,23 +79,19 @@ def command_line(signals: dict[str, Any], seconds: float) -> str:
     return f"{seconds:4.1f} s   {walk}   H {height:.2f} m, pitch {pitch:+.2f} rad"
 
 
-def film_title(row: "pd.Series[Any]") -> str:
-    """Variant, case, mass and number of a trial."""
-    return f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
-
-
 class EpisodeFilm:
-    """A film of the first environment of an in-process vector environment; give `look` to `play_in`."""
+    """Frames of the first environment of an in-process vector environment; give `look` to `play_in`, and `close` it."""
 
-    def __init__(self, environment: VectorEnv, film: Film | Pictures, video: Video, title: Sequence[str]) -> None:
-        """`title`: lines of text in every frame, above the line with time and command."""
-        self.environment, self.video, self.title = environment, video, list(title)
-        self._film = film
+    def __init__(
+        self, environment: VectorEnv, add: Callable[[Frame], None], video: Video, title: Sequence[str]
+    ) -> None:
+        """`add` receives each frame; `title`: lines of text in every frame, above the line with time and command."""
+        self.environment, self.add, self.video, self.title = environment, add, video, list(title)
         self._renderer: SceneRenderer | None = None
         self.frames = 0
 
     def look(self, seconds: float) -> None:
-        """Draw a frame if one is due at this time [s]."""
+        """Draw a frame if one is due at this time [s]. Raises NoRenderer where nothing can be drawn."""
         if seconds > self.video.duration or seconds * self.video.fps < self.frames - 1e-6:
             return
         simulation = self.environment.batch.simulation
@@ -146,37 +100,32 @@ class EpisodeFilm:
         frame = self._renderer.frame()
         if self.video.traces:
             frame = with_text(frame, [*self.title, command_line(self.environment.signals, seconds)])
-        self._film.add(frame)
+        self.add(frame)
         self.frames += 1
 
-    def __enter__(self) -> Self:
-        self._film.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Frees the renderer."""
         if self._renderer is not None:
             self._renderer.close()
-        self._film.__exit__(kind, error, trace)
 
 
 def film_trial(
     world: Specification,
     policy: Acting,
     row: "pd.Series[Any]",
-    film: Film | Pictures,
+    add: Callable[[Frame], None],
     video: Video,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> Outcome:
-    """Play the trial in a row of `trials.parquet` again and film it; `progress` is told the time reached [s].
+    """Play the trial in a row of `trials.parquet` again and give its frames to `add`; `progress` receives the time
+    reached [s].
 
     Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
     """
-    environment = VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
-    try:
-        with EpisodeFilm(environment, film, video, [film_title(row)]) as episode:
-            return play_in(environment, in_batch(policy, row), interrupted, progress, episode.look)[0]
-    finally:
-        environment.close()
+    title = [f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"]
+    with (
+        closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment,
+        closing(EpisodeFilm(environment, add, video, title)) as film,
+    ):
+        return play_in(environment, in_batch(policy, row), interrupted, progress, film.look)[0]

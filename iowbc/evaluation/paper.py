@@ -1,4 +1,4 @@
-"""What the paper reports: Table II (lifting), Table III (pushing) and the heavy task of its section IV-B.
+"""Numbers of the paper: Table II (lifting), Table III (pushing) and the heavy task of its section IV-B.
 
 Source: H. Zhang, Y. Tseng, D. Zhao, H. E. Tseng, "Interaction-Aware Whole-Body Control for Compliant Object
 Transport", tables `tab:lifting_huge` and `tab:pushing_huge`. None stands for the paper's "Fails".

@@ -1,27 +1,29 @@
-"""Plays one episode for the eye: in MuJoCo's viewer where there is a display, or into a film."""
+"""One episode to look at: in MuJoCo's viewer in real time where there is a display, or as a film."""
 
+import os
+import sys
+import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from iowbc.control.action import action_mirror
 from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
-from iowbc.errors import require_known
+from iowbc.errors import Interrupted, NoDisplay, require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
-from iowbc.evaluation.films import EpisodeFilm, Film
+from iowbc.evaluation.films import EpisodeFilm, written_film
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.evaluation.viewer import play_in_viewer, require_display
-from iowbc.learning.acting import load_policy
-from iowbc.learning.unfinished import unfinished_policy
+from iowbc.learning.acting import load_policy, unfinished_policy
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
+from iowbc.sim.rendering.appearance import Appearance
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -29,7 +31,7 @@ from iowbc.task.vector.vector_env import VectorEnv
 
 @dataclass(frozen=True)
 class Source:
-    """What is played: a policy, and the world that its recipe describes."""
+    """A policy to play, and the world that its recipe describes."""
 
     world: Specification
     policy: Path
@@ -60,8 +62,8 @@ def exported_source(folder: Path) -> Source:
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What was shown, and how it ended."""
+class PlayedEpisode:
+    """The end of the episode that was shown."""
 
     outcome: Outcome
     duration: float
@@ -75,10 +77,10 @@ def play(
     request: PlayRequest,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float, float], None] = lambda seconds, duration: None,
-) -> Shown:
+) -> PlayedEpisode:
     """Play one episode; in the viewer, or with `request.video` into that mp4 file (no display needed).
 
-    progress: is told how much of a film is drawn, and how long it is to be [s].
+    progress: receives how much of a film is drawn, and how long it is to be [s].
 
     Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
     """
@@ -86,23 +88,23 @@ def play(
     episode = requested_episode(recipe, request)
     if request.video is None:
         require_display()
-    environment = source.environment(episode)
-    try:
+    with closing(source.environment(episode)) as environment:
         policy = open_policy(source, environment)
         if request.video is None:
-            return Shown(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
+            return PlayedEpisode(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
-        with EpisodeFilm(environment, Film(request.video, settings.fps), settings, title) as film:
+        with (
+            written_film(request.video, settings.fps) as add,
+            closing(EpisodeFilm(environment, add, settings, title)) as film,
+        ):
 
             def look(seconds: float) -> None:
                 film.look(seconds)
                 progress(seconds, episode.duration)
 
             outcome = play_in(environment, policy, interrupted, look=look)[0]
-        return Shown(outcome, episode.duration, film.frames)
-    finally:
-        environment.close()
+        return PlayedEpisode(outcome, episode.duration, film.frames)
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
@@ -123,3 +125,32 @@ def open_policy(source: Source, environment: VectorEnv) -> Acting:
         return load_policy(source.policy)
     mirrors = (environment.layout.mirror, action_mirror(load_robot(source.world.robot)))
     return unfinished_policy(source.policy, source.key, source.world.recipe.teacher, mirrors)
+
+
+def require_display() -> None:
+    """Raises NoDisplay where the viewer cannot open a window."""
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise NoDisplay(
+            "no display (DISPLAY and WAYLAND_DISPLAY are unset): give --video out.mp4 to make a film instead"
+        )
+
+
+def play_in_viewer(environment: VectorEnv, policy: Acting, interrupted: Callable[[], bool]) -> Outcome:
+    """One episode in real time in a window. Raises Interrupted when the window is closed."""
+    import mujoco.viewer  # needs a window system as soon as it is imported
+
+    appearance = Appearance(environment.batch.simulation, 0)
+    data = appearance.data
+    with mujoco.viewer.launch_passive(appearance.model, data, show_left_ui=False, show_right_ui=False) as viewer:
+        start = time.monotonic()
+
+        def look(seconds: float) -> None:
+            if not viewer.is_running():
+                raise Interrupted("the viewer was closed")
+            with viewer.lock():
+                appearance.update()
+                viewer.cam.lookat[:] = data.qpos[:3]
+            viewer.sync()
+            time.sleep(max(0.0, start + seconds - time.monotonic()))
+
+        return play_in(environment, policy, interrupted, look=look)[0]

@@ -1,4 +1,4 @@
-"""What a user asks to see: one episode of a policy, in the viewer or as a film. Imports nothing heavy."""
+"""The request to show one episode of a policy, in the viewer or as a film. Imports nothing heavy."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,5 +1,6 @@
 """A film of several variants on the same trial, side by side."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -7,15 +8,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import imageio.v3 as iio
 import numpy as np
 import pandas as pd
+from PIL import Image
 
-from iowbc.evaluation.films import Film, Frame, Pictures, film_trial, filmed
+from iowbc.evaluation.films import Frame, film_trial, filmed, written_film
 from iowbc.evaluation.trials.rollout import Acting
 from iowbc.task.specification import Specification
 
 TRIAL = ["suite", "case", "mass", "impulse", "trial"]
-"""What tells one trial of a variant from another."""
+"""Columns that tell one trial of a variant from another."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,7 @@ class Actor:
     """A variant on the stage."""
 
     world: Specification
-    """Where its trials took place."""
+    """World of its trials."""
     policy: Acting
     trials: pd.DataFrame
     """Its long table."""
@@ -50,24 +53,30 @@ def film_side_by_side(
 ) -> None:
     """Play the trial in each actor's row again, and film them as tiles; who falls stays as he lay.
 
-    progress: told how much of all trials was played, and how long they may last together [s].
+    progress: receives the time of all trials that was played, and how long they may last together [s].
     Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
     """
     video = actors[0].world.recipe.eval.video
-    with TemporaryDirectory() as folder:
-        clips = [Pictures(Path(folder) / str(place)) for place in range(len(actors))]
+    with TemporaryDirectory() as place:
+        folders = [Path(place) / str(number) for number in range(len(actors))]
         duration, before = sum(float(row["duration"]) for row in rows), 0.0
-        for actor, row, clip in zip(actors, rows, clips, strict=True):
+        for actor, row, folder in zip(actors, rows, folders, strict=True):
+            folder.mkdir()
+            numbers = itertools.count()
+
+            def keep(frame: Frame, folder: Path = folder, numbers: Iterator[int] = numbers) -> None:
+                Image.fromarray(frame).save(folder / f"{next(numbers):06}.png", compress_level=1)
 
             def further(seconds: float, before: float = before) -> None:
                 progress(before + seconds, duration)
 
-            film_trial(actor.world, actor.policy, row, clip, video, interrupted, further)
+            film_trial(actor.world, actor.policy, row, keep, video, interrupted, further)
             before += float(row["duration"])
             progress(before, duration)
-        with Film(path, video.fps) as film:
-            for frames in _together([clip.frames() for clip in clips]):
-                film.add(tiled(frames))
+        clips = [sorted(folder.glob("*.png")) for folder in folders]
+        with written_film(path, video.fps) as add:
+            for number in range(max(map(len, clips))):
+                add(tiled([iio.imread(clip[min(number, len(clip) - 1)]) for clip in clips]))
 
 
 def tiled(frames: Sequence[Frame]) -> Frame:
@@ -80,16 +89,3 @@ def tiled(frames: Sequence[Frame]) -> Frame:
         top, left = height * (place // columns), width * (place % columns)
         picture[top : top + height, left : left + width] = frame
     return picture
-
-
-def _together(clips: Sequence[Iterator[Frame]]) -> Iterator[list[Frame]]:
-    """The frames of all clips, as long as one goes on; those that have ended keep their last."""
-    shown = [next(clip) for clip in clips]
-    going = True
-    while going:
-        yield list(shown)
-        going = False
-        for place, clip in enumerate(clips):
-            frame = next(clip, None)
-            if frame is not None:
-                shown[place], going = frame, True

@@ -1,10 +1,11 @@
 """Films of a policy while it trains: the same trial of its check, each time a further part of the training is done."""
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 from iowbc.errors import NoRenderer
-from iowbc.evaluation.films import EpisodeFilm, Film
+from iowbc.evaluation.films import EpisodeFilm, written_film
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.recipe.evaluation.video import Video
@@ -16,7 +17,7 @@ SMALL = Video(width=480, height=368, fps=10)
 
 
 class TrainingFilms:
-    """Makes the films that are due. What is there already is not made again."""
+    """The films that are due. An existing one is not made again."""
 
     def __init__(self, world: Specification, trial: Trial, folder: Path, parts: int) -> None:
         """`parts`: into which a training is divided; a film is due after each."""
@@ -32,15 +33,17 @@ class TrainingFilms:
 
     def make(self, path: Path, policy: Acting, say: Callable[[str], None]) -> bool:
         """Plays the trial and films it; where nothing can be drawn it says so once, and none is due any more."""
-        environment = VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=(self.trial.episode,))
         title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
+        episodes = (self.trial.episode,)
         try:
-            with EpisodeFilm(environment, Film(path, SMALL.fps), SMALL, [title]) as film:
+            with (
+                closing(VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment,
+                written_film(path, SMALL.fps) as add,
+                closing(EpisodeFilm(environment, add, SMALL, [title])) as film,
+            ):
                 play_in(environment, policy, look=film.look)
         except NoRenderer as reason:
             say(f"no films: {reason}")
             self.parts = 0
             return False
-        finally:
-            environment.close()
         return True

@@ -1,9 +1,10 @@
-"""Writes the exported folder: the graph, its contract, and all else that a controller loads."""
+"""The exported folder: the graph, its contract, and all else that a controller loads."""
 
 import shutil
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from iowbc.control.command import COMMAND
 from iowbc.deploy import contract, exported_folder
@@ -16,6 +17,8 @@ from iowbc.robot.description import DESCRIPTION
 
 PACKAGES = ("iowbc", "mujoco", "numpy", "onnx", "onnxruntime", "onnxscript", "torch")
 """Packages whose versions the contract records."""
+ROBOT_FIELDS = ("support", "interaction", "kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position")
+"""Arrays of the robot that the contract holds by the same name."""
 
 
 def write_folder(
@@ -26,6 +29,7 @@ def write_folder(
     sources: artifact keys of what went into the graph, by stage.
     """
     robot, drawn = graph.robot, recipe.simulation.randomization
+    arrays: dict[str, Any] = {name: tuple(getattr(robot, name).tolist()) for name in ROBOT_FIELDS}
     (out / exported_folder.ROBOT).mkdir()
     for source in (robot.folder / DESCRIPTION, robot.mjcf):
         shutil.copy(source, out / exported_folder.ROBOT / source.name)
@@ -45,15 +49,7 @@ def write_folder(
         settle=tuple(port.name for port in graph.settle.inputs),
         state=graph.state,
         joints=robot.joints,
-        support=tuple(robot.support.tolist()),
-        interaction=tuple(robot.interaction.tolist()),
-        kp=tuple(robot.kp.tolist()),
-        kd=tuple(robot.kd.tolist()),
-        effort=tuple(robot.effort.tolist()),
-        velocity_limit=tuple(robot.velocity_limit.tolist()),
-        lower=tuple(robot.lower.tolist()),
-        upper=tuple(robot.upper.tolist()),
-        default_position=tuple(robot.default_position.tolist()),
+        **arrays,
         action_scale=tuple(graph.equations.scale.tolist()),
         action_bound=graph.equations.bound,
         history=graph.history,

@@ -40,15 +40,6 @@ def write_golden(inputs: Values, outputs: Values, path: Path) -> None:
     np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
 
 
-def read_golden(path: Path) -> tuple[Values, Values]:
-    """Inputs and outputs by name."""
-    with np.load(path, allow_pickle=False) as file:
-        arrays = {name: file[name] for name in file.files}
-    inputs = {name.removeprefix(INPUT): value for name, value in arrays.items() if name.startswith(INPUT)}
-    outputs = {name.removeprefix(OUTPUT): value for name, value in arrays.items() if name.startswith(OUTPUT)}
-    return inputs, outputs
-
-
 def largest_difference(expected: Values, actual: Values) -> dict[str, float]:
     """Largest absolute difference of each output; infinite where a value is not finite."""
     return {

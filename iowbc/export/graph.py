@@ -17,7 +17,12 @@ from iowbc.learning.networks import StudentNetwork
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
 
-GRASP = PortEntry(name="grasp", shape=(2, 3), unit="m", frame="heading", meaning="base grasp of both wrists")
+
+def _port(name: str, shape: tuple[int, ...], unit: str, frame: str, meaning: str) -> PortEntry:
+    return PortEntry(name=name, shape=shape, unit=unit, frame=frame, meaning=meaning)
+
+
+GRASP = _port("grasp", (2, 3), "m", "heading", "base grasp of both wrists")
 
 
 class Program(nn.Module):
@@ -53,19 +58,9 @@ class StepProgram(Program):
         super().__init__()
         self.equations, self.student, self.inputs = equations, student, inputs
         self.outputs = (
-            PortEntry(
-                name="target", shape=(joints,), unit="rad", frame="joint", meaning="targets of the PD loop, all joints"
-            ),
-            PortEntry(
-                name="action", shape=(support,), unit="action", frame="joint", meaning="residual action, clipped"
-            ),
-            PortEntry(
-                name="support_reference",
-                shape=(support,),
-                unit="rad",
-                frame="joint",
-                meaning="θ_S_ref with the gait prior",
-            ),
+            _port("target", (joints,), "rad", "joint", "targets of the PD loop, all joints"),
+            _port("action", (support,), "action", "joint", "residual action, clipped"),
+            _port("support_reference", (support,), "rad", "joint", "θ_S_ref with the gait prior"),
             inputs[-1].model_copy(update={"name": "state_next", "meaning": "the next step's `state`"}),
         )
         self.eval().requires_grad_(False)
@@ -92,25 +87,19 @@ class ControllerGraph:
     ) -> None:
         equations = ControlStep(robot, task, references, layout, history, student)
         self.robot, self.student, self.layout, self.history, self.equations = robot, student, layout, history, equations
-        self.state = tuple(
-            PortEntry(name=name, shape=equations.shapes[name], unit=unit, frame=frame, meaning=meaning)
-            for name, (unit, frame, meaning) in STATE.items()
-        )
+        self.state = tuple(_port(name, equations.shapes[name], *about) for name, about in STATE.items())
         """Parts of the packed state, in order."""
         seen = {**quantities(of_object=False)}
         if OBJECT[0].name in layout.names:
             seen |= quantities(of_object=True)
         measured = {
-            name: PortEntry(
-                name=name, shape=(len(what.kind(robot)),), unit=what.unit, frame=what.frame, meaning=what.meaning
-            )
+            name: _port(name, (len(what.kind(robot)),), what.unit, what.frame, what.meaning)
             for name, what in seen.items()
         }
-        about = (PROPRIOCEPTION[0].unit, "heading", "the wanted command C: rate-limited and clamped inside")
-        command = PortEntry(name="command", shape=(len(COMMAND),), unit=about[0], frame=about[1], meaning=about[2])
-        size = sum(equations.sizes.values())
-        state = PortEntry(name="state", shape=(size,), unit="SI", frame="-", meaning="what the loop remembers")
-        load = PortEntry(name="load", shape=(1,), unit="kg", frame="-", meaning="mass expected between the hands")
+        meaning = "the wanted command C: rate-limited and clamped inside"
+        command = _port("command", (len(COMMAND),), PROPRIOCEPTION[0].unit, "heading", meaning)
+        state = _port("state", (sum(equations.sizes.values()),), "SI", "-", "what the loop remembers")
+        load = _port("load", (1,), "kg", "-", "mass expected between the hands")
         traced = equations.converted(_tensor)
         self.settle = SettleProgram(traced, command, measured["heading"], state)
         inputs = (command, *measured.values(), GRASP, load, state)

@@ -7,9 +7,15 @@ from typing import Any, Protocol
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from safetensors.numpy import load
 
-from iowbc.learning.networks import StudentNetwork, TeacherNetwork
+from iowbc.errors import Damaged
+from iowbc.files import previous, read_checked
+from iowbc.learning.checkpoint import under
+from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import Network, load_network
+from iowbc.learning.trained import trained_network
+from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.history import History
 
 
@@ -76,3 +82,18 @@ def policy_of(network: Network, architecture: Mapping[str, Any]) -> Policy:
     if isinstance(network, TeacherNetwork):
         return TeacherPolicy(network)
     return StudentPolicy(network, int(architecture["history"]))
+
+
+def unfinished_policy(path: Path, key: str, settings: Teacher, mirrors: Mirrors) -> Policy:
+    """The policy as the checkpoint at `path` of the stage's key has it, or the one before it where that is damaged.
+
+    mirrors: of a row (s_t, s_priv) and of an action. Raises `Damaged` where there is no whole checkpoint.
+    """
+    for candidate in (path, previous(path)):
+        try:
+            content = read_checked(candidate, key)
+        except Damaged:
+            continue
+        if content is not None:
+            return policy_of(*trained_network(under("policy", load(content)), settings, mirrors))
+    raise Damaged(f"{path}: no whole checkpoint of this training")

@@ -6,23 +6,13 @@ from torch import Tensor, nn
 
 from iowbc.arrays import Array
 from iowbc.learning.activations import ACTIVATIONS
-from iowbc.learning.encoders import (
-    KERNEL,
-    STRIDE,
-    ConvolutionalEncoder,
-    MirroredEncoder,
-    MlpEncoder,
-    RecurrentEncoder,
-)
-from iowbc.learning.estimate import Estimate
+from iowbc.learning.encoders import MirroredEncoder
 from iowbc.learning.history_actor import HistoryActor
 from iowbc.learning.networks import Normalizer, StudentNetwork, TeacherNetwork
 from iowbc.learning.perceptron import DenseMlp
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.symmetric import SymmetricHead, SymmetricMlp
-from iowbc.rollouts import encoders
-from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
-from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
+from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal, RowPolicy
 
 
 def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
@@ -30,12 +20,12 @@ def acting_policy(policy: ActorCritic) -> RowPolicy | HistoryPolicy:
     normalizer, actor = policy.normalizer, policy.actor
     if isinstance(actor, HistoryActor):
         return _history_policy(actor.network, _normal(normalizer, actor.observation))
-    return RowPolicy(_normal(normalizer), perceptron(actor))
+    return RowPolicy(_normal(normalizer), layers_of(actor))
 
 
 def teacher_policy(network: TeacherNetwork) -> RowPolicy:
     """A teacher's."""
-    return RowPolicy(_normal(network.normalizer), perceptron(network.body))
+    return RowPolicy(_normal(network.normalizer), layers_of(network.body))
 
 
 def student_policy(network: StudentNetwork) -> HistoryPolicy:
@@ -44,8 +34,8 @@ def student_policy(network: StudentNetwork) -> HistoryPolicy:
 
 
 @torch.no_grad()
-def perceptron(network: nn.Module) -> Perceptron:
-    """A perceptron; one that is symmetric by construction with its units (a, b) instead of sums and differences.
+def layers_of(network: nn.Module) -> Layers:
+    """Layers of a perceptron; of a symmetric one with its units (a, b) instead of sums and differences.
 
     Of the sums a layer makes E·(a + b), of the differences O·(a - b), and the units behind it are the activations of
     sum and difference of the two: (E + O)·a + (E - O)·b, and (E - O)·a + (E + O)·b. The first layer takes in the basis.
@@ -55,13 +45,12 @@ def perceptron(network: nn.Module) -> Perceptron:
         first, *others = [_linear(layer) for layer in layers]
         if network.seen is not None:
             first = Linear(_array(network.seen)[:, None] * first.weight, first.bias)
-        return Perceptron((first, *others), _activation(network.layers))
+        return Layers((first, *others), _activation(network.layers))
     assert isinstance(network, SymmetricMlp)
     basis = network.basis.matrix if network.seen is None else network.basis.matrix * network.seen
     even, odd = network.basis.split(basis)
-    layers_of = list(zip(network.layers.even, network.layers.odd, strict=True))
     found = []
-    for place, (keep, negate) in enumerate(layers_of):
+    for place, (keep, negate) in enumerate(zip(network.layers.even, network.layers.odd, strict=True)):
         assert isinstance(keep, nn.Linear)
         assert isinstance(negate, nn.Linear)
         if place:
@@ -71,7 +60,7 @@ def perceptron(network: nn.Module) -> Perceptron:
             sums, differences = even @ keep.weight.T, odd @ negate.weight.T
         weight = torch.cat([sums + differences, sums - differences], dim=1)
         found.append(Linear(_array(weight), _array(torch.cat([keep.bias, keep.bias]))))
-    return Perceptron((*found, _head(network.last)), _name(network.layers.activation.activation.module))
+    return Layers((*found, _head(network.last)), _name(network.layers.activation.activation.module))
 
 
 def _head(head: SymmetricHead) -> Linear:
@@ -87,40 +76,20 @@ def _head(head: SymmetricHead) -> Linear:
     return Linear(_array(torch.cat([sums + differences, sums - differences])), _array(bias))
 
 
-def _history_policy(network: StudentNetwork, normal: Normal) -> HistoryPolicy:
-    with torch.no_grad():
-        estimate = None if network.estimate is None else _estimate(network.estimate)
-        return HistoryPolicy(normal, encoder(network.encoder), estimate, perceptron(network.body))
-
-
-def _estimate(estimate: Estimate) -> Linear:
-    return _head(estimate.head) if isinstance(estimate.head, SymmetricHead) else _linear(estimate.head)
-
-
 @torch.no_grad()
-def encoder(module: nn.Module) -> encoders.Encoder:
-    """An encoder of a history."""
-    if isinstance(module, MirroredEncoder):
-        return encoders.Mirrored(encoder(module.encoder), module.permutation.numpy(), module.sign.numpy())
-    assert isinstance(module, MlpEncoder | ConvolutionalEncoder | RecurrentEncoder)
-    frame, activation = _first(module.frame), _activation(module.frame)
-    if isinstance(module, MlpEncoder):
-        return encoders.Whole(frame, _first(module.whole), activation)
-    if isinstance(module, RecurrentEncoder):
-        unit = module.time.state_dict()
-        given, kept = (Linear(_array(unit[f"weight_{of}_l0"].T), _array(unit[f"bias_{of}_l0"])) for of in ("ih", "hh"))
-        return encoders.Recurrent(frame, given, kept, activation)
-    convolutions = [layer for layer in module.time if isinstance(layer, nn.Conv1d)]
-    time = [Linear(_array(layer.weight.permute(2, 1, 0).flatten(0, 1)), _array(layer.bias)) for layer in convolutions]
-    whole, features = _first(module.whole), convolutions[-1].out_channels
-    by_moment = whole.weight.reshape(features, -1, whole.weight.shape[1]).swapaxes(0, 1)
-    whole = Linear(np.ascontiguousarray(by_moment.reshape(whole.weight.shape)), whole.bias)
-    return encoders.Convolutional(frame, tuple(time), KERNEL, STRIDE, whole, activation)
-
-
-def _first(layers: nn.Sequential) -> Linear:
-    assert isinstance(layers[0], nn.Linear)
-    return _linear(layers[0])
+def _history_policy(network: StudentNetwork, normal: Normal) -> HistoryPolicy:
+    own, mirror, estimate = network.encoder, None, None
+    if isinstance(own, MirroredEncoder):
+        mirror = own.permutation.numpy(), own.sign.numpy()
+        own = own.encoder
+    frame, whole = own.frame[0], own.whole[0]
+    assert isinstance(frame, nn.Linear)
+    assert isinstance(whole, nn.Linear)
+    encoder = HistoryEncoder(_linear(frame), _linear(whole), _activation(own.frame), mirror)
+    if network.estimate is not None:
+        head = network.estimate.head
+        estimate = _head(head) if isinstance(head, SymmetricHead) else _linear(head)
+    return HistoryPolicy(normal, encoder, estimate, layers_of(network.body))
 
 
 def _linear(layer: nn.Linear) -> Linear:

@@ -1,18 +1,22 @@
-"""The best policy so far, and when a training is to go back to it."""
+"""Policies that a training keeps beside the newest: the best so far, and a running mean."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import nn
 
 from iowbc.errors import StageFailed
-from iowbc.learning.checkpoint import Arrays, prefixed, under
+from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
 from iowbc.recipe.check import Check
+
+ACTS = ("actor.", "log_stds")
+"""Beginnings of the names of an `ActorCritic`'s arrays that decide its actions."""
 
 
 class Best:
-    """What a learner was when it scored best, and how cautiously it goes on."""
+    """State of a learner when it scored best, and the caution with which it goes on."""
 
     def __init__(self, settings: Check, learner: Arrays) -> None:
         """`learner`: everything that it has learnt before the first update."""
@@ -20,14 +24,14 @@ class Best:
         self.learner = learner
         self.score = 0.0
         self.caution = 1.0
-        """What the desired KL divergence is multiplied by."""
+        """Factor of the desired KL divergence."""
         self.rollbacks = 0
         """Since the last better policy."""
         self.low = 0
         """Scores in a row that were far below the best."""
 
     def collapsed(self, score: float) -> bool:
-        """Whether this score, after those before, says that the training got lost."""
+        """True where this score, after those before, says that the training got lost."""
         far_below = self.score >= self.settings.notable and score < (1.0 - self.settings.collapse) * self.score
         self.low = self.low + 1 if far_below else 0
         return self.low >= self.settings.patience
@@ -38,7 +42,7 @@ class Best:
             self.score, self.learner, self.rollbacks = score, learner, 0
 
     def go_back(self, why: str) -> Arrays:
-        """What the learner was at its best; from now on more cautiously. Raises StageFailed when that did not help."""
+        """The learner's state at its best, for more cautious updates. Raises StageFailed when that did not help."""
         self.rollbacks += 1
         if self.rollbacks > self.settings.rollbacks:
             raise StageFailed(
@@ -62,3 +66,29 @@ class Best:
         self.learner = under("learner", arrays)
         self.score, self.caution = arrays["score"].tolist()
         self.rollbacks, self.low = arrays["rollbacks"].tolist()
+
+
+class PolicyAverage:
+    """Exponentially weighted mean of weights and standard deviations."""
+
+    def __init__(self, policy: nn.Module, half_life: float) -> None:
+        """`half_life`: updates in which the weight of a policy in the mean halves."""
+        self.newest = 1.0 - 0.5 ** (1.0 / half_life)
+        """Weight of the newest policy."""
+        self.arrays: Arrays = acting_part(module_arrays(policy))
+
+    def take(self, policy: nn.Module) -> None:
+        """Takes the newest policy into account."""
+        newest = acting_part(module_arrays(policy))
+        self.arrays = {
+            name: mean + np.float32(self.newest) * (newest[name] - mean) for name, mean in self.arrays.items()
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Goes on from this mean."""
+        self.arrays = acting_part(arrays)
+
+
+def acting_part(arrays: Mapping[str, NDArray[Any]]) -> Arrays:
+    """Those arrays of an `ActorCritic` that decide how it acts."""
+    return {name: value for name, value in arrays.items() if name.startswith(ACTS)}

@@ -1,4 +1,4 @@
-"""What the learning curves are called in figures and reports, with units."""
+"""Titles of the learning curves in figures and reports, with units."""
 
 TITLES = {
     "episode_seconds": "length of an episode [s]",

@@ -10,7 +10,7 @@ from iowbc.files import write_whole
 from iowbc.learning.curve_titles import title_of
 
 TABLE, FIGURE = "tables/learning_curves.csv", "figures/learning_curves.png"
-"""What a stage that trains leaves of them."""
+"""Files of them in an artifact."""
 DIGITS = 6
 """Significant digits that are kept: a training of a night then has 5 MB of curves."""
 OUTLIERS = (1.0, 99.0)
@@ -95,5 +95,5 @@ class Curves:
 
 
 def _whole(row: Any) -> bool:
-    """Whether a line is a row of numbers with its step."""
+    """True for a row of numbers with its step."""
     return isinstance(row, dict) and "step" in row and all(isinstance(value, (int, float)) for value in row.values())

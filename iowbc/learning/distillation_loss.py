@@ -1,4 +1,4 @@
-"""What the student learns down: KL(teacher || student) (paper eq. 7), and how well its latent tells of the load."""
+"""The student's loss: KL(teacher || student) (paper eq. 7), and the error of the load read from its latent."""
 
 from typing import Literal, Protocol
 
@@ -14,8 +14,8 @@ from iowbc.robot.mirror import MirrorMap
 Symmetry = Literal["construction", "augment", "none"]
 
 
-class Mirrored(Protocol):
-    """How facts and actions are mirrored."""
+class LossMirrors(Protocol):
+    """LossMirrors of facts and actions."""
 
     @property
     def facts_mirror(self) -> MirrorMap:
@@ -37,7 +37,7 @@ class DistillationLoss(nn.Module):
         settings: Distillation,
         teacher_log_std: Tensor,
         network: StudentNetwork,
-        mirrors: Mirrored,
+        mirrors: LossMirrors,
         symmetry: Symmetry,
     ) -> None:
         """`teacher_log_std`: not below the recipe's floor, (A,)."""

@@ -1,21 +1,20 @@
-"""What a history of observations becomes: (n, K, S) normalised, oldest first, to a latent, (n, latent)."""
+"""The student's encoder: a history of observations to a latent, and s_priv as it is read from that."""
 
-from collections.abc import Callable
 from typing import Literal
 
 import torch
 from torch import Tensor, nn
 
 from iowbc.learning.activations import ACTIVATIONS
+from iowbc.learning.symmetric import SymmetricHead
 from iowbc.robot.mirror import MirrorMap
 
-EncoderName = Literal["mlp", "conv1d", "gru"]
-KERNEL, STRIDE = 5, 2
-"""Of the convolutions, in observations; each halves the length."""
+EncoderName = Literal["mlp"]
 
 
 class MlpEncoder(nn.Module):
-    """Projects each observation by the same layer, and all projections by another."""
+    """(n, K, S) normalised, oldest first, to (n, latent): projects each observation by the same layer, and all
+    projections by another."""
 
     def __init__(self, observation: int, history: int, features: int, latent: int, activation: str) -> None:
         super().__init__()
@@ -28,56 +27,14 @@ class MlpEncoder(nn.Module):
         return latent
 
 
-class ConvolutionalEncoder(nn.Module):
-    """Projects each observation by the same layer, convolves twice along time, and projects what is left."""
-
-    def __init__(self, observation: int, history: int, features: int, latent: int, activation: str) -> None:
-        super().__init__()
-        activate = ACTIVATIONS[activation].module
-        self.frame = nn.Sequential(nn.Linear(observation, features), activate())
-        layers: list[nn.Module] = []
-        length = history
-        for _ in range(2):
-            layers += [nn.Conv1d(features, features, KERNEL, STRIDE, padding=KERNEL // 2), activate()]
-            length = -(-length // STRIDE)
-        self.time = nn.Sequential(*layers)
-        self.whole = nn.Sequential(nn.Linear(length * features, latent), activate())
-
-    def forward(self, history: Tensor) -> Tensor:
-        latent: Tensor = self.whole(self.time(self.frame(history).transpose(1, 2)).flatten(1))
-        return latent
-
-
-class RecurrentEncoder(nn.Module):
-    """Projects each observation by the same layer and reads them in order with a gated recurrent unit."""
-
-    def __init__(self, observation: int, history: int, features: int, latent: int, activation: str) -> None:
-        super().__init__()
-        del history
-        self.frame = nn.Sequential(nn.Linear(observation, features), ACTIVATIONS[activation].module())
-        self.time = nn.GRU(features, latent, batch_first=True)
-
-    def forward(self, history: Tensor) -> Tensor:
-        every, _ = self.time(self.frame(history))
-        last: Tensor = every[:, -1]
-        return last
-
-
-ENCODERS: dict[EncoderName, Callable[[int, int, int, int, str], nn.Module]] = {
-    "mlp": MlpEncoder,
-    "conv1d": ConvolutionalEncoder,
-    "gru": RecurrentEncoder,
-}
-
-
 class MirroredEncoder(nn.Module):
-    """Any encoder of half the size, of a history and of its mirror image: the halves of the latent are then swapped
+    """An encoder of half the size, of a history and of its mirror image: the halves of the latent are then swapped
     when the history is mirrored."""
 
     permutation: Tensor
     sign: Tensor
 
-    def __init__(self, encoder: nn.Module, mirror: MirrorMap) -> None:
+    def __init__(self, encoder: MlpEncoder, mirror: MirrorMap) -> None:
         """`mirror`: of one observation."""
         super().__init__()
         self.encoder = encoder
@@ -87,3 +44,24 @@ class MirroredEncoder(nn.Module):
     def forward(self, history: Tensor) -> Tensor:
         image = torch.index_select(history, -1, self.permutation) * self.sign
         return torch.cat([self.encoder(history), self.encoder(image)], dim=1)
+
+
+class PrivilegedEstimate(nn.Module):
+    """A linear map from the latent to s_priv in the teacher's normalisation, at first its mean, zero."""
+
+    def __init__(self, latent: int, size: int, mirror: MirrorMap | None) -> None:
+        """`size`: of s_priv; `mirror`: its mirror, where that swaps the halves of the latent."""
+        super().__init__()
+        self.symmetric = mirror is not None
+        self.head = nn.Linear(latent, size) if mirror is None else SymmetricHead(latent, mirror)
+        for parameter in self.head.parameters():
+            nn.init.zeros_(parameter)
+
+    def forward(self, latent: Tensor) -> Tensor:
+        estimate: Tensor
+        if self.symmetric:
+            own, image = latent.chunk(2, dim=-1)
+            estimate = self.head(own + image, own - image)
+        else:
+            estimate = self.head(latent)
+        return estimate

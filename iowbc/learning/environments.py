@@ -1,4 +1,4 @@
-"""What the learners ask of the environments."""
+"""Requests of the learners to the environments."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol

@@ -60,9 +60,6 @@ class HistoryActor(Perceptron):
         self.network = StudentNetwork(**architecture)
         self.length, self.observation = int(architecture["history"]), int(architecture["observation"])
 
-    def prepare(self, x: Tensor) -> Tensor:
-        return x
-
     def hidden(self, prepared: Tensor) -> Hidden:
         flat = prepared.reshape(-1, prepared.shape[-1])
         frames = flat[:, : self.length * self.observation].reshape(-1, self.length, self.observation)
@@ -84,9 +81,6 @@ class NewestCritic(Perceptron):
         super().__init__()
         self.critic = critic
         self._newest = normalizer.newest
-
-    def prepare(self, x: Tensor) -> Tensor:
-        return x
 
     def hidden(self, prepared: Tensor) -> Hidden:
         return self.critic.hidden(self.critic.prepare(self._newest(prepared)))

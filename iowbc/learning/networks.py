@@ -7,8 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from iowbc.learning.encoders import ENCODERS, EncoderName, MirroredEncoder
-from iowbc.learning.estimate import Estimate
+from iowbc.learning.encoders import EncoderName, MirroredEncoder, MlpEncoder, PrivilegedEstimate
 from iowbc.learning.perceptron import DenseMlp, VectorPerceptron
 from iowbc.learning.symmetric import SymmetricMlp, paired
 from iowbc.robot.mirror import MirrorMap, side_by_side
@@ -120,19 +119,22 @@ class StudentNetwork(nn.Module):
         `privileged`: mirror of s_priv, where the body is to see an estimate of it: what a teacher's body sees.
         """
         super().__init__()
+        del encoder  # named in the architectures of earlier versions, which had others, too
         self.observation = observation
         self.normalizer = Normalizer(observation, clip)
         both = mirrors_from_json(mirrors)
         extra = None if privileged is None else mirror_from_json(privileged)
-        make = ENCODERS[encoder]
         body = None
+        self.encoder: MlpEncoder | MirroredEncoder
         if both is None:
-            self.encoder = make(observation, history, frame_features, latent, activation)
+            self.encoder = MlpEncoder(observation, history, frame_features, latent, activation)
         else:
-            half = make(observation, history, frame_features, paired(latent), activation)
+            half = MlpEncoder(observation, history, frame_features, paired(latent), activation)
             self.encoder = MirroredEncoder(half, both[0])
             body = side_by_side((both[0], swap(paired(latent)) if extra is None else extra)), both[1]
-        self.estimate = None if extra is None else Estimate(latent, len(extra), None if both is None else extra)
+        self.estimate = (
+            None if extra is None else PrivilegedEstimate(latent, len(extra), None if both is None else extra)
+        )
         seen = observation + (latent if extra is None else len(extra))
         self.body = perceptron(seen, hidden, actions, activation, body)
         self.register_buffer("log_std", torch.zeros(actions))

@@ -43,7 +43,7 @@ class Normalization:
         self.discounted = np.zeros(environments)
         """Σ discount^k · reward of each environment's episode so far."""
         self.frozen = False
-        """Whether the statistics of observations are kept as they are."""
+        """True while the statistics of observations are kept as they are."""
         self.inherited: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
         """Mean and standard deviation of the first inputs, where a trained policy came with them: they stay."""
 

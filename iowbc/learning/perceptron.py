@@ -19,9 +19,9 @@ class Perceptron(nn.Module, ABC):
     A learner prepares a sample once and sees it many times; it may compute `hidden` in less precision.
     """
 
-    @abstractmethod
     def prepare(self, x: Tensor) -> Tensor:
         """The input as the first layer takes it, of the same shape."""
+        return x
 
     @abstractmethod
     def hidden(self, prepared: Tensor) -> Hidden:
@@ -81,9 +81,6 @@ class DenseMlp(VectorPerceptron):
         super().__init__()
         *layers, self.last = mlp([inputs, *hidden, outputs], activation)
         self.layers = nn.Sequential(*layers)
-
-    def prepare(self, x: Tensor) -> Tensor:
-        return x
 
     def hidden(self, prepared: Tensor) -> Hidden:
         return (self.layers(self.looked_at(prepared)),)

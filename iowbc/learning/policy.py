@@ -95,7 +95,7 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         return self.log_stds[self.std_place]
 
     def finite(self) -> bool:
-        """Whether every parameter is a number."""
+        """True where every parameter is a number."""
         return all(bool(torch.isfinite(parameter).all()) for parameter in self.parameters())
 
     def prepared(self, observations: Tensor) -> Tensor:

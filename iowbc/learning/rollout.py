@@ -1,66 +1,50 @@
-"""What a rollout leaves for learning: one row of float32 numbers a sample, and its advantages."""
+"""Samples of a rollout for learning: one row of float32 numbers each, and their advantages."""
 
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from stable_baselines3.common.buffers import RolloutBuffer
 from torch import Tensor
 
-Array = NDArray[np.float32]
+from iowbc.arrays import Array, Mask
+
+SINGLE = ("log_density", "value", "advantage", "target")
+"""Columns of one number."""
 
 
-class Rollout(RolloutBuffer):  # type: ignore[misc]
+class Samples:
     """Samples of T steps of n environments as rows, so that an epoch shuffles them with a single gather.
 
-    `columns` are views of the rows by name: the prepared observation, the action, what the policy and the value were
-    before the update, and what is learnt from.
+    `columns` are views of the rows by name: the prepared observation, the action, the policy's mean, density and the
+    value before the update, and the advantage and target that are learnt from. Each rollout overwrites the one before.
     """
 
-    def reset(self) -> None:
-        """Room for a rollout; made once, and written over by each."""
-        if hasattr(self, "rows"):
-            return
-        (observation,), actions = self.obs_shape, self.action_dim
-        sizes = {
-            "observation": observation,
-            "action": actions,
-            "mean": actions,
-            "log_density": 1,
-            "value": 1,
-            "advantage": 1,
-            "target": 1,
-        }
+    def __init__(self, steps: int, environments: int, observation: int, actions: int) -> None:
+        sizes = {"observation": observation, "action": actions, "mean": actions, **dict.fromkeys(SINGLE, 1)}
         ends = np.cumsum(list(sizes.values())).tolist()
         self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
-        self.rows = torch.zeros(self.buffer_size, self.n_envs, ends[-1])
+        self.rows = torch.zeros(steps, environments, ends[-1])
         self.columns = self.named(self.rows)
-        self.rewards = np.zeros((self.buffer_size, self.n_envs), np.float32)
-        self.ended = np.zeros((self.buffer_size, self.n_envs), np.bool_)
 
     def named(self, rows: Tensor) -> dict[str, Tensor]:
         """Views of rows (..., width) by the name of the columns; single columns without their axis."""
         views = {name: rows[..., place] for name, place in self.places.items()}
-        single = ("log_density", "value", "advantage", "target")
-        return {name: view[..., 0] if name in single else view for name, view in views.items()}
+        return {name: view[..., 0] if name in SINGLE else view for name, view in views.items()}
 
     @property
     def flat(self) -> Tensor:
         """All samples, (T·n, width)."""
         return self.rows.view(-1, self.rows.shape[-1])
 
-    def finish(self, last_value: Array, discount: float, decay: float) -> None:
-        """Advantages, and targets of the value, from rewards, ends and values; `last_value`: behind the last step."""
+    def finish(self, rewards: Array, ended: Mask, last_value: Array, discount: float, decay: float) -> None:
+        """Add advantages and targets; arguments as of `advantages`."""
         values = self.columns["value"].numpy()
-        found = advantages(self.rewards, self.ended, values, last_value, discount, decay)
+        found = advantages(rewards, ended, values, last_value, discount, decay)
         self.columns["advantage"].copy_(torch.from_numpy(found))
         self.columns["target"].copy_(torch.from_numpy(found + values))
 
 
-def advantages(
-    rewards: Array, ended: NDArray[np.bool_], values: Array, last_value: Array, discount: float, decay: float
-) -> Array:
+def advantages(rewards: Array, ended: Mask, values: Array, last_value: Array, discount: float, decay: float) -> Array:
     """Generalised advantage estimates (Schulman et al. 2016, eq. 16), (T, n).
 
     rewards, values: (T, n), the value before each step; ended: (T, n), where an episode ended with the step;

@@ -25,14 +25,14 @@ from iowbc.rollouts.rollout_policies import DaggerPolicy, Past
 
 @dataclass(frozen=True)
 class Rows:
-    """Where in a row of the environments is what, and how it is mirrored."""
+    """Places in a row of the environments, and mirrors of them."""
 
     observation: slice
-    """What the student sees of s_t, with which the row begins."""
+    """The student's part of s_t, with which the row begins."""
     privileged: slice
-    """What the teacher alone sees: the rest of s_t, and s_priv."""
+    """The teacher's part: the rest of s_t, and s_priv."""
     facts: NDArray[np.int64]
-    """What the latent is to tell: places of the object's mass and the base's velocity."""
+    """Places of the object's mass and the base's velocity, which are read from the latent."""
     withheld: NDArray[np.int64]
     """Places in `privileged` of what the teacher is not told."""
     observation_mirror: MirrorMap

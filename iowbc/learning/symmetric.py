@@ -19,7 +19,7 @@ from iowbc.learning.perceptron import Hidden, VectorPerceptron
 from iowbc.robot.mirror import MirrorMap
 
 Parts = tuple[Tensor, Tensor]
-"""What the mirror keeps, and what it negates."""
+"""The part that the mirror keeps, and the part that it negates."""
 
 
 class MirrorBasis(nn.Module):

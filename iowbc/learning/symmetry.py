@@ -7,7 +7,7 @@ from torch import Tensor
 from iowbc.learning.gaussian import log_density
 from iowbc.learning.networks import Mirrors
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.rollout import Rollout
+from iowbc.learning.rollout import Samples
 from iowbc.robot.mirror import MirrorMap
 
 
@@ -28,18 +28,18 @@ class MirroredSamples:
         """`mirrors`: of observation and action; `gap`: how much less likely an image may be than its original [nat]."""
         self.mirrors, self.gap = mirrors, gap
 
-    def images(self, rollout: Rollout, policy: ActorCritic) -> Tensor:
+    def images(self, samples: Samples, policy: ActorCritic) -> Tensor:
         """The mirror image of every sample; the sample itself where its image is too unlikely."""
-        samples = rollout.flat
-        images = samples.clone()
-        old, new = rollout.named(samples), rollout.named(images)
+        rows = samples.flat
+        images = rows.clone()
+        old, new = samples.named(rows), samples.named(images)
         with torch.no_grad():
             new["observation"].copy_(mirror_tensor(self.mirrors[0], old["observation"]))
             new["action"].copy_(mirror_tensor(self.mirrors[1], old["action"]))
             new["mean"].copy_(policy.actor.head(policy.actor.hidden(new["observation"])))
             new["log_density"].copy_(log_density(new["action"], new["mean"], policy.log_std))
         unlikely = new["log_density"] < old["log_density"] - self.gap
-        images[unlikely] = samples[unlikely]
+        images[unlikely] = rows[unlikely]
         return images
 
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from iowbc.errors import StageFailed
 from iowbc.learning import checkpoint
 from iowbc.learning.acting import Policy, policy_of
-from iowbc.learning.average import PolicyAverage
-from iowbc.learning.best import Best
+from iowbc.learning.best import Best, PolicyAverage
 from iowbc.learning.checkpoint import Arrays, prefixed, under
 from iowbc.learning.environments import Environments
 from iowbc.learning.networks import Mirrors
@@ -58,7 +57,7 @@ class TeacherTraining:
     @property
     def steps(self) -> int:
         """Environment steps made so far."""
-        return int(self.model.num_timesteps)
+        return self.model.steps
 
     @property
     def planned(self) -> int:
@@ -75,10 +74,9 @@ class TeacherTraining:
         model.caution = self.best.caution
         model.explore_anew()
         model.collect()
-        model.train()
+        training = model.train()
         if self.average is not None:
             self.average.take(model.policy)
-        training = {name: float(value) for name, value in model.logger.name_to_value.items()}
         figures = self.environments.statistics() | self._judged(training)
         seconds = {f"seconds/{part}": spent for part, spent in model.seconds.items()}
         rest = time.perf_counter() - begin - sum(seconds.values())
@@ -118,7 +116,7 @@ class TeacherTraining:
             self._learn_again(self.best.learner)
 
     def _learnt(self) -> Arrays:
-        """What the learner has learnt: networks, optimiser, statistics."""
+        """Everything that the learner has learnt: networks, optimiser, statistics."""
         return {
             **prefixed("policy", checkpoint.module_arrays(self.model.policy)),
             **prefixed("optimizer", checkpoint.optimizer_arrays(self.model.policy.optimizer)),
@@ -130,7 +128,7 @@ class TeacherTraining:
         return checkpoint.module_arrays(self.model.policy) | ({} if self.average is None else self.average.arrays)
 
     def _scored(self) -> Arrays:
-        """What the learner has learnt, its policy being the one that a check scores."""
+        """The same with the policy that a check scores."""
         return {**self._learnt(), **prefixed("policy", self._acting())}
 
     def _learn_again(self, learnt: Mapping[str, NDArray[Any]]) -> None:
@@ -144,14 +142,14 @@ class TeacherTraining:
     def arrays(self) -> Arrays:
         """Everything that a resumed training needs, between two updates."""
         model = self.model
-        assert model._last_obs is not None, "arrays() comes after an update"
+        assert model.observation is not None, "arrays() comes after an update"
         return {
             **self._learnt(),
             **prefixed("best", self.best.arrays()),
             **prefixed("random", checkpoint.random_arrays()),
             **prefixed("environment", self.environments.state()),
-            "observation": np.array(model._last_obs),
-            "counters": np.array([model.num_timesteps, model._n_updates]),
+            "observation": np.array(model.observation),
+            "counters": np.array([model.steps]),
             "learning_rate": np.array([model.learning_rate]),
             **({} if self.average is None else prefixed("average", self.average.arrays)),
         }
@@ -185,8 +183,8 @@ class TeacherTraining:
             self.average.restore(under("average", arrays))
         self.best.restore(under("best", arrays))
         self.environments.restore(under("environment", arrays))
-        model._last_obs = np.array(arrays["observation"])
-        model.num_timesteps, model._n_updates = (int(value) for value in arrays["counters"])
+        model.observation = np.array(arrays["observation"])
+        model.steps = int(arrays["counters"][0])
         model.learning_rate = float(arrays["learning_rate"][0])
         checkpoint.restore_random(under("random", arrays))
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
-from iowbc.evaluation.trials.load import load_metrics
+from iowbc.evaluation.trials.interaction import load_metrics
 from iowbc.evaluation.trials.rollout import RECORDED, trace_of
 from iowbc.live.moment import Moment
 from iowbc.recipe.evaluation.success import Success

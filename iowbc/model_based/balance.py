@@ -26,7 +26,7 @@ WORLD = pinocchio.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True)
 class Solution:
-    """What the program wants of the period to come."""
+    """Motion that the program plans for the period to come."""
 
     acceleration: Array
     """Of base (local frame) and support joints, (21,) [m/s², rad/s²]."""

@@ -12,7 +12,7 @@ TILT = slice(0, 3)
 
 
 def filter_gains(period: float, settings: Estimation, angle: float, rate: float) -> Array:
-    """What a surprise in angle and rate adds to angle, rate and unplanned acceleration, (3, 2).
+    """Gains of the filter: from a surprise in angle and rate to angle, rate and unplanned acceleration, (3, 2).
 
     `angle` [rad] and `rate` [rad/s]: standard deviations of what is measured. The model over a period T is
     x⁺ = [[1, T, T²/2], [0, 1, T], [0, 0, 1]] x + [T²/2, T, 0] · planned acceleration.

@@ -1,4 +1,4 @@
-"""How long a stage takes: learnt from its last runs on this machine, else guessed from what is stored."""
+"""Expected time of a stage: learnt from its last runs on this machine, else guessed from what is stored."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from iowbc.recipe.recipe import SEEDS
 LAST_RUNS = 5
 """Runs that an estimate is learnt from: older ones are of an older program or of another load."""
 UNSEEN = (0.8, 1.25)
-"""How far the next run may lie beyond the fastest and the slowest of them: what other programs on a machine change."""
+"""Factors by which the next run may lie beyond the fastest and the slowest of them, for other programs change times."""
 
 
 @dataclass(frozen=True)
-class Estimate:
+class TimeEstimate:
     """The time that a stage takes [s]."""
 
     expected: float | None = None
@@ -31,18 +31,18 @@ class Estimate:
 
 def estimate(
     stage: Stage, ingredients: Mapping[str, Any], stored: Iterable[Artifact], closest: Artifact | None
-) -> Estimate:
+) -> TimeEstimate:
     """The time of a stage with these ingredients; `closest`: the stored artifact that differs least."""
     if closest is None:
-        return Estimate()
+        return TimeEstimate()
     own = sorted((one for one in stored if one.manifest.host == host()), key=lambda one: -one.manifest.made)
     reckoned = (_reckoned(stage, one, ingredients) for one in own)
     times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
     if not times:
-        return Estimate(roughly=_reckoned(stage, closest, ingredients)[0])
+        return TimeEstimate(roughly=_reckoned(stage, closest, ingredients)[0])
     middle = median(times)
     spread = (UNSEEN[0] * min(times) / middle, UNSEEN[1] * max(times) / middle) if middle else UNSEEN
-    return Estimate(expected=middle, spread=spread)
+    return TimeEstimate(expected=middle, spread=spread)
 
 
 def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:

@@ -32,7 +32,7 @@ def differences(before: Any, after: Any, path: str = "") -> Iterator[tuple[str, 
 
 
 def _branches(value: Any) -> dict[str, Any] | None:
-    """What is below a mapping or a list of mappings, by name; None for a leaf."""
+    """Entries of a mapping or a list of mappings, by name; None for a leaf."""
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, (list, tuple)) and any(isinstance(item, Mapping) for item in value):

@@ -1,4 +1,4 @@
-"""What would run, and why."""
+"""The plan of a recipe: stages that would run, and why."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from iowbc.pipeline.ingredients import key_values, slice_value
 from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Borrowed, Stage
-from iowbc.pipeline.step import Options, Step
+from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
@@ -52,9 +52,9 @@ class Planner:
         """Worker processes of a stage: as asked for, or the recipe's, or as many as there are cores."""
         return self.options.workers or self.loaded.recipe.execution.workers or available_cores()
 
-    def plan(self) -> list[Step]:
+    def plan(self) -> list[StagePlan]:
         """A step for each stage, as things stand; nothing is changed."""
-        steps: dict[str, Step] = {}
+        steps: dict[str, StagePlan] = {}
         for stage in self.stages:
             inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
             step = self.decide(stage, {**inputs, **self.borrowed(stage)})
@@ -93,8 +93,8 @@ class Planner:
         """Names of the stages whose artifacts a stage reads."""
         return stage.reads(self.loaded.recipe)
 
-    def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> Step:
-        """What is to be done for a stage whose inputs are these; None is an input that would be made anew.
+    def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
+        """The plan for a stage with these inputs; None is an input that would be made anew.
 
         whole: a published artifact does not do that leaves out large files.
         """
@@ -107,7 +107,7 @@ class Planner:
             "robot": self.robot_digest,
         }
         former = self._closest(stage.name, ingredients)
-        step = Step(stage, code=stage_code(stage))
+        step = StagePlan(stage, code=stage_code(stage))
         if former is not None:
             found = estimate(stage, ingredients, self.store.artifacts(stage.name), former)
             step = replace(step, **vars(found), rate_of=_origin_of(former))
@@ -119,7 +119,7 @@ class Planner:
             reasons += [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
         return self._resumed(replace(step, reasons=tuple(reasons))) if reasons else step
 
-    def _looked_up(self, step: Step) -> Step:
+    def _looked_up(self, step: StagePlan) -> StagePlan:
         """With the stored artifact of its key, where that is whole, and what there is to say about it."""
         stage, key, notes = step.stage, str(step.key), []
         artifact, damage = _checked(self.store.find, stage.name, key)
@@ -136,7 +136,7 @@ class Planner:
             notes.extend(self._looks(stage, artifact))
         return replace(step, artifact=artifact, damage=damage, notes=tuple(notes))
 
-    def _demands(self, step: Step, whole: bool) -> Iterator[str]:
+    def _demands(self, step: StagePlan, whole: bool) -> Iterator[str]:
         """Why a stored artifact is not used although its key is the right one."""
         if step.stage.name in self.options.force:
             yield "forced by --force"
@@ -151,12 +151,17 @@ class Planner:
         changed = changed_code(artifact.manifest.code, code)
         return f"code changed since it was made: {', '.join(changed)}" if changed else ""
 
-    def _resumed(self, step: Step) -> Step:
+    def _resumed(self, step: StagePlan) -> StagePlan:
         """A step that runs, with what it goes on from: an earlier attempt, or an artifact that ends earlier."""
-        stage, key = step.stage, str(step.key)
-        notes, expected = [*step.notes, *self._checkpoint(stage, key)], self._rest(stage, key, step.expected)
-        predecessor = None
-        if stage.name not in self.options.force:
+        stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
+        record, forced = Workspace(self.store.runs, stage.name, str(step.key)).record, stage.name in self.options.force
+        if record and (record.get("forced") or not forced):
+            done, total, seconds = (float(record[name]) for name in ("done", "total", "seconds"))
+            share = f", {100 * done / total:.0f} %" if total else ""
+            notes.append(f"goes on from attempt {record['attempts'] or 1}{share}")
+            if done and total and seconds:  # the rest at its own rate
+                expected = seconds * max(0.0, total / done - 1.0)
+        if not forced:
             predecessor = self._predecessor(stage, step.ingredients or {})
         if predecessor is not None:
             notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
@@ -196,24 +201,6 @@ class Planner:
             ):
                 yield f"{path} is {_shown(old)} in it; `--force {stage.name}` makes it with {_shown(new)}"
 
-    def _attempt(self, stage: Stage, key: str) -> dict[str, Any]:
-        """The record of an attempt that this run would go on from; empty where there is none."""
-        record = Workspace(self.store.runs, stage.name, key).record
-        return record if record.get("forced") or stage.name not in self.options.force else {}
-
-    def _rest(self, stage: Stage, key: str, expected: float | None) -> float | None:
-        """The time that is left where an earlier attempt has left something, at its own rate [s]."""
-        record = self._attempt(stage, key)
-        done, total, seconds = (float(record.get(name, 0.0)) for name in ("done", "total", "seconds"))
-        return seconds * max(0.0, total / done - 1.0) if done and total and seconds else expected
-
-    def _checkpoint(self, stage: Stage, key: str) -> Iterator[str]:
-        """What an earlier attempt has left."""
-        record = self._attempt(stage, key)
-        if record:
-            share = f", {100 * record['done'] / record['total']:.0f} %" if record["total"] else ""
-            yield f"goes on from attempt {int(record['attempts']) or 1}{share}"
-
     def _closest(self, stage: str, ingredients: Mapping[str, Any]) -> Artifact | None:
         """The stored artifact of a stage that differs least; of several this recipe's own, then the newest."""
 
@@ -234,7 +221,7 @@ class Planner:
         return texts or ["nothing stored yet"]
 
     def _differences(self, ingredients: Mapping[str, Any], old: Mapping[str, Any]) -> Iterator[str]:
-        """How a key's ingredients differ from earlier ones, each with its place in the recipe."""
+        """Differences of a key's ingredients from earlier ones, each with its place in the recipe."""
         for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
             yield f"{path} ({self.loaded.place(path)}): {_shown(before)} -> {_shown(after)}"
         if old.get("version") != ingredients["version"]:

@@ -15,7 +15,7 @@ from iowbc.pipeline.machine import host, versions
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
-from iowbc.pipeline.step import Step
+from iowbc.pipeline.stage_plan import StagePlan
 from iowbc.pipeline.store.artifact import Artifact, seal
 from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
@@ -136,11 +136,11 @@ class Runner:
                 if held and workspace.leftover:
                     workspace.remove()
 
-    def _decide(self, stage: Stage, whole: bool) -> Step:
+    def _decide(self, stage: Stage, whole: bool) -> StagePlan:
         return self.planner.decide(stage, self._inputs(stage), whole=whole)
 
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
-        """What a stage reads, by name."""
+        """Artifacts that a stage reads, by name."""
         read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
         for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
@@ -149,7 +149,7 @@ class Runner:
             read[name] = artifact
         return read
 
-    def _reused(self, step: Step, artifact: Artifact, view: StageView) -> Artifact:
+    def _reused(self, step: StagePlan, artifact: Artifact, view: StageView) -> Artifact:
         notes = ("published", *step.notes) if artifact.published else step.notes
         view.state, view.note = "cached", "; ".join(notes)
         self.display.changed(view)
@@ -166,7 +166,7 @@ class Runner:
         except Damaged:
             return
 
-    def _made(self, step: Step, workspace: Workspace, view: StageView) -> Artifact:
+    def _made(self, step: StagePlan, workspace: Workspace, view: StageView) -> Artifact:
         """Run the stage and publish what it leaves."""
         stage, key = step.stage, step.key
         assert key is not None
@@ -224,7 +224,7 @@ class Runner:
             self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
 
-    def _published(self, step: Step, workspace: Workspace) -> Artifact:
+    def _published(self, step: StagePlan, workspace: Workspace) -> Artifact:
         """Seal what the stage left and move it into the store."""
         assert step.key is not None
         details = {

@@ -1,14 +1,16 @@
-"""What a stage declares and what it receives."""
+"""A stage: its declaration, and the job that it receives."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 from iowbc.recipe.recipe import Recipe
 
-Result = TypeVar("Result")
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.spread import NodeSpread
+
 SUMMARY = "summary.json"
 """File of an artifact with its metrics."""
 START = "start"
@@ -16,7 +18,7 @@ START = "start"
 
 
 class Report(Protocol):
-    """Where a stage tells how it goes: console and tracking."""
+    """A stage's way to console and tracking."""
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
         """Record named values at a step; one batched tracking call."""
@@ -44,51 +46,6 @@ class Member(Protocol):
         """Inverse of `state`."""
 
 
-class ActorPool(Protocol):
-    """Members that are asked side by side. Who is lost is remade in the state after the last request."""
-
-    @property
-    def states(self) -> list[Any]:
-        """The state of each member after the last request that changed it."""
-
-    def ask(self, messages: Sequence[Any], *, changes: bool = True, patience: float = 600.0) -> None:
-        """Send each member its message. `changes`: whether that changes states;
-        `patience`: seconds after which a member that has not answered counts as lost."""
-
-    def answers(self) -> list[Any]:
-        """What the members answered, in order.
-
-        Raises WorkerFailed with what a member raised, StageFailed where one is lost again and again, and `Interrupted`
-        where members have not begun yet when the job is asked to stop.
-        """
-
-    def close(self) -> None:
-        """End the members."""
-
-
-class Spread(Protocol):
-    """Other machines that work for a stage."""
-
-    @property
-    def width(self) -> int:
-        """Calls that can run at the same time."""
-
-    def __call__(
-        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> Iterator[tuple[int, Result]]:
-        """Call a function of a module with each of these arguments, on any machine; place and result of each call, in
-        the order in which they end. `folders`: what the job reads, given to the function by name, wherever it lies.
-
-        Raises `Interrupted` once the job is asked to stop.
-        """
-
-    def actor_pool(
-        self, called: str, make: Callable[..., Member], calls: Sequence[tuple[Any, ...]], folders: Mapping[str, Path]
-    ) -> ActorPool:
-        """Members of one core each on any machines, made by a function of a module from each of these arguments and
-        `folders`, as above. `called`: what users know a member as."""
-
-
 @dataclass(frozen=True)
 class Job:
     """One execution of a stage."""
@@ -111,7 +68,7 @@ class Job:
     """True once the user asked to stop: write a checkpoint and raise `Interrupted`."""
     predecessor: Path | None = None
     """Artifact folder of the same stage that this one goes on from; see `Stage.extends`."""
-    spread: Spread | None = None
+    spread: "NodeSpread | None" = None
     """Other machines that may work for the stage; never changes a result."""
 
     def summarize(self, metrics: Mapping[str, float], **details: Any) -> None:
@@ -151,7 +108,7 @@ class Borrowed:
 
 @dataclass(frozen=True)
 class Presentation:
-    """How artifacts of a stage are shown, and what other commands find in them."""
+    """Presentation of artifacts of a stage, and what other commands find in them."""
 
     headline: tuple[str, ...] = ()
     """Patterns of the metrics that are shown at the end of a run, the most telling first; `show` has all."""
@@ -164,7 +121,7 @@ class Presentation:
     trained_by: str = ""
     """Name of the method whose steps `<stage>.steps` counts; empty for a stage that does not train."""
     leaves_policy: bool = False
-    """Whether its artifact holds a policy that can be played."""
+    """True where its artifact holds a policy that can be played."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +140,7 @@ class Stage:
     """Patterns of the files that decide the stages which read this one, the same for the same key; all others are
     records: curves, times, pictures, convenience."""
     problems: Callable[[Recipe], Iterator[tuple[str, str]]] = _none
-    """What a recipe asks that this stage cannot do, known before it runs: dotted paths, and what is wrong there."""
+    """Requests of a recipe that this stage cannot fulfil, known before it runs: dotted paths, and the problem there."""
     defaults: Callable[[Recipe], Mapping[str, Any]] = _empty
     """Values of the program that decide the result where a recipe has none: JSON data by dotted path, for the key."""
     extends: str | None = None
@@ -197,4 +154,4 @@ class Stage:
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
     presentation: Presentation = Presentation()
     spreads: Callable[[Recipe], bool] = _never
-    """Whether it leaves its heavy work to `Job.spread` where there is one, for a given recipe."""
+    """True for a recipe of which it leaves its heavy work to `Job.spread` where there is one."""

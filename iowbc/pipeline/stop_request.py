@@ -29,7 +29,7 @@ class StopRequest:
 
     @property
     def text(self) -> str:
-        """What was asked for, and how to ask for more; empty before."""
+        """The request, and how to abort; empty before."""
         if self.signal is None:
             return ""
         return f"{self.signal.name}: stopping at the next checkpoint; once more to abort at once"

@@ -1,4 +1,4 @@
-"""Whether a folder can be written, asked before work begins."""
+"""Checks before work begins that folders can be written."""
 
 import os
 import tempfile
@@ -24,7 +24,7 @@ def require_writable(folder: Path, option: str) -> None:
 
 
 def _remedy(folder: Path, option: str) -> str:
-    """What to do about a folder that cannot be written: another user's runs are to be given to this one; any other
+    """Remedy for a folder that cannot be written: another user's runs are to be given to this one; any other
     folder is left to its owner."""
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     owner, user = there.stat().st_uid, os.geteuid()
@@ -37,7 +37,7 @@ def _remedy(folder: Path, option: str) -> str:
 
 
 def _obstacle(folder: Path) -> str:
-    """Why no file can be made in a folder, which is made where it is missing; empty where one can."""
+    """The reason why no file can be made in a folder, which is made where it is missing; empty where one can."""
     if folder.exists() and not folder.is_dir():
         return "it is not a folder"
     try:
@@ -49,9 +49,8 @@ def _obstacle(folder: Path) -> str:
 
 
 def _closed(part: Path) -> str:
-    """Why an existing part of the runs is closed to this user; empty where it is open or not there."""
-    if not part.exists():
-        return ""
-    if not part.is_dir():
+    """The reason why an existing part of the runs is closed to this user; empty where it is open or not there."""
+    if part.exists() and not part.is_dir():
         return f"{part} is not a folder"
-    return "" if os.access(part, os.R_OK | os.W_OK | os.X_OK) else f"{part} belongs to another user or is read-only"
+    open_ = not part.exists() or os.access(part, os.R_OK | os.W_OK | os.X_OK)
+    return "" if open_ else f"{part} belongs to another user or is read-only"

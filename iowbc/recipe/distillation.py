@@ -18,10 +18,9 @@ class Distillation(Section):
     """Control steps between two rounds of gradient steps."""
     history: int = Field(default=25, ge=1, le=1000)
     """Length of the observation history H_t (paper Table I)."""
-    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
-    """What turns the history into a latent: layers over all of it at once, convolutions along time, or a gated
-    recurrent unit. Where the teacher is symmetric by construction, so is the student: the encoder has half the latent's
-    size and reads the history and its mirror image."""
+    encoder: Literal["mlp"] = "mlp"
+    """Layers over all of the history at once turn it into a latent. Where the teacher is symmetric by construction, so
+    is the student: the encoder has half the latent's size and reads the history and its mirror image."""
     frame_features: int = Field(default=32, ge=1, le=16_384)
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1, le=16_384)

@@ -16,9 +16,8 @@ class Execution(Section):
     """Where stages run: in processes here, or on the nodes of a Ray cluster, with the same results. `--engine` goes
     before it."""
     address: str = Field(default="local", min_length=1, max_length=200)
-    """The Ray cluster: `local` (one of this machine alone, which ends with the run), `local:NODES` (the same of several
-    nodes, which share the cores), `auto` (the one that `ray start` began here), `HOST:PORT`, or `ray://HOST:PORT`.
-    `--address` goes before it."""
+    """The Ray cluster: `local` (one of this machine alone, which ends with the run), `auto` (the one that `ray start`
+    began here), `HOST:PORT`, or `ray://HOST:PORT`. `--address` goes before it."""
     rollout_actors: int | None = Field(default=None, ge=1, le=1024)
     """On Ray: actors of one core each, on whatever nodes, that make the rollouts of a training; at most as many as the
     cluster has cores. When empty a training stays on one node with its worker processes, which is better where many

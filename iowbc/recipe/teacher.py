@@ -16,8 +16,8 @@ class HistoryNetwork(Section):
 
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
-    encoder: Literal["mlp", "conv1d", "gru"] = "mlp"
-    """What turns the history into a latent; see `distill.encoder`."""
+    encoder: Literal["mlp"] = "mlp"
+    """See `distill.encoder`."""
     frame_features: int = Field(default=32, ge=1, le=16_384)
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1, le=16_384)

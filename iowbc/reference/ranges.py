@@ -1,4 +1,4 @@
-"""Which sampling ranges make sense for a robot."""
+"""Check of the sampling ranges against the robot."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Which (height, pitch) can be held: by labels on a grid and around it, and where the fitted network moves gently."""
+"""The feasible (height, pitch): by labels on a grid and around it, and by gentle motion of the fitted network."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class LabelledRegion:
 
     map: FeasibleMap
     held: Mask
-    """Whether one of the grid's two arm postures has a label."""
+    """True where one of the grid's two arm postures has a label."""
     share: Array
     """Share of the samples around a command that have a label; -1 where there were too few."""
 
@@ -41,9 +41,9 @@ def measure_labelled_region(plan: SamplePlan, dataset: Dataset) -> LabelledRegio
     found = np.zeros(plan.grid_shape, dtype=bool)
     found.ravel()[dataset.index[on_grid] - plan.drawn] = True
     held: Mask = np.any(found, axis=0, keepdims=False)
-    told = dataset.rejected_reason != ARMS_COLLIDE
+    relevant = dataset.rejected_reason != ARMS_COLLIDE
     kept = _around(plan, dataset.command[~on_grid])
-    tried = kept + _around(plan, dataset.rejected_command[told & (dataset.rejected_index < plan.drawn)])
+    tried = kept + _around(plan, dataset.rejected_command[relevant & (dataset.rejected_index < plan.drawn)])
     enough = tried >= recipe.enough
     share = np.where(enough, kept / np.maximum(tried, 1), -1.0)
     feasible = held & (~enough | (share >= recipe.kept_share))

@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from iowbc.learning.curve_titles import title_of
 from iowbc.learning.curves import TABLE
 from iowbc.report.runs import Group
+from iowbc.results.picture import COLOURS
 from iowbc.stages.registry import STAGES
 
 Values = NDArray[np.float64]
 
 MOST_POINTS = 400
 """Points of a curve; a longer one is averaged over neighbours."""
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
-"""Colours that colour-blind readers tell apart (Okabe and Ito), one for each group."""
 BAND = 0.2
 """Opacity of a band."""
 ERRORS = {
@@ -59,13 +59,13 @@ class Curve:
 
     @property
     def banded(self) -> NDArray[np.bool_]:
-        """Where there is a band: nowhere if it has no width."""
+        """Points with a band: none if it has no width."""
         known = np.isfinite(self.low) & np.isfinite(self.high)
         return known & (not np.array_equal(self.low[known], self.high[known]))
 
     def traces(self, mode: str) -> list[dict[str, Any]]:
-        """What plotly draws: the edges of each unbroken part of the band, then the line."""
-        shown = {"name": self.label, "legendgroup": self.label}
+        """Traces for plotly: the edges of each unbroken part of the band, then the line."""
+        shown = {"name": escape(self.label, quote=False), "legendgroup": self.label}
         edge = {**shown, "mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
         fill = {"fill": "tonexty", "fillcolor": f"{self.colour}{round(255 * BAND):02x}"}
         found: list[dict[str, Any]] = []
@@ -80,57 +80,50 @@ class Curve:
 
 
 @dataclass
-class Panel:
+class CurvePanel:
     """One small figure."""
 
     title: str
     curves: list[Curve] = field(default_factory=list)
     across: str = "million environment steps"
     mode: str = "lines"
-    """How plotly draws its curves."""
+    """Mode of plotly for its curves."""
     from_zero: bool = False
-    """Whether the upright axis begins at 0, so that heights compare."""
-
-    @property
-    def traces(self) -> list[dict[str, Any]]:
-        """Its curves as plotly draws them."""
-        return [trace for curve in self.curves for trace in curve.traces(self.mode)]
+    """True where the upright axis begins at 0, so that heights compare."""
 
     @property
     def figure(self) -> dict[str, Any]:
-        """What plotly draws, which takes markup in its texts; the page adds the colours of light and dark."""
+        """The figure for plotly, which takes markup in its texts; the page adds the colours of light and dark."""
         layout: dict[str, Any] = {
             "title": {"text": escape(self.title, quote=False), "font": {"size": 14}},
             "xaxis": {"title": {"text": self.across}},
             "yaxis": {"rangemode": "tozero"} if self.from_zero else {},
         }
-        traces = [{**trace, "name": escape(trace["name"], quote=False)} for trace in self.traces]
-        return {"data": traces, "layout": layout}
+        return {"data": [trace for curve in self.curves for trace in curve.traces(self.mode)], "layout": layout}
 
 
 def learning_panels(
     groups: Sequence[Group], stage: str, most_points: int = MOST_POINTS
-) -> tuple[list[Panel], list[Panel]]:
+) -> tuple[list[CurvePanel], list[CurvePanel]]:
     """The main learning curves of a stage, and all others; one of more than `most_points` is averaged to that many."""
     found = [
         [_columns(run.artifacts[stage].folder) for run in group.runs if stage in run.artifacts] for group in groups
     ]
     names = dict.fromkeys(name for group in found for columns in group for name in columns if name != "step")
     first = STAGES[stage].presentation.curves
-    panels = {name: Panel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
+    panels = {name: CurvePanel(title_of(name)) for name in dict.fromkeys([*first, *names]) if name in names}
     for name, panel in panels.items():
         for place, (group, runs) in enumerate(zip(groups, found, strict=True)):
             having = [columns for columns in runs if name in columns]
             curves = [_thinned(columns["step"] / 1e6, columns[name], most_points) for columns in having]
             panel.curves += [Curve(group.label, place, *_joined(curves))] if curves else []
-    return [panel for name, panel in panels.items() if name in first], [
-        panel for name, panel in panels.items() if name not in first
-    ]
+    main = [panel for name, panel in panels.items() if name in first]
+    return main, [panel for name, panel in panels.items() if name not in first]
 
 
-def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
+def evaluation_panels(groups: Sequence[Group]) -> list[CurvePanel]:
     """Success and errors over the mass, for each suite that sweeps it."""
-    panels: dict[tuple[str, str], Panel] = {}
+    panels: dict[tuple[str, str], CurvePanel] = {}
     for place, group in enumerate(groups):
         folders = [run.artifacts["eval"].folder for run in group.runs if "eval" in run.artifacts]
         for suite in dict.fromkeys(suite for folder in folders for suite in _suites(folder)):
@@ -138,12 +131,12 @@ def evaluation_panels(groups: Sequence[Group]) -> list[Panel]:
             for name, title in ERRORS.items():
                 curves = [sweep[name] for sweep in sweeps]
                 joined = _joined([curve[:2] for curve in curves]) if len(curves) > 1 else curves[0]
-                new = Panel(f"{suite}: {title}", across="mass [kg]", mode="lines+markers", from_zero=True)
+                new = CurvePanel(f"{suite}: {title}", across="mass [kg]", mode="lines+markers", from_zero=True)
                 panels.setdefault((suite, name), new).curves.append(Curve(group.label, place, *joined))
     return list(panels.values())
 
 
-def learning_figure(panels: Sequence[Panel], title: str) -> Figure:
+def learning_figure(panels: Sequence[CurvePanel], title: str) -> Figure:
     """Panels of `learning_panels` side by side: a line for each group, a band from its least to its greatest seed."""
     lines = -(-len(panels) // COLUMNS)
     figure = Figure(figsize=(PANEL_SIZE[0] * COLUMNS, PANEL_SIZE[1] * lines), layout="constrained")
@@ -183,11 +176,12 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
 
     An error is no less than 0, nor is its interval; a mean over one trial has none, its ends are NaN.
     """
-    rows = [row for row in _rows(folder / "tables" / "summary.csv") if np.isfinite(_number(row.get("mass")))]
+    rows = _rows(folder / "tables" / "summary.csv")
+    masses = _numbers(rows, "mass")
+    rows = [rows[place] for place in np.argsort(masses, kind="stable") if np.isfinite(masses[place])]
     found = {}
     for suite in dict.fromkeys(row.get("suite", "") for row in rows):
         own = [row for row in rows if row.get("suite") == row.get("case") == suite]
-        own.sort(key=lambda row: _number(row["mass"]))
         mass = _numbers(own, "mass")
         if len(set(mass)) < SWEPT:
             continue
@@ -199,15 +193,9 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
 
 
 def _numbers(rows: Sequence[Mapping[str, str]], name: str) -> Values:
-    return np.array([_number(row.get(name)) for row in rows])
-
-
-def _number(text: str | None) -> float:
-    """What a cell says, NaN where it says no number."""
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return float("nan")
+    """A column; NaN where a cell holds no number."""
+    numbers = pd.to_numeric(pd.Series([row.get(name) for row in rows]), errors="coerce")
+    return np.asarray(numbers, np.float64)
 
 
 def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:
@@ -216,8 +204,8 @@ def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, 
     across, values = across[known], values[known]
     if len(values) <= most_points:
         return across, values
-    parts = [np.array_split(row, most_points) for row in (across, values)]
-    return np.array([part.mean() for part in parts[0]]), np.array([part.mean() for part in parts[1]])
+    thinned = [np.array([part.mean() for part in np.array_split(row, most_points)]) for row in (across, values)]
+    return thinned[0], thinned[1]
 
 
 def _joined(curves: Sequence[tuple[Values, Values]]) -> tuple[Values, Values, Values, Values]:

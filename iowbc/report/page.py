@@ -3,7 +3,7 @@
 import base64
 import secrets
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -12,7 +12,7 @@ from types import MappingProxyType
 from iowbc.learning.curves import FIGURE
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
-from iowbc.report.curves import Panel, evaluation_panels, learning_panels
+from iowbc.report.curves import CurvePanel, evaluation_panels, learning_panels
 from iowbc.report.runs import Group, Run, metric_rows
 from iowbc.results.table import Table
 from iowbc.stages.registry import STAGES
@@ -40,7 +40,7 @@ def write_page(
     template = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(
         files("iowbc.report").joinpath("page.html").read_text(encoding="utf-8")
     )
-    curves: dict[str, Panel] = {}
+    curves: dict[str, CurvePanel] = {}
     learning = []
     for stage in (name for name, one in STAGES.items() if one.presentation.trained_by):
         main, others = learning_panels(groups, stage)
@@ -57,8 +57,8 @@ def write_page(
         more_tables=more_tables,
         learning=[entry for entry in learning if entry[1] or entry[2]],
         evaluation=evaluation,
-        films=[*_together(together, ".mp4"), *_media(runs, "videos")],
-        pictures=[*_together(together, ".png"), *_media(runs, "figures")],
+        films=_media(runs, "videos", together, ".mp4"),
+        pictures=_media(runs, "figures", together, ".png"),
         first_pictures=[name for stage in STAGES.values() for name in stage.presentation.pictures],
         differences=differences,
         provenance=[(run, stage, made, _beside(made)) for run in runs for stage, made in run.artifacts.items()],
@@ -71,42 +71,34 @@ def write_page(
     path.write_text(text, encoding="utf-8")
 
 
-def _numbered(curves: dict[str, Panel], panels: Sequence[Panel]) -> list[str]:
+def _numbered(curves: dict[str, CurvePanel], panels: Sequence[CurvePanel]) -> list[str]:
     """Names of panels on the page, which are added to its curves."""
     names = [f"curve{len(curves) + place}" for place in range(len(panels))]
     curves.update(zip(names, panels, strict=True))
     return names
 
 
-def _together(files: Mapping[str, bytes], kind: str) -> Iterator[tuple[str, str, str]]:
-    """The same as `_media`, of what shows all runs."""
-    for name, content in files.items():
-        if name.endswith(kind):
-            yield "all runs", name, _address(content, kind)
-
-
-def _address(content: bytes, kind: str) -> str:
-    """A file of a kind as an address that holds it."""
-    return f"data:{KINDS[kind]};base64,{base64.b64encode(content).decode()}"
-
-
-def _media(runs: Sequence[Run], folder: str) -> Iterator[tuple[str, str, str]]:
-    """Whose it is, name, and content as a data address of every film or picture, each artifact once.
+def _media(runs: Sequence[Run], folder: str, together: Mapping[str, bytes], kind: str) -> list[tuple[str, str, str]]:
+    """Owner, name, and content as a data address of every film or picture, those of all runs first, each artifact once.
 
     The picture of the learning curves is left out: the page draws them.
     """
+    found = [("all runs", Path(name), content) for name, content in together.items() if name.endswith(kind)]
     seen = set()
     for run in runs:
         for stage, artifact in run.artifacts.items():
-            if artifact.manifest.key in seen:
-                continue
+            if artifact.manifest.key not in seen:
+                paths = sorted((artifact.folder / folder).glob("*"))
+                shown = [path for path in paths if path.suffix in KINDS and path != artifact.folder / FIGURE]
+                found += [(f"{run.label}, {stage}", path, path.read_bytes()) for path in shown]
             seen.add(artifact.manifest.key)
-            for path in sorted((artifact.folder / folder).glob("*")):
-                if path.suffix in KINDS and path != artifact.folder / FIGURE:
-                    yield f"{run.label}, {stage}", path.name, _address(path.read_bytes(), path.suffix)
+    return [
+        (owner, path.name, f"data:{KINDS[path.suffix]};base64,{base64.b64encode(content).decode()}")
+        for owner, path, content in found
+    ]
 
 
 def _beside(artifact: Artifact) -> list[tuple[str, str]]:
-    """What the key was computed from, and the recipe."""
+    """The ingredients of the key, and the recipe."""
     paths = [artifact.folder / name for name in (INGREDIENTS, RECIPE)]
     return [(path.name, path.read_text(encoding="utf-8", errors="replace")) for path in paths if path.is_file()]

@@ -1,7 +1,7 @@
-"""Parallel coordinates: what a sweep varied and what came out, an upright axis each, and a line for every setting."""
+"""Parallel coordinates: an upright axis for each setting and outcome of a sweep, and a line for every point."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +28,7 @@ AXIS_WIDTH = 1.9
 
 @dataclass(frozen=True)
 class Line:
-    """One setting: what was varied, and what came out of each of its runs."""
+    """One point: its settings, and the outcomes of its runs."""
 
     label: str
     settings: Mapping[str, JsonValue]
@@ -39,20 +39,35 @@ class Line:
     """The same of each run alone."""
 
 
+@dataclass(frozen=True)
+class AxisScale:
+    """An upright axis from 0 to 1."""
+
+    name: str
+    height: Callable[[JsonValue], float]
+    """Place of a value; NaN for none."""
+    marks: Sequence[tuple[float, str]]
+    """Heights that are named, and how."""
+
+
 def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines: Sequence[Line], title: str) -> Figure:
     """Axes for the settings, then for the outcomes: means thick with their intervals as bars, single runs thin."""
     scales = [_setting(name, lines) for name in settings] + [_outcome(name, lines) for name in outcomes]
     figure = Figure(figsize=(max(6.0, AXIS_WIDTH * len(scales) + 1.0), 4.6), layout="constrained")
     axes = figure.subplots()
-    colours = _colours(figure, axes, lines, outcomes)
-    for line, colour in zip(lines, colours, strict=True):
+
+    def draw(values: Sequence[JsonValue], **style: Any) -> None:
+        heights = [scale.height(value) for scale, value in zip(scales, values, strict=True)]
+        axes.plot(range(len(scales)), heights, **style)
+
+    for line, colour in zip(lines, _colours(figure, axes, lines, outcomes), strict=True):
         fixed = [line.settings.get(name) for name in settings]
         for run in line.runs if len(line.runs) > 1 else ():
-            _draw(axes, scales, [*fixed, *(run.get(name) for name in outcomes)], color=colour, lw=0.7, alpha=0.5)
+            draw([*fixed, *(run.get(name) for name in outcomes)], color=colour, lw=0.7, alpha=0.5)
         means = [line.means.get(name) for name in outcomes]
-        _draw(axes, scales, [*fixed, *means], color=colour, lw=2.2, marker="o", ms=4, label=line.label)
-        for place, name in enumerate(outcomes, len(settings)):
-            mean, half = line.means.get(name), line.halves.get(name, math.nan)
+        draw([*fixed, *means], color=colour, lw=2.2, marker="o", ms=4, label=line.label)
+        for place, (name, mean) in enumerate(zip(outcomes, means, strict=True), len(settings)):
+            half = line.halves.get(name, math.nan)
             if mean is not None and math.isfinite(half):
                 ends = [scales[place].height(mean - half), scales[place].height(mean + half)]
                 axes.plot([place, place], ends, color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
@@ -62,11 +77,8 @@ def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines
             label = axes.annotate(text, (place, height), (-5, 0), textcoords="offset points", ha="right", va="center")
             label.set(size=7, zorder=5, path_effects=[withStroke(linewidth=3, foreground="white")])
     axes.set_xticks(range(len(scales)), [scale.name for scale in scales], fontsize=8)
-    axes.set_yticks([])
-    axes.set_xlim(-0.6, len(scales) - 0.7)
-    axes.set_ylim(-0.06, 1.06)
-    for side in ("top", "left", "right", "bottom"):
-        axes.spines[side].set_visible(False)
+    axes.set(yticks=[], xlim=(-0.6, len(scales) - 0.7), ylim=(-0.06, 1.06))
+    axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
     if len(lines) <= len(COLOURS):
         figure.legend(loc="outside lower center", ncols=min(3, len(lines)), fontsize=7, frameon=False)
@@ -74,65 +86,48 @@ def parallel_coordinates(settings: Sequence[str], outcomes: Sequence[str], lines
     return figure
 
 
-@dataclass(frozen=True)
-class _Scale:
-    name: str
-    low: float
-    high: float
-    logarithmic: bool
-    places: Mapping[str, float]
-    """Height of each value, for values that are no numbers."""
-    marks: Sequence[tuple[float, str]]
-    """Heights that are named, and how."""
-
-    def height(self, value: JsonValue) -> float:
-        """Where a value stands, 0 to 1; NaN for none."""
-        if self.places:
-            return self.places.get(written(value), math.nan)
-        return _height(value, self.low, self.high, self.logarithmic)
+def _setting(name: str, lines: Sequence[Line]) -> AxisScale:
+    """The axis of a setting: numbers to scale, other values at equal distances."""
+    short, values = name.rpartition(".")[2], [line.settings.get(name) for line in lines]
+    numbers = [float(value) for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    if len(numbers) == len(values):
+        return _numbers(short, numbers, named=True)
+    texts = list(dict.fromkeys(map(written, values)))
+    places = dict(zip(texts, np.linspace(0.0, 1.0, len(texts)) if len(texts) > 1 else [0.5], strict=True))
+    return AxisScale(
+        short, lambda value: places.get(written(value), math.nan), [(places[text], text) for text in texts]
+    )
 
 
-def _height(value: JsonValue, low: float, high: float, logarithmic: bool) -> float:
-    if not isinstance(value, (int, float)) or not math.isfinite(value):
-        return math.nan
-    if high <= low:
-        return 0.5
-    if logarithmic:
-        return math.log(max(float(value), low) / low) / math.log(high / low)
-    return (float(value) - low) / (high - low)
-
-
-def _setting(name: str, lines: Sequence[Line]) -> _Scale:
-    values = list(dict.fromkeys(written(line.settings.get(name)) for line in lines))
-    numbers = [line.settings.get(name) for line in lines]
-    if not all(isinstance(number, (int, float)) and not isinstance(number, bool) for number in numbers):
-        last = max(1, len(values) - 1)
-        places = {value: place / last if len(values) > 1 else 0.5 for place, value in enumerate(values)}
-        return _Scale(name.rpartition(".")[2], 0.0, 1.0, False, places, [(places[value], value) for value in values])
-    return _numbers(name.rpartition(".")[2], [float(number) for number in numbers], named=True)  # type: ignore[arg-type]
-
-
-def _outcome(name: str, lines: Sequence[Line]) -> _Scale:
-    found = [run[name] for line in lines for run in line.runs if math.isfinite(run.get(name, math.nan))]
+def _outcome(name: str, lines: Sequence[Line]) -> AxisScale:
+    """The axis of an outcome, with room for every interval."""
+    found = [run.get(name, math.nan) for line in lines for run in line.runs]
     for line in lines:
         mean, half = line.means.get(name, math.nan), line.halves.get(name, math.nan)
-        found += [value for value in (mean - half, mean + half) if math.isfinite(value)]
-    return _numbers(name.replace(" ", "\n", 1), found or [0.0], named=False)
+        found += [mean - half, mean + half]
+    return _numbers(
+        name.replace(" ", "\n", 1), [value for value in found if math.isfinite(value)] or [0.0], named=False
+    )
 
 
-def _numbers(name: str, values: Sequence[float], *, named: bool) -> _Scale:
+def _numbers(name: str, values: Sequence[float], *, named: bool) -> AxisScale:
     low, high = min(values), max(values)
     logarithmic = named and low > 0 and high / low > ORDERS
-    own = sorted(set(values))
-    if not (named and len(own) <= VALUES_NAMED):
-        own = [float(tick) for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high] or own
-        own = sorted({low, high}) if logarithmic else own
-    marks = [(_height(value, low, high, logarithmic), f"{value:.4g}") for value in own]
-    return _Scale(name, low, high, logarithmic, {}, marks)
 
+    def height(value: JsonValue) -> float:
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            return math.nan
+        if high <= low:
+            return 0.5
+        if logarithmic:
+            return math.log(max(float(value), low) / low) / math.log(high / low)
+        return (float(value) - low) / (high - low)
 
-def _draw(axes: Axes, scales: Sequence[_Scale], values: Sequence[JsonValue], **style: Any) -> None:
-    axes.plot(range(len(scales)), [scale.height(value) for scale, value in zip(scales, values, strict=True)], **style)
+    marked = sorted(set(values))
+    if not (named and len(marked) <= VALUES_NAMED):
+        ticks = [float(tick) for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high]
+        marked = sorted({low, high}) if logarithmic else ticks or marked
+    return AxisScale(name, height, [(height(value), f"{value:.4g}") for value in marked])
 
 
 def _colours(figure: Figure, axes: Axes, lines: Sequence[Line], outcomes: Sequence[str]) -> Sequence[object]:

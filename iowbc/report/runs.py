@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
-from iowbc.results.table import Cell, Column, Measured, Table, heads
+from iowbc.results.table import Cell, Column, MeanCell, Table, heads
 
 EVAL = "eval"
 NAMING = ("name", "description", "execution")
@@ -19,7 +19,7 @@ NAMING = ("name", "description", "execution")
 
 @dataclass(frozen=True)
 class Run:
-    """What a recipe has, under the name by which the user called it."""
+    """The artifacts of a recipe, under the name by which the user called it."""
 
     label: str
     artifacts: Mapping[str, Artifact]
@@ -37,9 +37,12 @@ class Group:
 
     @property
     def seeds(self) -> tuple[str, ...]:
-        """Of each run's training; where that does not tell them apart, what the runs are called."""
-        told = [str(_seed(run.recipe)) for run in self.runs]
-        return tuple(told if len({*told}) == len(told) else (run.label for run in self.runs))
+        """Seed of each run's training; where seeds are equal, the labels of the runs."""
+        own = [run.recipe.get("teacher", {}).get("seed") for run in self.runs]
+        seeds = [
+            str(run.recipe.get("seed", 0) if seed is None else seed) for run, seed in zip(self.runs, own, strict=True)
+        ]
+        return tuple(seeds if len({*seeds}) == len(seeds) else (run.label for run in self.runs))
 
     def values(self, stage: str, metric: str) -> NDArray[np.float64]:
         """A stage's metric in each run that has it."""
@@ -66,9 +69,8 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
     for run in runs:
         group = next((group for group in found if _of_one_variant(run, group[0])), None)
         if group is None:
-            found.append([run])
-        else:
-            group.append(run)
+            found.append(group := [])
+        group.append(run)
     return [
         Group(group[0].label if len(group) == 1 else f"{group[0].label} ({len(group)} seeds)", tuple(group))
         for group in found
@@ -77,16 +79,11 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
 
 def metric_rows(groups: Sequence[Group]) -> list[MetricRow]:
     """Every metric of every stage, those of a stage together."""
-    found = dict.fromkeys(
-        (stage, metric)
-        for group in groups
-        for run in group.runs
-        for stage, artifact in run.artifacts.items()
-        for metric in artifact.metrics
-    )
-    stages = [*dict.fromkeys(stage for stage, _ in found)]
-    names = sorted(found, key=lambda name: stages.index(name[0]))
-    return [_row(groups, stage, metric) for stage, metric in names]
+    found: dict[str, dict[str, None]] = {}
+    for run in (run for group in groups for run in group.runs):
+        for stage, artifact in run.artifacts.items():
+            found.setdefault(stage, {}).update(dict.fromkeys(artifact.metrics))
+    return [_row(groups, stage, metric) for stage, names in found.items() for metric in names]
 
 
 def metrics_table(groups: Sequence[Group]) -> Table:
@@ -109,11 +106,11 @@ def _row(groups: Sequence[Group], stage: str, metric: str) -> MetricRow:
 
 def _cell(values: NDArray[np.float64]) -> Cell:
     mean = figure(values.mean()) if len(values) else ""
-    return Measured(mean, f"{np.ptp(values) / 2:.2g}") if len(values) > 1 else mean
+    return MeanCell(mean, f"{np.ptp(values) / 2:.2g}") if len(values) > 1 else mean
 
 
 def _of_one_variant(first: Run, second: Run) -> bool:
-    """Whether two runs differ in their seeds alone: their recipes, or, where both are evaluated, what decided their
+    """True where two runs differ in their seeds alone: their recipes, or, where both are evaluated, what decided their
     artifacts, which says the same of recipes that were written down by different versions of the program."""
     recipe = _seedless(first.recipe)
     if recipe and recipe == _seedless(second.recipe):
@@ -126,23 +123,13 @@ def _of_one_variant(first: Run, second: Run) -> bool:
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """A recipe without what only tells repetitions apart."""
-    return {
-        name: _without_seed(name, value) for name, value in recipe.items() if name not in NAMING and name not in SEEDS
-    }
+    """A recipe without its seeds, name, description and execution."""
+    found = {name: value for name, value in recipe.items() if name not in NAMING and name not in SEEDS}
+    for name, value in found.items():
+        if f"{name}.seed" in SEEDS and isinstance(value, Mapping):
+            found[name] = {key: item for key, item in value.items() if key != "seed"}
+    return found
 
 
 def _label(run: Run) -> Any:
     return run.recipe.get(EVAL, {}).get("label")
-
-
-def _without_seed(name: str, value: Any) -> Any:
-    if f"{name}.seed" not in SEEDS or not isinstance(value, Mapping):
-        return value
-    return {key: item for key, item in value.items() if key != "seed"}
-
-
-def _seed(recipe: Mapping[str, Any]) -> Any:
-    """Seed of a recipe's training."""
-    own = recipe.get("teacher", {}).get("seed")
-    return recipe.get("seed", 0) if own is None else own

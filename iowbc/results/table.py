@@ -33,7 +33,7 @@ class Column:
     latex: str = ""
     """Its head in LaTeX, where it is another one."""
     role: Literal["own", "paper", "detail"] = "own"
-    """Whether it holds the paper's figures, or a detail that other columns nearly tell; narrow terminals leave these
+    """The paper's figures, or a detail that other columns nearly tell; narrow terminals leave these
     out first."""
 
     @property
@@ -42,7 +42,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeanCell:
     """A mean with half its interval, and a note behind it; narrow terminals leave the interval out."""
 
     value: str
@@ -53,7 +53,7 @@ class Measured:
         return f"{self.value} ± {self.half}{self.note}"
 
 
-Cell = str | Measured
+Cell = str | MeanCell
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Table:
     numbers: Any = Field(default=None, exclude=True, repr=False)
     """The same figures as numbers, a pandas DataFrame, for the CSV."""
     grouped: bool = True
-    """Whether the first column groups rows that repeat it."""
+    """True where the first column groups rows that repeat it."""
 
     @property
     def head(self) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ def measured(
     """A mean with half its interval; the mean alone without one, and `none` where there is no mean."""
     if np.isnan(value):
         return none
-    return Measured(f"{value:{form}}", f"{half:{half_form}}", note) if np.isfinite(half) else f"{value:{form}}"
+    return MeanCell(f"{value:{form}}", f"{half:{half_form}}", note) if np.isfinite(half) else f"{value:{form}}"
 
 
 def markdown(table: Table) -> str:

@@ -1,12 +1,92 @@
-"""Mean actions of policies, in NumPy."""
+"""Policies in NumPy: mean actions of stacks of rows, as fast as torch's, without its memory in every worker."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from iowbc.arrays import Array
-from iowbc.rollouts.encoders import Encoder
-from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
+from iowbc.arrays import Array, Indices
+
+Activation = Callable[[Array], Array]
+
+
+def elu(x: Array) -> Array:
+    """x where it is positive, else exp(x) - 1."""
+    below = np.expm1(np.minimum(x, 0.0))
+    below += np.maximum(x, 0.0)
+    return below
+
+
+ACTIVATIONS: Mapping[str, Activation] = {"elu": elu, "relu": lambda x: np.maximum(x, 0.0), "tanh": np.tanh}
+"""By their name in a recipe."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """x · weight + bias."""
+
+    weight: Array
+    """(inputs, outputs), float32."""
+    bias: Array
+    """(outputs,), float32."""
+
+    def __call__(self, x: Array) -> Array:
+        y: Array = x @ self.weight
+        y += self.bias
+        return y
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Linear layers with an activation between them; a network that commutes with a mirror is one with tied weights."""
+
+    layers: tuple[Linear, ...]
+    activation: str
+
+    def __call__(self, x: Array) -> Array:
+        activate = ACTIVATIONS[self.activation]
+        *hidden, last = self.layers
+        for layer in hidden:
+            x = activate(layer(x))
+        return last(x)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """(x - mean) / std, clipped."""
+
+    mean: Array
+    std: Array
+    clip: float
+
+    def __call__(self, x: Array) -> Array:
+        y: Array = x - self.mean
+        y /= self.std
+        return np.clip(y, -self.clip, self.clip, out=y)
+
+
+@dataclass(frozen=True)
+class HistoryEncoder:
+    """A history, (..., n, K, S) normalised, oldest first, to a latent, (..., n, latent): each observation is projected
+    by the same layer, and all projections by another."""
+
+    frame: Linear
+    whole: Linear
+    activation: str
+    mirror: tuple[Indices, Array] | None = None
+    """Permutation and sign by which an observation is mirrored, where the latent is of the history and its image."""
+
+    def __call__(self, history: Array) -> Array:
+        if self.mirror is None:
+            return self._encoded(history)
+        permutation, sign = self.mirror
+        return np.concatenate([self._encoded(history), self._encoded(history[..., permutation] * sign)], axis=-1)
+
+    def _encoded(self, history: Array) -> Array:
+        activate = ACTIVATIONS[self.activation]
+        *outer, rows, moments, size = history.shape
+        frames = activate(self.frame(history.reshape(*outer, rows * moments, size)))
+        return activate(self.whole(frames.reshape(*outer, rows, -1)))
 
 
 @dataclass(frozen=True)
@@ -14,7 +94,7 @@ class RowPolicy:
     """Of the newest row, (..., n, S + P) to (..., n, A)."""
 
     normal: Normal
-    body: Perceptron
+    body: Layers
 
     def __call__(self, rows: Array) -> Array:
         return self.body(self.normal(rows))
@@ -25,13 +105,13 @@ class HistoryPolicy:
     """Of the history H_t, (..., n, K, S), oldest first, to (..., n, A): a student."""
 
     normal: Normal
-    encoder: Encoder
+    encoder: HistoryEncoder
     estimate: Linear | None
     """Reads s_priv from the latent, where the body is to see that."""
-    body: Perceptron
+    body: Layers
 
     def __call__(self, history: Array) -> Array:
         seen = self.normal(history)
         latent = self.encoder(seen)
-        told = latent if self.estimate is None else self.estimate(latent)
-        return self.body(np.concatenate([seen[..., -1, :], told], axis=-1))
+        read = latent if self.estimate is None else self.estimate(latent)
+        return self.body(np.concatenate([seen[..., -1, :], read], axis=-1))

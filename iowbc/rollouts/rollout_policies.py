@@ -27,7 +27,7 @@ class RolloutPolicy(Protocol):
         """Of the environments from `first` to `last`, the latter excluded; `first` begins a block."""
 
     def act(self, step: int, rows: Array, starts: Mask) -> Decision:
-        """What to do, from rows (n, S); `starts`: environments whose episode begins with them, (n,)."""
+        """The decision for rows (n, S); `starts`: environments whose episode begins with them, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Past:
         return Past(self.frames[first:last], self.starts[first:last])
 
     def history(self) -> History:
-        """Where they are continued."""
+        """A history that continues them."""
         history = History(*self.frames.shape)
         history.frames[:] = self.frames
         return history
@@ -56,7 +56,7 @@ class ExploringPolicy:
 
     policy: RowPolicy | HistoryPolicy
     noise: Array
-    """What is added to the mean action, (T, n, A)."""
+    """Added to the mean action, (T, n, A)."""
     block: int
     """Size of the blocks of environments, see `iowbc.rollouts.blocks`."""
     past: Past | None = None
@@ -90,9 +90,9 @@ class DaggerPolicy:
     student: HistoryPolicy
     teachers: tuple[RowPolicy, ...]
     observation: slice
-    """Where in a row is s_t."""
+    """Place of s_t in a row."""
     privileged: slice
-    """Where in a row is s_priv."""
+    """Place of s_priv in a row."""
     masked: Indices
     """Places in a row of what is masked for the teachers, which see its mean there."""
     teacher_of: Indices
@@ -129,7 +129,7 @@ class DaggerPolicy:
         return np.where(self.taught[:, None], answer, own), {"own": own, "answer": answer}
 
     def _answer(self, place: int, rows: Array) -> Array:
-        """What one teacher would do in every environment, whole blocks at a time, (n, A)."""
+        """Actions of one teacher in every environment, whole blocks at a time, (n, A)."""
         teacher, seen = self.teachers[place], rows.copy()
         seen[:, self.masked] = teacher.normal.mean[self.masked]
         seen = np.concatenate([seen[:, self.observation], seen[:, self.privileged]], axis=1)

@@ -30,17 +30,17 @@ class Trajectories:
     observation: Array
     """Rows before each step and behind the last one, (T + 1, n, S)."""
     action: Array
-    """What drove, (T, n, A)."""
+    """(T, n, A)."""
     reward: Array
     """(T, n)."""
     ended: Mask
-    """Where an episode ended with the step, (T, n)."""
+    """True where an episode ended with the step, (T, n)."""
     cut: Array
     """Step and environment of each episode that its time limit ended, (k, 2), in order."""
     cut_observation: Array
     """The last row of those episodes, (k, S)."""
     told: Mapping[str, Array]
-    """What the policy recorded beside, (T, n, ...) by name."""
+    """Further records of the policy, (T, n, ...) by name."""
     acting: float
     """Time that the policy took of it [s], the mean over those who worked side by side."""
 

@@ -30,7 +30,7 @@ WITH_WHEELS = ("object_ground_friction",)
 """Quantities that are zero but in a push."""
 
 
-class Table:
+class DrawTable:
     """Distributions side by side, a column each number; drawn in one sweep, for many small draws cost more."""
 
     def __init__(self, entries: Mapping[str, tuple[Distribution, int]]) -> None:
@@ -69,7 +69,7 @@ class Draws:
     def __init__(self, recipe: Recipe, scenes: list[Scene], robot: Robot) -> None:
         self.recipe = recipe
         n = len(scenes)
-        self._table = Table(_entries(recipe, robot))
+        self._table = DrawTable(_entries(recipe, robot))
         self._pushing = np.array([scene.kind == "push" for scene in scenes])
         self._with_object = np.array([scene.object is not None for scene in scenes])
         self._nominal_mass = np.array([scene.object.mass if scene.object else 0.0 for scene in scenes])
@@ -82,7 +82,7 @@ class Draws:
             elif name in WITH_WHEELS:
                 self._present[~self._pushing, place] = 0.0
         self._rows = np.tile(self._table.nominal, (n, 1))
-        self._habits = Table(_habits(recipe.partner))
+        self._habits = DrawTable(_habits(recipe.partner))
         self._habit_rows = np.tile(self._habits.nominal, (n, 1))
         chances = np.array([share for _, share in recipe.partner.behaviours])
         self._behaviours = np.cumsum(chances)[:-1] / chances.sum()

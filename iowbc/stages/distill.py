@@ -44,7 +44,7 @@ def run(job: Job) -> None:
 
     from iowbc.control.action import action_mirror
     from iowbc.control.observation import observation_layout
-    from iowbc.learning.side_by_side import prepare_process
+    from iowbc.learning.computing import prepare_process
     from iowbc.learning.storage import load_teacher, save_network
     from iowbc.learning.student import Rows, StudentTraining
     from iowbc.robot.description import load_robot

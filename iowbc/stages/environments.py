@@ -7,20 +7,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from iowbc.arrays import Array
-from iowbc.pipeline.stage import Job, Spread
+from iowbc.pipeline.stage import Job
 from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.specification import Specification
-from iowbc.task.vector.messages import Message, Roll
+from iowbc.task.vector.messages import Message
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
-from iowbc.task.vector.vector_env import PATIENCE, VectorEnv
-from iowbc.task.vector.workers import STARTING, Workers
+from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.vector.workers import Workers
+
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.spread import NodeSpread
 
 ACTOR = "rollout actor"
-"""What a group of environments on another machine is called."""
+"""Name of a group of environments on another machine."""
 WRITTEN = ("action", "counters", "terms")
 """Buffers in which the learner's side writes, too: actions, and figures that it sets back once it has read them."""
 
@@ -38,7 +41,7 @@ def training_environments(job: Job, *, count: int, seed: int, divergences: Path 
 class RemoteWorkers(Workers):
     """Environments in groups on other machines; what is here is a copy of their buffers after the last request."""
 
-    def __init__(self, spread: Spread, count: int, setup: Setup) -> None:
+    def __init__(self, spread: "NodeSpread", count: int, setup: Setup) -> None:
         """`count`: groups that are asked for."""
         world = setup.specification
         folders = {"robot": world.robot} | ({} if world.rg is None else {"generator": world.rg})
@@ -55,8 +58,7 @@ class RemoteWorkers(Workers):
             ({name: self.buffers[name][first:last] for name in WRITTEN}, message)
             for (first, last), message in zip(self.groups, messages, strict=True)
         ]
-        steps = messages[0].steps if isinstance(messages[0], Roll) else 0
-        self._pool.ask(written, changes=self._changes, patience=STARTING + steps * PATIENCE)
+        self._pool.ask(written, changes=self._changes)
 
     def answers(self) -> list[Any]:
         """See `Workers`."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Presentation, Spread, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Stage, always
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from iowbc.evaluation.trials.plan import Trial
     from iowbc.evaluation.trials.protocol import Batches
     from iowbc.evaluation.trials.rollout import Acting
+    from iowbc.pipeline.cluster.spread import NodeSpread
     from iowbc.task.specification import Specification
 
 
@@ -81,7 +82,7 @@ def run(job: Job) -> None:
 def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
-    from iowbc.evaluation.films import Film, film_trial, filmed
+    from iowbc.evaluation.films import film_trial, filmed, written_film
     from iowbc.evaluation.report.other_tables import PROBING
     from iowbc.evaluation.report.report import write_report
     from iowbc.evaluation.trials.protocol import Protocol
@@ -103,8 +104,8 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
     try:
         for name, row in filmed(trials, recipe.eval.video.count):
             job.report.progress(len(trials), len(trials), f"film {name}")
-            film = Film(job.out / "videos" / f"{name}.mp4", recipe.eval.video.fps)
-            film_trial(world, policy, row, film, recipe.eval.video, job.interrupted)
+            with written_film(job.out / "videos" / f"{name}.mp4", recipe.eval.video.fps) as add:
+                film_trial(world, policy, row, add, recipe.eval.video, job.interrupted)
     except NoRenderer as reason:
         job.report.say(f"no films: {reason}")
     for suite, rows in summary[~summary["kind"].isin(PROBING)].groupby("suite", sort=False):
@@ -115,8 +116,7 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
 
 def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
-    from iowbc.evaluation.probe.readings import read
-    from iowbc.evaluation.probe.regression import inferred_masses
+    from iowbc.evaluation.probe import inferred_masses, read
     from iowbc.evaluation.report.probe import write_probe
 
     asked = job.recipe.eval.probe
@@ -149,7 +149,7 @@ def read_by_trials(job: Job) -> dict[str, Path]:
 
 
 def play_everywhere(
-    spread: Spread, recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
+    spread: "NodeSpread", recipe: Recipe, folders: Mapping[str, Path], batches: "Batches"
 ) -> "Iterator[tuple[str, bytes]]":
     """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
     names = list(batches)

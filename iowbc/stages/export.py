@@ -1,11 +1,20 @@
 """Stage `export`: the control step as an ONNX graph, its contract and golden vectors, checked and tried out."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.pipeline.stage import Job, Presentation, Stage
+from iowbc.recipe.export import Export
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
+
+if TYPE_CHECKING:
+    from iowbc.deploy.session import Values
+    from iowbc.evaluation.acceptance import Accepted
+    from iowbc.export.graph import ControllerGraph
+    from iowbc.learning.networks import StudentNetwork
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -17,66 +26,31 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 def run(job: Job) -> None:
     """Export, hold the graph against torch, and let the exported controller carry its load in the simulation."""
-    from functools import partial
-
     import numpy as np
     import torch
 
-    from iowbc.control.observation import OBJECT, observation_layout
-    from iowbc.control.references import ReferenceLayer
     from iowbc.deploy import contract, exported_folder
-    from iowbc.deploy.session import open_session
-    from iowbc.deploy.session import run as run_graph
     from iowbc.deploy.timing import step_seconds
-    from iowbc.evaluation.acceptance import try_out, try_out_network
-    from iowbc.evaluation.golden_rollout import golden_inputs
+    from iowbc.evaluation.acceptance import golden_inputs, try_out, try_out_network
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
-    from iowbc.export.graph import ControllerGraph
-    from iowbc.export.onnx_graph import run_torch
     from iowbc.learning.acting import policy_of
-    from iowbc.learning.networks import StudentNetwork
-    from iowbc.learning.storage import load_network
-    from iowbc.robot.description import load_robot
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as on the robot, where the controller has one thread
-    recipe, task, settings = job.recipe, job.recipe.task, job.recipe.export
-    rg, source = job.inputs.get("rg-fit"), job.inputs[policy_stage(job.recipe)]
-    student, about = load_network(source)
-    if not isinstance(student, StudentNetwork):
-        raise StageFailed(
-            f"{source} holds no student: a policy that needs privileged observations cannot run on a robot; "
-            "add the stage `distill` to the recipe, or leave `export` out of its stages"
-        )
-    robot = load_robot(job.robot)
-    graph = ControllerGraph(
-        student,
-        robot,
-        task,
-        observation_layout(robot, OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}),
-        int(about["architecture"]["history"]),
-        ReferenceLayer(robot, task.references, rg),
-    )
+    rg, (student, about) = job.inputs.get("rg-fit"), _student(job.inputs[policy_stage(job.recipe)])
+    graph = _graph(job, student, about)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
-    statement = write_folder(job.out, graph, recipe, rg, sources)
+    statement = write_folder(job.out, graph, job.recipe, rg, sources)
     try:
-        world = Specification(recipe, job.robot, rg).deployed
+        world = Specification(job.recipe, job.robot, rg).deployed
         policy, played = try_out(world, job.out, job.interrupted)
         by_torch = try_out_network(world, policy_of(student, about["architecture"]), job.interrupted)
         steps = golden_inputs(world, job.out, job.interrupted)
     except Interrupted as stopped:
         raise Interrupted(f"export: {stopped}; it starts anew, which takes less than a minute") from stopped
-
-    inputs = golden.stacked(steps)
-    expected = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
-    settle, step = (
-        partial(run_graph, open_session(job.out / name)) for name in (exported_folder.SETTLE, exported_folder.STEP)
-    )
-    differences = golden.largest_difference(expected, golden.played(settle, step, inputs))
-    golden.write_golden(inputs, expected, job.out / exported_folder.GOLDEN)
-    seconds = step_seconds(job.out, settings.timing_steps)[:, 0]
-
+    differences = _parity(graph, golden.stacked(steps), job.out)
+    seconds = step_seconds(job.out, job.recipe.export.timing_steps)[:, 0]
     metrics = {
         "parity": max(differences.values()),
         "target_difference": policy.largest_difference,
@@ -98,21 +72,70 @@ def run(job: Job) -> None:
         f"torch and onnxruntime differ by {metrics['parity']:.1e} at most over {len(steps)} steps; "
         f"a control step takes {metrics['step_ms']:.3f} ms"
     )
+    for place, each in enumerate(played):
+        differ = metrics[f"errors_differ/{place}"]
+        job.report.say(f"{each.sentence}; its errors differ from the torch student's by {differ:.2%} at most")
+    _require_gates(job.recipe.export, differences, policy.largest_difference, played)
+
+
+def _student(source: Path) -> "tuple[StudentNetwork, dict[str, Any]]":
+    """The student of a stage's artifact, and its description. Raises StageFailed where there is none."""
+    from iowbc.learning.networks import StudentNetwork
+    from iowbc.learning.storage import load_network
+
+    network, about = load_network(source)
+    if not isinstance(network, StudentNetwork):
+        raise StageFailed(
+            f"{source} holds no student: a policy that needs privileged observations cannot run on a robot; "
+            "add the stage `distill` to the recipe, or leave `export` out of its stages"
+        )
+    return network, about
+
+
+def _graph(job: Job, student: "StudentNetwork", about: Mapping[str, Any]) -> "ControllerGraph":
+    from iowbc.control.observation import OBJECT, observation_layout
+    from iowbc.control.references import ReferenceLayer
+    from iowbc.export.graph import ControllerGraph
+    from iowbc.robot.description import load_robot
+
+    robot, task = load_robot(job.robot), job.recipe.task
+    sees_object = OBJECT[0].name in {part["name"] for part in about["layout"]["observation"]}
+    references = ReferenceLayer(robot, task.references, job.inputs.get("rg-fit"))
+    layout, history = observation_layout(robot, sees_object), int(about["architecture"]["history"])
+    return ControllerGraph(student, robot, task, layout, history, references)
+
+
+def _parity(graph: "ControllerGraph", inputs: "Values", out: Path) -> dict[str, float]:
+    """Largest differences between torch and onnxruntime by output; leaves the golden vectors."""
+    from functools import partial
+
+    from iowbc.deploy import exported_folder
+    from iowbc.deploy.session import open_session, run
+    from iowbc.export import golden
+    from iowbc.export.onnx_graph import run_torch
+
+    expected = golden.played(partial(run_torch, graph.settle), partial(run_torch, graph.step), inputs)
+    settle, step = (partial(run, open_session(out / name)) for name in (exported_folder.SETTLE, exported_folder.STEP))
+    golden.write_golden(inputs, expected, out / exported_folder.GOLDEN)
+    return golden.largest_difference(expected, golden.played(settle, step, inputs))
+
+
+def _require_gates(
+    settings: Export, differences: Mapping[str, float], target_difference: float, played: "Sequence[Accepted]"
+) -> None:
+    """Raises StageFailed for the first gate that is missed: parity, joint targets, acceptance."""
     worst = max(differences, key=lambda name: differences[name])
     if not differences[worst] <= settings.parity_tolerance:
         raise StageFailed(
             f"parity: output {worst} differs by {differences[worst]:.2e} between torch and onnxruntime, "
             f"export.parity_tolerance is {settings.parity_tolerance:.0e}; try another export.opset or raise it"
         )
-    if not policy.largest_difference <= settings.target_tolerance:
+    if not target_difference <= settings.target_tolerance:
         raise StageFailed(
-            f"the controller's joint targets differ by {policy.largest_difference:.2e} rad from the simulation's own, "
+            f"the controller's joint targets differ by {target_difference:.2e} rad from the simulation's own, "
             f"export.target_tolerance is {settings.target_tolerance:.0e}: its arm kinematics, reference generator, "
             "gait clock or action scale are not those of the task: the code of one of the two has changed"
         )
-    for place, each in enumerate(played):
-        differ = metrics[f"errors_differ/{place}"]
-        job.report.say(f"{each.sentence}; its errors differ from the torch student's by {differ:.2%} at most")
     for place, each in enumerate(played):
         if not each.enough:
             raise StageFailed(

@@ -1,4 +1,4 @@
-"""What the stages behind the reference generator share: which artifacts they read."""
+"""Inputs of the stages behind the reference generator."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,12 +15,12 @@ def generator_stage(recipe: Recipe) -> tuple[str, ...]:
 
 
 def leaves_student(recipe: Recipe) -> bool:
-    """Whether a recipe trains a policy that needs no privileged observation."""
+    """True where a recipe trains a policy that needs no privileged observation."""
     return "distill" in recipe.stages or recipe.teacher.history is not None
 
 
 def not_privileged(recipe: Recipe, path: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Which of the names at a dotted path of the recipe are no parts of s_priv, as a stage's problems."""
+    """Names at a dotted path of the recipe that are no parts of s_priv, as a stage's problems."""
     if not names:
         return
     from iowbc.task.privileged import PRIVILEGED

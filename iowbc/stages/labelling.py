@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from iowbc.pipeline.stage import Spread
-
 if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.spread import NodeSpread
     from iowbc.reference.labels.labelling import LabelTask
     from iowbc.reference.labels.shards import Shard
 
@@ -20,7 +19,7 @@ def label_everywhere(
     task: "LabelTask",
     indices: Sequence[int],
     *,
-    spread: Spread,
+    spread: "NodeSpread",
     folder: Path,
     key: str,
     chunk_size: int,

@@ -43,7 +43,7 @@ PANELS = (
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """What s_priv does not hold, or has a name that another part of it has."""
+    """Names that s_priv does not hold, or that two parts of it have."""
     yield from not_privileged(recipe, "teacher.value_only", recipe.teacher.value_only)
     if recipe.task.observation.own:
         from iowbc.task.own_parts import taken_names
@@ -60,8 +60,8 @@ def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
 def run(job: Job) -> None:
     """Train the teacher; leave its best network, normalisation, curves, and an SB3 zip for users' own code."""
     from iowbc.control.action import action_mirror
+    from iowbc.learning.computing import prepare_process
     from iowbc.learning.history_environments import HistoryEnvironments
-    from iowbc.learning.side_by_side import prepare_process
     from iowbc.learning.storage import save_network
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.processes import available_cores
@@ -105,7 +105,7 @@ def run(job: Job) -> None:
 
     network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
-    training.model.save(job.out / "teacher_sb3.zip")
+    training.model.save_for_sb3(job.out / "teacher_sb3.zip")
     for name in ("divergences", VIDEOS):
         if (job.work / name).is_dir():
             (job.work / name).rename(job.out / name)

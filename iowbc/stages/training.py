@@ -1,4 +1,4 @@
-"""What the stages that train share: updates until the budget is spent, curves, checkpoints, stopping and going on."""
+"""Shared by the stages that train: updates until the budget is spent, curves, checkpoints, stopping and going on."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -42,7 +42,7 @@ CURVES = "curves.jsonl"
 
 
 def rolls_elsewhere(recipe: Recipe) -> bool:
-    """Whether a recipe wants the rollouts of a training made by other machines, where there are any."""
+    """True where a recipe wants the rollouts of a training made by other machines, where there are any."""
     return recipe.execution.rollout_actors is not None
 
 

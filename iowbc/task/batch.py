@@ -152,7 +152,7 @@ class Batch:
         if self._schedule.repeats:
             write_trial_signals(self.buffers, simulation, action * self._scale)
         memory.earlier_action[:], memory.action[:] = memory.action, action
-        self.guidance.advance(memory, self._schedule.episode_key)
+        self.guidance.advance(memory, self._schedule.episode_key, simulation.measured)
         self._finish(judgement)
 
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:

@@ -10,6 +10,7 @@ from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, YAW_RATE
 from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
 from iowbc.task.commands.commander import Commander
 from iowbc.task.commands.script import CommandScript
@@ -58,17 +59,17 @@ class Guidance:
         joints[:, self._support], joints[:, self._arms] = posture, arms
         return joints, self.references.start_pitch(posture, command)
 
-    def advance(self, memory: Memory, key: Keys) -> None:
-        """Command, gait clock and references of the step to come; keys of the episodes, (n,)."""
+    def advance(self, memory: Memory, key: Keys, measured: Measured) -> None:
+        """Command, references and gait clock of the step to come; keys of the episodes, (n,)."""
         settings, period = self._settings, self._period
         height = memory.command[:, HEIGHT].copy()
         self.commander.advance(memory, key)
         memory.height_rate[:] = (memory.command[:, HEIGHT] - height) / period
-        moving = gait.wants_to_move(memory.command, settings)
-        phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
-        memory.phase[:], memory.stepping[:] = phase, stepping
         arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self._grasp, period)
         memory.arms[:], memory.posture[:] = arms, posture
+        moving = self.references.wants_steps(measured, posture, memory.command)
+        phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
+        memory.phase[:], memory.stepping[:] = phase, stepping
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping)
 
     def turn(self, memory: Memory) -> None:

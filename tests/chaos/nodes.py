@@ -16,6 +16,7 @@ import argparse
 import contextlib
 import os
 import random
+import secrets
 import subprocess
 import sys
 import tempfile
@@ -28,23 +29,22 @@ from typing import Any
 import psutil
 from tally import ENDED, Tally, Turn, Undisturbed
 
-from iowbc.pipeline.cluster.loopback import ALONE, STARTS, secured
-from iowbc.pipeline.cluster.loopback_nodes import OBJECT_STORE
+from iowbc.pipeline.cluster.cluster import ALONE, STARTS
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 
 PATIENT = {"RAY_raylet_start_wait_time_s": "300"}
 """Environment in which a node may take its time to start on a busy machine."""
-ALIKE = {
-    "object_store_memory": OBJECT_STORE,
+NODE = {
+    "object_store_memory": 1 << 30,
     "include_dashboard": False,
     "include_log_monitor": False,
     "no_monitor": True,
 }
-"""What all nodes have, as those of `--address local`."""
+"""Settings of each node."""
 IDLE = ("IDLE", "Agent")
 """Ends of the names of Ray's processes that do nothing for a run."""
-WORKERS = ("multiprocessing.spawn", "task.vector.worker", "ray::Holder")
+WORKERS = ("multiprocessing.spawn", "task.vector.worker", "ray::ActorHost")
 """What the command lines of stages' worker processes and rollout actors have in them."""
 LEAVING = 20.0
 """Seconds within which they are gone after a run."""
@@ -62,7 +62,7 @@ class Nodes:
         from ray.cluster_utils import Cluster
 
         self._cluster = Cluster()
-        self._cluster.add_node(num_cpus=0, **ALIKE)
+        self._cluster.add_node(num_cpus=0, **NODE)
         self.nodes = [self._added() for _ in range(count)]
 
     @property
@@ -95,8 +95,8 @@ class Nodes:
         """A node; on a busy machine Ray's own processes give each other up, and it takes another attempt."""
         for _ in range(STARTS - 1):
             with contextlib.suppress(Exception):
-                return self._cluster.add_node(num_cpus=1, **ALIKE)
-        return self._cluster.add_node(num_cpus=1, **ALIKE)
+                return self._cluster.add_node(num_cpus=1, **NODE)
+        return self._cluster.add_node(num_cpus=1, **NODE)
 
 
 @dataclass
@@ -224,7 +224,13 @@ def main() -> int:
     record.parent.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory(prefix="iowbc-nodes-", ignore_cleanup_errors=True) as folder:
-        os.environ |= {**ALONE, **PATIENT, **secured(), "RAY_TMPDIR": folder}  # its own files lie in ray/ there
+        token = secrets.token_hex(32)
+        os.environ |= {
+            **ALONE,
+            **PATIENT,
+            "RAY_AUTH_TOKEN": token,
+            "RAY_TMPDIR": folder,
+        }  # its own files lie in ray/ there
         nodes = Nodes(asked.nodes)
         try:
             series = Series(words, Path(folder), nodes, Tally(record), asked.gap, random.Random(asked.seed))

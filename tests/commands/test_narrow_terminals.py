@@ -22,7 +22,7 @@ from iowbc.commands.status import print_status
 from iowbc.commands.sweep_plan import PlannedStage, plan_table
 from iowbc.pipeline.console.wording import figure
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Step
+from iowbc.pipeline.stage_plan import StagePlan
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.results.table import Column, Table, drawn, folded, heads
@@ -185,7 +185,7 @@ def test_a_plan_of_several_recipes_keeps_names_and_times_whole(what: str, name: 
     stages = ("rg-dataset", "rg-fit", "teacher", "distill", "eval", "export")
     times = (0.5, 42.0, 7500.0, 7500.0, 600.0, None)
     steps = [
-        Step(cast(Stage, SimpleNamespace(name=stage)), None, None, None, reasons=("new",), roughly=seconds)
+        StagePlan(cast(Stage, SimpleNamespace(name=stage)), None, None, None, reasons=("new",), roughly=seconds)
         for stage, seconds in zip(stages, times, strict=True)
     ]
     written = io.StringIO()

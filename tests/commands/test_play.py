@@ -78,11 +78,11 @@ def test_a_film_that_is_terminated_leaves_no_part_of_it(tmp_path: Path, number: 
     program = (
         "import os, signal\nfrom pathlib import Path\nimport numpy as np\n"
         "from iowbc.commands.ending import close_on_termination, leave\n"
-        "from iowbc.evaluation.films import Film\n"
+        "from iowbc.evaluation.films import written_film\n"
         "signal.signal(signal.SIGINT, leave)\nclose_on_termination()\n"
-        "with Film(Path('x.mp4'), 10) as film:\n"
+        "with written_film(Path('x.mp4'), 10) as add:\n"
         "    while not Path('x.part.mp4').exists():\n"
-        "        film.add(np.zeros((32, 32, 3), np.uint8))\n"
+        "        add(np.zeros((32, 32, 3), np.uint8))\n"
         f"    os.kill(os.getpid(), {int(number)})\n"
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)

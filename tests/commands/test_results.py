@@ -16,7 +16,7 @@ from iowbc.commands.named import last_used
 from iowbc.commands.results import headline, next_commands, print_results
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.results.table import Column, Measured, Table, drawn, heads, read_tables, write_table
+from iowbc.results.table import Column, MeanCell, Table, drawn, heads, read_tables, write_table
 
 PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 LIFTING = Table(
@@ -26,7 +26,7 @@ LIFTING = Table(
         *("Mass", "Algorithm", Column("E_α", "rad"), Column("E_h", "m"), "Survived"), Column("paper E_α", role="paper")
     ),
     [
-        ("0 kg", "IO-WBC", Measured("0.039", "0.024"), Measured("0.02", "1.2e-03"), "5/5", "0.125"),
+        ("0 kg", "IO-WBC", MeanCell("0.039", "0.024"), MeanCell("0.02", "1.2e-03"), "5/5", "0.125"),
         ("0 kg", "stands still", "0.047", "0.017", "–", "–"),
     ],
     pd.DataFrame(),

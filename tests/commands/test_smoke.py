@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from local_nodes import local_nodes
 from network_watch import watched
 from ray_processes import HEALTH, below, holds_an_actor, kill, kill_a_node, nodes
 
@@ -61,13 +62,26 @@ def test_a_sweep_of_it_on_ray_outlives_a_node_with_the_same_results(smoke: Path,
     pytest.importorskip("ray", reason="the extra `cluster` brings Ray")
     words = [sys.executable, "-m", "iowbc", "sweep", "smoke", "--set", f"seed=0..{POINTS - 1}", *UNTRACKED]
     words += ["--until", SWEPT[-1], "--set", "execution.copy_files=true", "--set", "execution.rollout_actors=2"]
-    words += ["--engine", "ray", "--address", "local:3", "--jobs", str(POINTS)]
+    words += ["--engine", "ray", "--jobs", str(POINTS), "--address"]
     said = tmp_path / "said.txt"
-    with said.open("wb") as output:
-        sweep = subprocess.Popen(words, cwd=tmp_path, env=os.environ | HEALTH, stdout=output, stderr=output)
+    with local_nodes([1, 1, 1]) as address, said.open("wb") as output:
+        command = [*words, address]
+        sweep = subprocess.Popen(command, cwd=tmp_path, env=os.environ | HEALTH, stdout=output, stderr=output)
+        outlives_a_node(sweep, said)
+    logs = [log.read_text() for log in tmp_path.glob("runs/sweeps/*/logs/*.log")]
+    assert any("was lost" in log for log in logs), "the node had work"
+    alone, swept = results(smoke), results(tmp_path)
+    assert len(swept) == POINTS * len(SWEPT)
+    assert {stage for stage, _ in alone.keys() - swept.keys()} == {"eval", "export"}
+    for key in alone.keys() & swept.keys():
+        assert swept[key] == alone[key], key
+
+
+def outlives_a_node(sweep: "subprocess.Popen[bytes]", said: Path) -> None:
+    """Kills a node on which a rollout actor works, and waits for the end."""
     try:
         limit = time.monotonic() + PATIENCE
-        while not (found := [node for node in nodes(sweep.pid) if holds_an_actor(node)]):
+        while not (found := [node for node in nodes(os.getpid()) if holds_an_actor(node)]):
             assert sweep.poll() is None, said.read_text()
             assert time.monotonic() < limit, "no training has begun"
             time.sleep(0.1)
@@ -76,13 +90,6 @@ def test_a_sweep_of_it_on_ray_outlives_a_node_with_the_same_results(smoke: Path,
     finally:
         kill(below(sweep.pid))
         sweep.kill()
-    logs = [log.read_text() for log in tmp_path.glob("runs/sweeps/*/logs/*.log")]
-    assert any("was lost" in log for log in logs), "the node had work"
-    alone, swept = results(smoke), results(tmp_path)
-    assert len(swept) == POINTS * len(SWEPT)
-    assert {stage for stage, _ in alone.keys() - swept.keys()} == {"eval", "export"}
-    for key in alone.keys() & swept.keys():
-        assert swept[key] == alone[key], key
 
 
 def results(folder: Path) -> dict[tuple[str, str], str]:

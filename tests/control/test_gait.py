@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from iowbc.control import gait
-from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.control.sensors import Measured
+from iowbc.recipe.task.joint_references import GaitPrior, Recovery
 
 PRIOR = GaitPrior(frequency=1.0, stance=0.6)
 DT = 0.02
@@ -71,3 +72,20 @@ def test_small_commands_ask_for_no_steps() -> None:
     command = np.zeros((3, 11))
     command[1, 0], command[2, 2] = 0.3, -0.3
     assert gait.wants_to_move(command, PRIOR).tolist() == [False, True, True]
+
+
+def sensed(pitch: float, roll: float, rate: tuple[float, float, float]) -> Measured:
+    """Of one robot that leans forward and to the right [rad], turning at a rate [rad/s]."""
+    gravity = np.array([[np.sin(pitch), -np.sin(roll) * np.cos(pitch), -np.cos(roll) * np.cos(pitch)]])
+    joints = np.zeros((1, 29))
+    return Measured(gravity, np.array([rate]), np.zeros((1, 1)), joints, joints)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_standing_robot_steps_when_it_tips_over_and_not_when_it_bows(side: float) -> None:
+    recovery, bowed = Recovery(tilt=0.1, horizon=0.25), np.array([0.4])
+    assert not gait.is_falling(sensed(0.4, 0.0, (0.0, 0.0, 0.0)), bowed, recovery)
+    assert gait.is_falling(sensed(0.4 + side * 0.13, 0.0, (0.0, 0.0, 0.0)), bowed, recovery)
+    assert gait.is_falling(sensed(0.4, side * 0.11, (0.0, 0.0, 0.0)), bowed, recovery)
+    assert gait.is_falling(sensed(0.4, 0.0, (side * 0.5, 0.0, 0.0)), bowed, recovery)
+    assert not gait.is_falling(sensed(0.4, side * 0.11, (-side * 0.5, 0.0, 0.0)), bowed, recovery)

@@ -7,7 +7,7 @@ import pytest
 from made_up_trials import DT, trace
 
 from iowbc.evaluation.trials.feet import foot_metrics, runs
-from iowbc.evaluation.trials.load import load_metrics
+from iowbc.evaluation.trials.interaction import load_metrics
 
 
 def test_only_loaded_feet_slip() -> None:

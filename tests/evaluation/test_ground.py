@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_up_trials import DT, trace
 
-from iowbc.evaluation.trials.ground import ground_metrics
+from iowbc.evaluation.trials.feet import ground_metrics
 
 
 def test_the_touchdown_speed_of_a_sine_is_its_slope_where_it_ends() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_up_trials import DT, trace
 
-from iowbc.evaluation.trials.interaction import Push, interaction_metrics, push_metrics
+from iowbc.evaluation.trials.interaction import interaction_metrics, push_metrics
 from iowbc.evaluation.trials.trace import Trace
 
 WINDOW = 40
@@ -57,7 +57,7 @@ def pushing(along: float, commanded: float = 1.0, **signals: np.ndarray) -> dict
     grip, directions = np.zeros((400, 6)), np.zeros((500, 2))
     grip[200:, [1, 4]] = -0.5 * along
     directions[200:, 1] = commanded
-    return push_metrics(holding(grip_force=grip, **signals), directions, 10, Push(0.5, 1000.0, 0.5))
+    return push_metrics(holding(grip_force=grip, **signals), directions, 10, 0.5, 1000.0, 0.5)
 
 
 def test_a_push_is_held_against_what_friction_allows() -> None:
@@ -70,8 +70,8 @@ def test_a_push_is_held_against_what_friction_allows() -> None:
 def test_a_crate_that_resists_less_than_friction_is_pushed_with_less() -> None:
     signals = holding(grip_force=np.tile([-20.0, 0.0, 0.0, -20.0, 0.0, 0.0], (400, 1)))
     ahead = np.tile([1.0, 0.0], (400, 1))
-    assert push_metrics(signals, ahead, 10, Push(0.5, 60.0, 0.5))["push_force_share"] == 1.0
-    assert push_metrics(signals, ahead, 10, Push(0.5, 100.0, 0.5))["push_force_share"] == 0.0
+    assert push_metrics(signals, ahead, 10, 0.5, 60.0, 0.5)["push_force_share"] == 1.0
+    assert push_metrics(signals, ahead, 10, 0.5, 100.0, 0.5)["push_force_share"] == 0.0
 
 
 def test_a_statue_pushes_nothing_and_who_is_not_told_to_push_is_not_measured() -> None:

@@ -6,9 +6,8 @@ import pytest
 from made_up_trials import trials_of
 
 from iowbc.evaluation.report.aggregate import TRAINING, aggregate
-from iowbc.evaluation.report.beside_paper import paper_table
 from iowbc.evaluation.report.differences import difference_table, paired
-from iowbc.evaluation.report.error_tables import error_table
+from iowbc.evaluation.report.error_tables import error_table, paper_table
 from iowbc.evaluation.report.interquartile import blocks, figures, improvement, interquartile_table
 from iowbc.evaluation.report.report import report_tables
 from iowbc.evaluation.report.statistics import interquartile_mean, percentile_interval
@@ -37,9 +36,10 @@ def test_an_interval_may_reach_to_infinity_without_becoming_no_number() -> None:
 def test_all_trainings_play_the_same_masses_and_failures_are_worse_than_any_error() -> None:
     found = blocks(pd.concat([TWO, RIVAL], ignore_index=True))
     assert list(found) == ["IO-WBC", "WBC"]
-    assert found["IO-WBC"].trainings == ("0", "1")
-    assert found["IO-WBC"].values.shape == (2, 2, 5, 6), "8 kg is the rival's alone"
-    assert np.isinf(found["WBC"].values[0, 1, 1:, 1:]).all()
+    assert {seed: values.shape for seed, values in found["IO-WBC"].items()} == {"0": (2, 5, 6), "1": (2, 5, 6)}, (
+        "8 kg is the rival's alone"
+    )
+    assert np.isinf(found["WBC"]["0"][1, 1:, 1:]).all()
     estimates = figures(found["WBC"])
     assert estimates["success"].value == pytest.approx(0.6)
     assert np.isinf(estimates["E_alpha"].value), "four of ten trials were not survived"
@@ -47,7 +47,7 @@ def test_all_trainings_play_the_same_masses_and_failures_are_worse_than_any_erro
 
 def test_the_interval_of_two_trainings_spans_both() -> None:
     found = blocks(TWO)["IO-WBC"]
-    alone = [figures(found.alone(place))["E_alpha"] for place in range(2)]
+    alone = [figures({seed: values})["E_alpha"] for seed, values in found.items()]
     both = figures(found)["E_alpha"]
     assert [one.value for one in alone] == pytest.approx([0.3, 0.4])
     assert both.value == pytest.approx(0.35)

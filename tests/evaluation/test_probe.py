@@ -10,27 +10,35 @@ import torch
 from numpy.typing import NDArray
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.probe.readings import HISTORY, LATENT, NEWEST, PRIVILEGED, Listener, Readings, gathered
-from iowbc.evaluation.probe.regression import inferred_masses
+from iowbc.evaluation.probe import (
+    HISTORY,
+    LATENT,
+    NEWEST,
+    PRIVILEGED,
+    Listener,
+    ProbeReadings,
+    gathered,
+    inferred_masses,
+)
 from iowbc.evaluation.report.probe import figures_of, probe_figure, probe_table, write_probe
 from iowbc.evaluation.report.statistics import determination, determination_interval
 from iowbc.learning.acting import StudentPolicy, TeacherPolicy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 
-RANDOM = np.random.default_rng(0)
 KINDS = ("md", "tex", "csv", "json", "png")
 TRIALS, MOMENTS = 60, 6
 
 
-def readings() -> Readings:
+def readings() -> ProbeReadings:
     """Trials of 1 to 10 kg in which a sensor shows the mass with an error of 0.5 kg, and others name the trial."""
     trial = np.repeat(np.arange(TRIALS), MOMENTS)
     mass = np.linspace(1.0, 10.0, TRIALS)[trial]
-    names = RANDOM.normal(size=(TRIALS, 5))[trial]
-    shown = mass + RANDOM.normal(scale=0.5, size=len(mass))
+    random = np.random.default_rng(0)
+    names = random.normal(size=(TRIALS, 5))[trial]
+    shown = mass + random.normal(scale=0.5, size=len(mass))
     features = {"sensor": np.column_stack([0.3 * shown - 2.0, names]), "names": names}
     seconds = np.tile(np.arange(MOMENTS) * 0.5, TRIALS)
-    return Readings(
+    return ProbeReadings(
         {name: values.astype(np.float32) for name, values in features.items()}, trial, mass, seconds, seconds > 0
     )
 
@@ -74,8 +82,8 @@ def test_readings_end_with_their_trial_and_settle_with_a_full_history() -> None:
     assert found.settled.tolist() == [False, False, True, True, True]
 
 
-def rows(size: int) -> NDArray[np.float32]:
-    return RANDOM.normal(size=(3, size)).astype(np.float32)
+def rows(size: int, seed: int = 0) -> NDArray[np.float32]:
+    return np.random.default_rng(seed).normal(size=(3, size)).astype(np.float32)
 
 
 def test_a_listener_leaves_the_policy_as_it_is_and_reads_its_latent() -> None:
@@ -84,8 +92,8 @@ def test_a_listener_leaves_the_policy_as_it_is_and_reads_its_latent() -> None:
     listener, alone = Listener(StudentPolicy(network, 4), 3, 2, 25), StudentPolicy(network, 4)
     for policy in (listener, alone):
         policy.reset(np.ones(3, np.bool_))
-    for _ in range(5):
-        observation, privileged = rows(6), rows(7)
+    for moment in range(5):
+        observation, privileged = rows(6, moment), rows(7, moment)
         assert np.array_equal(listener.act(observation, privileged), alone.act(observation, privileged))
     assert len(listener.kept) == 3, "every other step"
     last = listener.kept[-1]
@@ -115,7 +123,7 @@ def test_r_squared_is_that_of_the_textbooks() -> None:
 
 def test_repeating_the_readings_of_a_trial_makes_no_interval_narrower() -> None:
     mass = np.linspace(1.0, 10.0, 30)
-    read, trial = mass + RANDOM.normal(size=30), np.arange(30)
+    read, trial = mass + np.random.default_rng(0).normal(size=30), np.arange(30)
     low, high = determination_interval(mass, read, trial)
     assert low < determination(mass, read) < high
     assert determination_interval(np.tile(mass, 5), np.tile(read, 5), np.tile(trial, 5)) == pytest.approx((low, high))

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from iowbc.control.command import rate_limits
+from iowbc.control.gait import wants_to_move
 from iowbc.evaluation.paper import TABLES
-from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still, given_commands, moving
+from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still, given_commands
 from iowbc.evaluation.trials.plan import command_script
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING, STAGNATION
@@ -22,7 +23,7 @@ def test_a_statue_does_not_beat_the_paper(suite: str, sequence: tuple[Segment, .
     assert script.duration == 20.0
     given = given_commands(script, 1000, DT)
     deviations = deviations_standing_still(given, COMMANDS, DT)
-    for part in (slice(None), moving(given, References().gait)):
+    for part in (slice(None), wants_to_move(given, References().gait)):
         still = deviations.means(part=part)
         for mass, row in TABLES[suite].items():
             paper = dict(zip(ERRORS, row["IO-WBC"] or (), strict=True))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported_policies import read_golden
 from network_watch import watched
 from stage_jobs import make_job
 
@@ -19,9 +20,8 @@ from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, SETTLE, STEP
 from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.acceptance import try_out_network
-from iowbc.evaluation.play import exported_source, play
+from iowbc.evaluation.play import exported_source, play, require_display
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.viewer import require_display
 from iowbc.export import golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import TeacherNetwork
@@ -143,7 +143,7 @@ def test_a_control_step_is_timed_with_nothing_that_a_robot_need_not_have(done: J
 
 
 def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
-    inputs, outputs = golden.read_golden(done.out / GOLDEN)
+    inputs, outputs = read_golden(done.out / GOLDEN)
     assert len(inputs["command"]) == 24
     sessions = (open_session(done.out / name) for name in (SETTLE, STEP))
     found = golden.played(*(partial(run, session) for session in sessions), inputs)
@@ -151,7 +151,7 @@ def test_golden_vectors_let_another_machine_check_the_graph(done: Job) -> None:
 
 
 def test_the_golden_rollout_walks_turns_and_changes_height_and_lean(done: Job) -> None:
-    inputs, _ = golden.read_golden(done.out / GOLDEN)
+    inputs, _ = read_golden(done.out / GOLDEN)
     command = inputs["command"]
     assert abs(command[:, :3]).max(axis=0).min() > 0.05
     assert np.ptp(command[:, 3]) > 0.01

@@ -8,6 +8,7 @@ import numpy as np
 import onnx
 import pytest
 import torch
+from exported_policies import read_golden
 
 from iowbc.control import observation
 from iowbc.control.layout import Part
@@ -16,7 +17,7 @@ from iowbc.deploy.contract import Contract
 from iowbc.deploy.exported_folder import SETTLE, STEP
 from iowbc.deploy.session import open_session, run
 from iowbc.export.folder import write_folder
-from iowbc.export.golden import Values, largest_difference, read_golden, stacked, write_golden
+from iowbc.export.golden import Values, largest_difference, stacked, write_golden
 from iowbc.export.graph import ControllerGraph
 from iowbc.export.onnx_graph import run_torch, write_onnx
 from iowbc.recipe.recipe import Recipe

@@ -6,7 +6,7 @@ import pytest
 import torch
 from point_masses import MIRRORS, PointMasses
 
-from iowbc.learning.side_by_side import SideBySide
+from iowbc.learning.computing import SideBySide
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 

@@ -11,7 +11,7 @@ from iowbc.learning.activations import ACTIVATIONS, PairedActivation
 from iowbc.learning.networks import SymmetricMlp, TeacherNetwork, mirror_as_json
 from iowbc.learning.normalization import SymmetricMeanStd
 from iowbc.learning.policy import ActorCritic
-from iowbc.learning.rollout import Rollout
+from iowbc.learning.rollout import Samples
 from iowbc.learning.symmetric import MirrorBasis, SymmetricLayers
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored, mirror_tensor
 from iowbc.robot.mirror import MirrorMap
@@ -174,8 +174,7 @@ def test_samples_are_shown_or_their_whole_images_but_no_image_that_is_too_unlike
             std_learning_rate=1e-3,
         )
     )
-    rollout = Rollout(2, policy.observation_space, policy.action_space, n_envs=1)
-    rollout.reset()
+    rollout = Samples(2, 1, *policy.observation_space.shape, *policy.action_space.shape)
     rollout.rows.normal_()
     old = rollout.columns
     image = mirror_tensor(ACTION, old["action"][0])

@@ -165,7 +165,7 @@ def test_the_network_that_is_kept_acts_as_the_trained_policy_and_as_its_zip_for_
     raw = np.random.default_rng(0).normal(size=(9, 3)).astype(np.float32)
     own = some.model.policy.get_distribution(torch.from_numpy(raw)).mode()
     torch.testing.assert_close(network(torch.from_numpy(raw)), own, rtol=1e-5, atol=1e-6)
-    some.model.save(tmp_path / "teacher_sb3.zip")
+    some.model.save_for_sb3(tmp_path / "teacher_sb3.zip")
     loaded = PPO.load(tmp_path / "teacher_sb3.zip", device="cpu")
     action, _ = loaded.predict(raw, deterministic=True)
     np.testing.assert_allclose(action, own.detach().numpy().clip(-1, 1), rtol=1e-5, atol=1e-6)
@@ -250,7 +250,7 @@ def test_the_policy_that_acts_in_a_rollout_is_the_one_that_is_judged() -> None:
     for _ in range(3):
         before = some.model.policy.log_std.detach().clone()
         some.update()
-    columns = some.model.rollout_buffer.columns
+    columns = some.model.samples.columns
     noise = (columns["action"] - columns["mean"]) / before.exp()
     assert abs(float(noise.mean())) < 0.2
     assert 0.8 < float(noise.std()) < 1.2

@@ -7,10 +7,9 @@ import pytest
 from point_masses import MIRRORS, PointMasses
 
 from iowbc.errors import Damaged
-from iowbc.learning.acting import policy_of
+from iowbc.learning.acting import policy_of, unfinished_policy
 from iowbc.learning.checkpoint import save_checkpoint
 from iowbc.learning.teacher import TeacherTraining
-from iowbc.learning.unfinished import unfinished_policy
 from iowbc.recipe.teacher import Teacher
 
 KEY = "a key"

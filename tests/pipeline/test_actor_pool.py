@@ -1,6 +1,7 @@
-"""Members on nodes that are busy, lost, slow or hang, on a stand-in for Ray with a clock of its own."""
+"""Members on nodes that are busy or lost, on a stand-in for Ray."""
 
-from collections.abc import Iterator
+import traceback
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,10 +13,9 @@ import ray
 from ray import exceptions
 
 from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
-from iowbc.pipeline.cluster import actor_pool as module
-from iowbc.pipeline.cluster import stragglers
-from iowbc.pipeline.cluster.actor_pool import CORE_PATIENCE, TRIES, ActorHost, NodeActorPool, Origin
-from iowbc.pipeline.cluster.identity import identity
+from iowbc.pipeline.cluster.actor_pool import TRIES, ActorHost, NodeActorPool
+from iowbc.pipeline.cluster.folders import SharedFolder
+from iowbc.pipeline.machine import identity
 
 pytestmark = pytest.mark.unit
 
@@ -43,20 +43,18 @@ class Adder:
 
 @dataclass(eq=False)
 class Call:
-    """What a request of an actor gives, from a moment on; never where its actor hangs."""
+    """What a request of an actor gives, from a moment on."""
 
     actor: "Actor"
     method: str
     arguments: tuple[Any, ...]
-    begun: float | None = None
 
 
 @dataclass(eq=False)
 class Actor:
-    """A holder, on a core of its own unless it asks for none."""
+    """A holder, begun where a core is free."""
 
     holder: ActorHost
-    cores: int
     placed: bool = False
     killed: bool = False
     last: Call | None = None
@@ -73,12 +71,10 @@ class Actor:
 
 @dataclass
 class Nodes:
-    """Ray with so many cores. Each request takes `seconds`, by the number of the actor in the order of being made."""
+    """Ray with so many cores."""
 
     cores: int
-    clock: float = 0.0
     actors: list[Actor] = field(default_factory=list)
-    seconds: dict[int, float] = field(default_factory=dict)
     lost: set[int] = field(default_factory=set)
     """Actors whose node is lost while they are asked."""
 
@@ -87,11 +83,11 @@ class Nodes:
 
         class Options:
             @staticmethod
-            def options(*, num_cpus: int, **settings: Any) -> Any:
+            def options(**settings: Any) -> Any:
                 class Made:
                     @staticmethod
                     def remote(*arguments: Any) -> Actor:
-                        nodes.actors.append(Actor(holder(*arguments), num_cpus))
+                        nodes.actors.append(Actor(holder(*arguments)))
                         return nodes.actors[-1]
 
                 return Made
@@ -99,18 +95,18 @@ class Nodes:
         return Options
 
     def wait(self, calls: list[Call], num_returns: int, timeout: float) -> tuple[list[Call], list[Call]]:
-        self.clock += timeout
         self._place()
-        over = [call for call in calls if self._over(call)]
+        over = [call for call in calls if call.actor.placed]
         return over, [call for call in calls if call not in over]
 
     def get(self, call: Call) -> Any:
         number = self.actors.index(call.actor)
-        if call.method == "host":
-            return f"node{number}"
         if number in self.lost:
             raise exceptions.ActorDiedError()
-        return getattr(call.actor.holder, call.method)(*call.arguments)
+        try:
+            return getattr(call.actor.holder, call.method)(*call.arguments)
+        except Exception as error:
+            raise exceptions.RayTaskError("ask", traceback.format_exc(), error, ip=f"node{number}") from error
 
     def kill(self, actor: Actor) -> None:
         actor.killed = True
@@ -118,16 +114,7 @@ class Nodes:
 
     def _place(self) -> None:
         for actor in self.actors:
-            free = self.cores - sum(one.cores for one in self.actors if one.placed)
-            if not actor.placed and not actor.killed and actor.cores <= free:
-                actor.placed = True
-
-    def _over(self, call: Call) -> bool:
-        if not call.actor.placed:
-            return False
-        call.begun = self.clock if call.begun is None else call.begun
-        number = self.actors.index(call.actor)
-        return call.method == "host" or self.clock - call.begun >= self.seconds.get(number, 0.0)
+            actor.placed = not actor.killed and self.cores > 0
 
 
 @dataclass
@@ -135,15 +122,16 @@ class Watch:
     """An actor pool on some nodes, and what it says."""
 
     nodes: Nodes
-    origin: Origin
+    folders: Mapping[str, SharedFolder] = field(default_factory=dict)
     said: list[str] = field(default_factory=list)
     stop: bool = False
 
     def pool(self, *starts: int) -> NodeActorPool:
-        return NodeActorPool("helper", self.origin, [(start,) for start in starts], lambda: self.stop, self.said.append)
+        calls = [(start,) for start in starts]
+        return NodeActorPool("helper", Adder, calls, self.folders, lambda: self.stop, self.said.append)
 
-    def added(self, pool: NodeActorPool, *values: int | str, patience: float = 60.0) -> list[int]:
-        pool.ask(values, patience=patience)
+    def added(self, pool: NodeActorPool, *values: int | str) -> list[int]:
+        pool.ask(values)
         return pool.answers()
 
 
@@ -153,8 +141,7 @@ def watch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watch]:
     nodes = Nodes(2)
     for name in ("remote", "wait", "get", "kill"):
         monkeypatch.setattr(ray, name, getattr(nodes, name))
-    monkeypatch.setattr(module.time, "monotonic", lambda: nodes.clock)
-    return Watch(nodes, Origin(identity(), Adder, {}, copy=False))
+    return Watch(nodes)
 
 
 def test_members_answer_in_order_and_go_on_from_what_they_were(watch: Watch) -> None:
@@ -167,37 +154,12 @@ def test_members_answer_in_order_and_go_on_from_what_they_were(watch: Watch) -> 
     assert all(actor.killed for actor in watch.nodes.actors)
 
 
-def test_who_finds_no_core_shares_one_after_a_while(watch: Watch) -> None:
-    pool = watch.pool(10, 20, 30)
-    assert watch.added(pool, 1, 2, 3) == [11, 22, 33]
-    assert watch.nodes.clock == pytest.approx(CORE_PATIENCE, abs=1.0)
-    assert watch.said == ["1 of 3 helpers find no core of their own, and share one"]
-    assert [actor.cores for actor in watch.nodes.actors if not actor.killed] == [1, 1, 0]
-
-
 def test_a_lost_member_goes_on_elsewhere_from_its_last_state(watch: Watch) -> None:
     pool = watch.pool(10, 20)
     watch.added(pool, 1, 2)
     watch.nodes.lost = {1}
     assert watch.added(pool, 1, 2) == [12, 24]
-    assert watch.said == ["a helper was lost on node1; another one takes its place"]
-
-
-def test_a_member_that_hangs_is_lost_once_its_patience_is_over(watch: Watch) -> None:
-    pool = watch.pool(10, 20)
-    watch.added(pool, 1, 2)
-    before = watch.nodes.clock
-    watch.nodes.seconds = {0: float("inf")}
-    assert watch.added(pool, 1, 2, patience=7.0) == [12, 24]
-    assert watch.nodes.clock - before == pytest.approx(7.0, abs=1.0)
-    assert watch.said == ["a helper was lost on node0; another one takes its place"]
-
-
-def test_one_that_shares_a_core_and_hangs_is_lost_too(watch: Watch) -> None:
-    watch.nodes.cores = 0
-    watch.nodes.seconds = {1: float("inf")}
-    assert watch.added(watch.pool(10), 1, patience=7.0) == [11]
-    assert watch.said[1].startswith("a helper was lost on node1")
+    assert watch.said == ["a helper was lost; another one takes its place"]
 
 
 def test_losses_in_a_row_are_counted_and_the_last_reason_told(watch: Watch) -> None:
@@ -218,14 +180,15 @@ def test_what_a_member_raises_is_told_with_its_place(watch: Watch, request_: str
 
 
 def test_a_node_with_another_version_is_refused_with_both(watch: Watch) -> None:
-    own = watch.origin.driver
-    watch.origin = replace(watch.origin, driver=replace(own, versions={**own.versions, "mujoco": "3.0"}))
+    own = identity()
+    driver = replace(own, versions={**own.versions, "mujoco": "3.0"})
+    watch.folders = {"robot": SharedFolder("", "", (), driver, copy=False)}
     with pytest.raises(WorkerFailed, match=rf"mujoco 3\.0 here, {own.versions['mujoco']} on .*; install the same"):
         watch.added(watch.pool(10), 1)
 
 
 def test_a_stop_ends_the_wait_of_who_has_not_begun(watch: Watch) -> None:
-    watch.stop, watch.nodes.cores = True, 1
+    watch.stop, watch.nodes.cores = True, 0
     with pytest.raises(Interrupted, match="had not begun"):
         watch.added(watch.pool(10, 20), 1, 2)
 
@@ -235,31 +198,3 @@ def test_a_stop_waits_for_who_was_lost_so_that_a_checkpoint_can_be_written(watch
     watch.added(pool, 1, 2)
     watch.stop, watch.nodes.cores, watch.nodes.lost = True, 1, {1}
     assert watch.added(pool, 1, 2) == [12, 24]
-
-
-def test_who_is_slow_is_named_once_for_as_long_as_it_lasts(watch: Watch) -> None:
-    pool = watch.pool(10, 20, 30)
-    watch.nodes.cores = 3
-    watch.nodes.seconds = {0: 2.0, 1: 2.0, 2: 9.0}
-    for _ in range(3):
-        watch.added(pool, 1, 2, 3)
-    assert [text.startswith("helper 3 took 9.") for text in watch.said] == [True], watch.said
-    assert " s on node2, the others 2." in watch.said[0]
-    watch.nodes.seconds = {0: 2.0, 1: 2.0, 2: 2.0}
-    watch.added(pool, 1, 2, 3)
-    watch.nodes.seconds = {0: 2.0, 1: 9.0, 2: 2.0}
-    watch.added(pool, 1, 2, 3)
-    assert [text.split(" took")[0] for text in watch.said] == ["helper 3", "helper 2"]
-
-
-def test_being_made_is_not_being_slow(watch: Watch) -> None:
-    watch.nodes.seconds = {1: 9.0}
-    pool = watch.pool(10, 20)
-    watch.added(pool, 1, 2)
-    assert watch.said == []
-
-
-def test_what_is_short_varies_by_chance() -> None:
-    assert stragglers.straggler("it", "here", 0.5, [0.01, 0.01]) == ""
-    assert stragglers.straggler("it", "here", 10.0, []) == ""
-    assert stragglers.straggler("it", "here", 10.0, [2.0, 2.0, 30.0]) == "it took 10.0 s on here, the others 2.0 s"

@@ -1,6 +1,7 @@
 """A sweep on Ray gives what a local one gives, loses nothing to Ctrl-C or a dead node, and leaves no process behind."""
 
 import json
+import os
 import re
 import signal
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from typing import Any
 
 import psutil
 import pytest
+from local_nodes import local_nodes
 from ray_processes import HEALTH, below, kill, kill_a_node, listens_on, name, nodes, rays
 from workplace import Command, Workplace, until
 
@@ -85,12 +87,13 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
 
 @pytest.mark.timeout(900)
 def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: Sweep, tmp_path: Path) -> None:
-    command = sweep.start("local:2")
-    sweep.wait("teacher: runs on", 2)
-    kill_a_node(nodes(command.process.pid)[0])
-    sweep.wait("was lost", 1)
-    sweep.gate.touch()
-    assert command.finish() == 0, command.errors
+    with local_nodes([1, 1]) as address:
+        command = sweep.start(address)
+        sweep.wait("teacher: runs on", 2)
+        kill_a_node(nodes(os.getpid())[0])
+        sweep.wait("was lost", 1)
+        sweep.gate.touch()
+        assert command.finish() == 0, command.errors
 
     assert sweep.workplace.command(*WORDS, "--runs", "here").code == 0
     stored = {

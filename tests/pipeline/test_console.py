@@ -70,18 +70,10 @@ def test_plain_lines_come_once_in_an_interval() -> None:
     assert stream.getvalue() == "teacher: runs\n"
 
 
-def test_lines_of_progress_tell_how_busy_a_cluster_is_before_it() -> None:
-    stream = io.StringIO()
-    display = PlainDisplay(0.0, stream, lambda: "2 nodes, 3 of 4 cores")
-    view = StageView("teacher", state="runs", done=1.0, total=4.0)
-    display.moved(view)
-    assert stream.getvalue() == "2 nodes, 3 of 4 cores\nteacher: 25 %\n"
-
-
-def drawn(width: int, stopping: str = "", total: float = 1.0, load: str = "") -> str:
+def drawn(width: int, stopping: str = "", total: float = 1.0) -> str:
     """The live table of a run whose teacher has trained 0.4 of a total, as a terminal of this width shows it."""
     console = Console(file=io.StringIO(), force_terminal=True, width=width, record=True)
-    display = LiveTable(console, lambda: stopping, lambda: load)
+    display = LiveTable(console, lambda: stopping)
     views = [StageView("rg-dataset", state="cached", note="published"), StageView("teacher", state="runs")]
     views[1].began = time.monotonic() - 7500.0
     for step in range(1, 9):
@@ -137,11 +129,6 @@ def test_lines_that_are_said_scroll_by_above_the_live_table() -> None:
 
 def test_the_live_table_says_that_it_was_asked_to_stop() -> None:
     assert drawn(80, "SIGINT: stopping at the next checkpoint").splitlines()[-1].startswith("SIGINT")
-
-
-def test_the_live_table_shows_how_busy_a_cluster_is() -> None:
-    last = drawn(80, "SIGINT: stopping", load="2 nodes, 3 of 4 cores").splitlines()[-2:]
-    assert [line.strip() for line in last] == ["2 nodes, 3 of 4 cores", "SIGINT: stopping"]
 
 
 def test_a_stop_that_the_live_table_shows_is_not_written_into_it(capfd: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,7 @@ from iowbc.learning.curves import Curves
 from iowbc.pipeline.planner import planner_for
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Job, Presentation, Stage
-from iowbc.pipeline.step import Options
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe import recipe as recipes
 from iowbc.recipe.reading.loading import load_recipe

@@ -19,7 +19,7 @@ from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.step import Options, Step
+from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.runs import Runs, read_json
 from iowbc.pipeline.store.store import Store
@@ -69,7 +69,7 @@ class Workplace:
         loaded = load_recipe(self.recipe, overrides)
         return planner_for(loaded, self.registry, self.store, self.robot, Options(**options))
 
-    def plan(self, *overrides: str, **options: Any) -> dict[str, Step]:
+    def plan(self, *overrides: str, **options: Any) -> dict[str, StagePlan]:
         return {step.stage.name: step for step in self.planner(*overrides, **options).plan()}
 
     def run(

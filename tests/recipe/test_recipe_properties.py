@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from iowbc.commands.request import Request, prepared
 from iowbc.errors import Problem, RecipeError
 from iowbc.pipeline.nested import flattened
-from iowbc.pipeline.step import Options
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.runs import Runs
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.recipe import Recipe

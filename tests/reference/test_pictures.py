@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from iowbc.reference.labels.checks import MethodComparison
 from iowbc.reference.pictures import figures
 
 
@@ -15,7 +16,7 @@ from iowbc.reference.pictures import figures
 def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Figure]:
     """The figures that were written, by file name."""
     found: dict[str, Figure] = {}
-    monkeypatch.setattr(figures, "_write", lambda figure, path: found.update({path.name: figure}))
+    monkeypatch.setattr(figures, "write_figure", lambda figure, path: found.update({path.name: figure}))
     return found
 
 
@@ -24,17 +25,9 @@ def legend(axes: Any) -> list[str]:
     return [] if shown is None else [text.get_text() for text in shown.get_texts()]
 
 
-def test_the_comparison_with_optimal_control_shows_every_sample_and_its_limit(
-    drawn: dict[str, Figure], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for other in ("_labelled_map", "_rejections", "_physics"):
-        monkeypatch.setattr(figures, other, lambda *given: None)
+def test_the_comparison_with_optimal_control_shows_every_sample_and_its_limit() -> None:
     differences = np.r_[np.linspace(0.001, 0.01, 599), 0.3]
-    plan: Any = SimpleNamespace(recipe=SimpleNamespace(crosscheck=SimpleNamespace(p90_limit=0.02)))
-    check: Any = SimpleNamespace(difference=differences, count=len(differences))
-    nothing: Any = ()
-    figures.dataset_figures(Path(), plan, nothing, nothing, {}, check)
-    (axes,) = drawn["crosscheck.png"].axes
+    (axes,) = figures.crosscheck_figure(MethodComparison(differences, len(differences), {}, []), 0.02).axes
     assert sum(bar.get_height() for bar in axes.patches) == 600, "also the one far beyond the limit"
     assert "600 samples" in axes.get_title()
     (line,) = [line for line in axes.lines if line.get_linestyle() == "--"]
@@ -44,7 +37,7 @@ def test_the_comparison_with_optimal_control_shows_every_sample_and_its_limit(
 
 def test_a_histogram_of_errors_says_how_many_lie_beyond_its_axis() -> None:
     axes = Figure().add_subplot()
-    figures._histogram(axes, np.r_[np.linspace(0.0, 1.0, 999), 50.0], "error [rad]", figures.Limit(0.5, "gate"))
+    figures.histogram(axes, np.r_[np.linspace(0.0, 1.0, 999), 50.0], "error [rad]", (0.5, "gate"))
     (beyond,) = [text.get_text() for text in axes.texts]
     assert beyond.endswith(" beyond, up to 50")
     assert sum(bar.get_height() for bar in axes.patches) + int(beyond.split()[0]) == 1000  # type: ignore[attr-defined]

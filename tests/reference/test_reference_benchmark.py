@@ -6,7 +6,7 @@ from iowbc.benchmarks import reference
 
 
 def test_both_methods_are_measured_for_each_number_of_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reference, "COURSES", {"static": reference.Course(64, 8), "ocp": reference.Course(8, 1)})
+    monkeypatch.setattr(reference, "SAMPLES", {"static": (64, 8), "ocp": (8, 1)})
     lines: list[str] = []
     figures = reference.main(workers=(1,), turns=1, say=lines.append)
     assert set(figures) == {f"{method}{name}_1" for method in ("static", "ocp") for name in ("", "_a_core", "_scaling")}

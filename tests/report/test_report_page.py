@@ -98,7 +98,7 @@ def test_learning_curves_of_seeds_are_a_band_and_of_few_points(runs: list[Run]) 
     main, others = learning_panels(grouped(runs), "teacher")
     assert [panel.title for panel in main] == ["reward [1/s]", "score of the check"]
     assert others == []
-    low, high, mean, other = main[0].traces
+    low, high, mean, other = main[0].figure["data"]
     assert (low["line"]["width"], high["fill"], mean["name"], other["name"]) == (
         0,
         "tonexty",
@@ -135,10 +135,10 @@ def test_every_curve_of_a_training_has_a_title_with_its_unit(runs: list[Run]) ->
 
 def test_errors_over_the_mass_have_their_intervals_and_gaps_where_nobody_survived(runs: list[Run]) -> None:
     panels = {panel.title: panel for panel in evaluation_panels(grouped(runs[:1]))}
-    low, _, mean = panels["lifting: E_v [m/s]"].traces
+    low, _, mean = panels["lifting: E_v [m/s]"].figure["data"]
     assert (mean["x"], mean["y"]) == ([0.0, 4.0], [1.0, None])
     assert (low["x"], low["y"]) == ([0.0], [0.99])
-    assert panels["lifting: success rate"].traces[2]["y"] == [1.0, 0.8]
+    assert panels["lifting: success rate"].figure["data"][2]["y"] == [1.0, 0.8]
     assert {panel.figure["layout"]["yaxis"]["rangemode"] for panel in panels.values()} == {"tozero"}
 
 
@@ -148,7 +148,7 @@ def test_a_mean_over_one_trial_has_no_band_and_no_interval_of_an_error_is_below_
         "suite,case,mass,E_v,E_v_half\n" + "".join(f"push,push,{mass},{mean},{half}\n" for mass, mean, half in rows)
     )
     panels = {panel.title: panel for panel in evaluation_panels(grouped(runs[:1]))}
-    *bands, mean_line = panels["push: E_v [m/s]"].traces
+    *bands, mean_line = panels["push: E_v [m/s]"].figure["data"]
     assert mean_line["y"] == [0.1, 0.1, 0.3, 0.2]
     assert [(edge["x"], edge["y"]) for edge in bands] == [
         ([0.0, 1.0], [0.0, 0.05]),

@@ -8,7 +8,6 @@ import torch
 from gymnasium import spaces
 
 from iowbc.learning.as_numpy import acting_policy, student_policy, teacher_policy
-from iowbc.learning.encoders import ENCODERS, EncoderName
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
 from iowbc.learning.policy import ActorCritic
 from iowbc.robot.mirror import MirrorMap
@@ -47,9 +46,8 @@ def test_a_teacher_in_numpy_acts_as_its_network(symmetric: bool, activation: str
 
 
 @pytest.mark.parametrize("told", [None, TOLD])
-@pytest.mark.parametrize("encoder", list(ENCODERS))
 @pytest.mark.parametrize("symmetric", [False, True])
-def test_a_student_in_numpy_acts_as_its_network(symmetric: bool, encoder: EncoderName, told: MirrorMap | None) -> None:
+def test_a_student_in_numpy_acts_as_its_network(symmetric: bool, told: MirrorMap | None) -> None:
     sizes = {"observation": 4, "actions": 3, "frame_features": 8, "latent": 12, "hidden": [16], "clip": 2.0}
     privileged = None if told is None else mirror_as_json(told)
     for length in (1, 6, 25):
@@ -57,7 +55,6 @@ def test_a_student_in_numpy_acts_as_its_network(symmetric: bool, encoder: Encode
             **sizes,
             history=length,
             activation="elu",
-            encoder=encoder,
             mirrors=mirrors(symmetric),
             privileged=privileged,
         )

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.rollouts.encoders import Whole
-from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
-from iowbc.rollouts.policies import HistoryPolicy, RowPolicy
+from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal, RowPolicy
 from iowbc.rollouts.rollout_policies import DaggerPolicy, ExploringPolicy, Past, RolloutPolicy
 
 ENVIRONMENTS, LENGTH, STATE, TOLD, ACTIONS, BLOCK, STEPS = 10, 4, 3, 2, 2, 2, 6
@@ -30,13 +28,13 @@ def scale(size: int) -> Normal:
     return Normal(normal(size), np.ones(size, np.float32), 5.0)
 
 
-TEACHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
-OTHER = RowPolicy(scale(STATE + TOLD), Perceptron((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
+TEACHER = RowPolicy(scale(STATE + TOLD), Layers((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
+OTHER = RowPolicy(scale(STATE + TOLD), Layers((linear(STATE + TOLD, 8), linear(8, ACTIONS)), "tanh"))
 STUDENT = HistoryPolicy(
     scale(STATE),
-    Whole(linear(STATE, 4), linear(4 * LENGTH, 6), "elu"),
+    HistoryEncoder(linear(STATE, 4), linear(4 * LENGTH, 6), "elu"),
     None,
-    Perceptron((linear(STATE + 6, 8), linear(8, ACTIONS)), "relu"),
+    Layers((linear(STATE + 6, 8), linear(8, ACTIONS)), "relu"),
 )
 ROWS, ENDS = normal(STEPS + 1, ENVIRONMENTS, STATE + TOLD), np.random.default_rng(0).random((STEPS, ENVIRONMENTS)) < 0.3
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import psutil
+from local_nodes import connected_nodes
 from stage_jobs import make_job
 from training_jobs import small_recipe
 
-from iowbc.pipeline.cluster.cluster import begun_here
 from iowbc.recipe.execution import Execution
 from iowbc.stages import teacher
 
@@ -24,7 +24,7 @@ def main(folder: Path) -> None:
             psutil.Process(killed[0]).kill()
         return False
 
-    with begun_here([1, 1], copy=True) as cluster:
+    with connected_nodes([1, 1]) as cluster:
         job = make_job(folder, recipe, workers=0, interrupted=after_an_update)
         teacher.STAGE.run(replace(job, spread=cluster.spread([job.robot])))
     print(f"{len(killed)} actors, one of them killed")

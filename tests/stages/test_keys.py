@@ -73,7 +73,7 @@ def other(section: Section, name: str) -> Any:
     value, annotation = getattr(section, name), type(section).model_fields[name].annotation
     choices = get_args(annotation) if get_origin(annotation) is Literal else ()
     if choices:
-        return next(choice for choice in choices if choice != value)
+        return next((choice for choice in choices if choice != value), f"{value}x")
     if isinstance(value, bool):
         return not value
     if isinstance(value, (int, float)):

@@ -1,4 +1,4 @@
-"""`iowbc bench scale` measures one node against two and names its figures."""
+"""`make scale` measures one node against two and names its figures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -6,9 +6,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import scaling
 from stage_jobs import Backwards
-
-from iowbc.stages import scaling
 
 
 def timed(count: int, work: Callable[[], None]) -> scaling.Throughput:
@@ -21,11 +20,11 @@ def test_rates_efficiencies_times_and_sizes_are_named(monkeypatch: pytest.Monkey
     begun: list[int] = []
 
     @contextmanager
-    def here(cores: Sequence[int], *, copy: bool) -> Iterator[Any]:
+    def here(cores: Sequence[int]) -> Iterator[Any]:
         begun.append(len(cores))
         yield SimpleNamespace(spread=lambda paths: Backwards())
 
-    monkeypatch.setattr(scaling, "begun_here", here)
+    monkeypatch.setattr(scaling, "connected_nodes", here)
     monkeypatch.setattr(scaling, "label_everywhere", lambda *words, **settings: None)
     monkeypatch.setattr(scaling, "_timed", timed)
     monkeypatch.setattr(scaling, "SHARES", 1)

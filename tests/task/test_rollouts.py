@@ -15,8 +15,7 @@ from faulty import StepBy
 
 from iowbc.errors import WorkerFailed
 from iowbc.rollouts.blocks import block_size
-from iowbc.rollouts.perceptron import Linear, Normal, Perceptron
-from iowbc.rollouts.policies import RowPolicy
+from iowbc.rollouts.policies import Layers, Linear, Normal, RowPolicy
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 from iowbc.task.vector.messages import GetLevels
@@ -35,7 +34,7 @@ def explorer(env: VectorEnv, steps: int = STEPS) -> ExploringPolicy:
     layers = [Linear(weight, np.zeros(weight.shape[1], np.float32)) for weight in weights]
     normal = Normal(np.zeros(sizes[0], np.float32), np.ones(sizes[0], np.float32), 10.0)
     noise = 0.3 * random.normal(size=(steps, env.num_envs, 15)).astype(np.float32)
-    return ExploringPolicy(RowPolicy(normal, Perceptron(tuple(layers), "elu")), noise, block_size(env.num_envs))
+    return ExploringPolicy(RowPolicy(normal, Layers(tuple(layers), "elu")), noise, block_size(env.num_envs))
 
 
 def same(first: Trajectories, second: Trajectories) -> bool:

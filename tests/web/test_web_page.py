@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported_policies import read_golden
 from numpy.typing import NDArray
 
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import GOLDEN, exported_folder
 from iowbc.evaluation.exported import exported_world
-from iowbc.export.golden import read_golden
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.web.page import write_page

@@ -1,6 +1,5 @@
 """From the long table of trials to one row for each variant, suite, case and mass."""
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -67,9 +66,10 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
         "suite": list(dict.fromkeys(trials["suite"])),
         "case": list(dict.fromkeys(trials["case"])),
     }
-    places = {f"_{name}": table[name].map({value: place for place, value in enumerate(ranks[name])}) for name in ranks}
-    order = table.assign(**places).sort_values(["_suite", "_case", "mass", "impulse", "_variant"])
-    return order.drop(columns=list(places)).reset_index(drop=True)
+    order = ["suite", "case", "mass", "impulse", "variant"]
+    return table.sort_values(
+        order, key=lambda values: values.map(ranks[values.name].index) if values.name in ranks else values
+    ).reset_index(drop=True)
 
 
 def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
@@ -93,20 +93,17 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
         "rate_high": high,
     }
     for name in ALL_ERRORS:
-        told = survivors[[WORLD, name]].dropna()
-        row[name] = float(told[name].mean()) if len(told) else np.nan
-        row[f"{name}_half"] = mean_half_width(told[name].to_numpy(np.float64), told[WORLD].to_numpy())
+        known = survivors[[WORLD, name]].dropna()
+        row[name] = float(known[name].mean())
+        row[f"{name}_half"] = mean_half_width(known[name].to_numpy(np.float64), known[WORLD].to_numpy())
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
     joints = [name for name in group.columns if name.startswith(JOINT_COSTS)]
-    for name in (*COSTS, *joints):
-        row[name] = float(survivors[name].mean()) if len(survivors) else np.nan
-    by_joint = {name: float(row[name]) for name in joints if name.startswith(TORQUE)}
+    row |= survivors[[*COSTS, *joints]].mean().to_dict()
+    by_joint = {name: row[name] for name in joints if name.startswith(TORQUE)}
     worst = max(by_joint, key=lambda name: by_joint[name], default="")
-    row[TORQUE] = by_joint.get(worst, np.nan)
-    row[f"{TORQUE}_joint"] = worst.removeprefix(f"{TORQUE}/")
-    for name in (*WAYS, *FORCES, *STILL):
-        row[name] = float(group[name].mean())
-    return row | {name: group[name].iloc[0] for name in SETTINGS}
+    row |= {TORQUE: by_joint.get(worst, np.nan), f"{TORQUE}_joint": worst.removeprefix(f"{TORQUE}/")}
+    row |= group[[*WAYS, *FORCES, *STILL]].mean().to_dict() | group[[*SETTINGS]].iloc[0].to_dict()
+    return row
 
 
 def with_trainings(trials: pd.DataFrame) -> pd.DataFrame:
@@ -116,12 +113,13 @@ def with_trainings(trials: pd.DataFrame) -> pd.DataFrame:
 
 def variants_of(trials: pd.DataFrame) -> list[str]:
     """Variants in the paper's order, then any others in order of appearance."""
-    present: Iterable[str] = dict.fromkeys(trials["variant"])
-    return sorted(present, key=lambda name: VARIANTS.index(name) if name in VARIANTS else len(VARIANTS))
+    return sorted(
+        dict.fromkeys(trials["variant"]), key=lambda name: VARIANTS.index(name) if name in VARIANTS else len(VARIANTS)
+    )
 
 
 def asks_for_steps(rows: pd.DataFrame) -> bool:
-    """Whether any of these trials commands steps, as the paper's do: errors of standing are not to be held against its
+    """Steps are commanded in any of these trials, as in the paper's: errors of standing are not to be held against its
     errors of walking."""
     return bool(rows["still_E_v_moving"].notna().any())
 

@@ -1,8 +1,14 @@
-"""How much a variant withstands: the largest load, or push, up to which it succeeds."""
+"""The largest load, or push, up to which a variant succeeds: figures and tables."""
 
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
+
+from iowbc.evaluation.report.aggregate import suites_of, variants_of
+from iowbc.evaluation.report.columns import STANDS_STILL
+from iowbc.evaluation.report.error_tables import SWEPT
+from iowbc.results.table import ABSENT, Table, heads
 
 
 @dataclass(frozen=True)
@@ -14,7 +20,7 @@ class Capacity:
     smallest: float
     """That was tried."""
     open_ended: bool
-    """Whether it is also the largest that was tried, so that the true one may be larger."""
+    """True where it is also the largest that was tried, so that the true one may be larger."""
 
     def text(self, unit: str) -> str:
         """As it stands in a table."""
@@ -23,25 +29,71 @@ class Capacity:
         return f"{'≥ ' if self.open_ended else ''}{self.value:g} {unit}"
 
 
-def capacity(rows: pd.DataFrame, by: str, rate: float) -> Capacity | None:
-    """The capacity in rows of a summary along a column, "mass" or "impulse"; None where there are no rows."""
-    if rows.empty:
-        return None
-    ordered = rows.sort_values(by)
-    passed = (ordered["rate"] >= rate).cummin()
-    values = ordered.loc[passed, by]
-    value = float(values.iloc[-1]) if len(values) else None
-    return Capacity(value, float(ordered[by].iloc[0]), bool(passed.all()))
+Capacities = dict[str, dict[str, Capacity]]
+"""By variant, then by suite or direction; only those that were played."""
 
 
-def load_capacity(summary: pd.DataFrame, suite: str, variant: str, rate: float) -> Capacity | None:
-    """The largest mass of a sweep [kg] up to which every mass of an object reached the success rate; None if it was not
-    played."""
-    loaded = (summary["suite"] == suite) & (summary["variant"] == variant) & (summary["case"] == suite)
-    return capacity(summary[loaded], "mass", rate)
+def load_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
+    """The largest mass of each sweep [kg] up to which every mass of an object reached the success rate."""
+    return _capacities(summary[summary["kind"].isin(SWEPT) & (summary["case"] == summary["suite"])], "mass", rate)
 
 
-def push_capacity(summary: pd.DataFrame, direction: str, variant: str, rate: float) -> Capacity | None:
-    """The largest impulse on the base in a direction [N·s] up to which every one was survived at the rate, or None."""
-    chosen = (summary["kind"] == "pushes") & (summary["case"] == direction) & (summary["variant"] == variant)
-    return capacity(summary[chosen], "impulse", rate)
+def push_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
+    """The largest impulse on the base in each direction [N·s] up to which every one was survived at the rate."""
+    return _capacities(summary[summary["kind"] == "pushes"], "impulse", rate)
+
+
+def _capacities(rows: pd.DataFrame, by: str, rate: float) -> Capacities:
+    found: Capacities = {variant: {} for variant in variants_of(rows)}
+    for (variant, case), own in rows.groupby(["variant", "case"], sort=False):
+        ordered = own.sort_values(by)
+        passed = (ordered["rate"] >= rate).cummin()
+        values = ordered.loc[passed, by]
+        value = float(values.iloc[-1]) if len(values) else None
+        found[variant][case] = Capacity(value, float(ordered[by].iloc[0]), bool(passed.all()))
+    return found
+
+
+def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
+    """The largest mass that each variant carries and pushes with the success rate asked for."""
+    suites = suites_of(summary, *SWEPT)
+    asked = [(summary.loc[summary["suite"] == suite, "commanded_distance"] > 0).any() for suite in suites]
+    caption = (
+        f"Load capacity: the largest mass up to which every mass reached {100 * rate:.0f} % success; "
+        "≥ where the heaviest tried did. In simulation."
+    )
+    still = (STANDS_STILL, *("none" if one else ABSENT for one in asked))
+    nothing: Capacities = {variant: {} for variant in variants_of(summary)}
+    found = nothing | load_capacities(summary, rate)
+    return _table("capacity", caption, found, {suite: suite.capitalize() for suite in suites}, "kg", [still])
+
+
+def push_table(summary: pd.DataFrame, rate: float) -> Table:
+    """The largest impulse on the base that each variant survives, by direction."""
+    pushes = summary[summary["kind"] == "pushes"]
+    caption = (
+        f"Impulse on the base survived with {float(pushes['mass'].iloc[0]):g} kg in the hands, by its direction, while "
+        f"standing or walking: the largest up to which every one tried reached {100 * rate:.0f} % survival and a walk "
+        "after it. In simulation, without a partner."
+    )
+    directions = {str(case): str(case) for case in dict.fromkeys(pushes["case"])}
+    return _table("pushes", caption, push_capacities(summary, rate), directions, "N·s", [])
+
+
+def _table(
+    name: str, caption: str, found: Capacities, columns: dict[str, str], unit: str, last: list[tuple[str, ...]]
+) -> Table:
+    """A row for each variant; `columns`: heads by suite or direction."""
+    rows = [
+        (variant, *(own[case].text(unit) if case in own else ABSENT for case in columns))
+        for variant, own in found.items()
+    ]
+    numbers = [
+        {"variant": variant, "of": case, "value": np.nan if own[case].value is None else own[case].value}
+        | {"open": own[case].open_ended}
+        for variant, own in found.items()
+        for case in columns
+        if case in own
+    ]
+    frame = pd.DataFrame(numbers, columns=["variant", "of", "value", "open"])
+    return Table(name, caption, heads("Variant", *columns.values()), [*rows, *last], frame, grouped=False)

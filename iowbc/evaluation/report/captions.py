@@ -1,4 +1,4 @@
-"""What has to be said beside a table: load, partner, friction, what the height is, how E_v was averaged, and where."""
+"""Sentences of captions: partner, friction, trainings, meaning of the height, averaging of E_v."""
 
 import numpy as np
 import pandas as pd
@@ -11,21 +11,19 @@ HEIGHTS = {"pelvis": "the pelvis above the ground", "com": "the robot's centre o
 
 def conditions(rows: pd.DataFrame) -> str:
     """The conditions of the trials in rows of a summary, in a sentence or two."""
-    said = ["In simulation", partner(rows)]
-    if (rows["kind"] == "pushing").any():
-        said.append(rolling_resistance(rows))
-    return ", ".join(said) + "." + trainings(rows)
+    rolling = f", {rolling_resistance(rows)}" if (rows["kind"] == "pushing").any() else ""
+    return f"In simulation, {partner(rows)}{rolling}.{trainings(rows)}"
 
 
 def trainings(rows: pd.DataFrame) -> str:
-    """Which variants were trained more than once."""
+    """The variants that were trained more than once."""
     several = rows[rows["trainings"] > 1].groupby("variant", sort=False)["trainings"].max()
-    told = ", ".join(f"{variant}: {count} trainings" for variant, count in several.items())
-    return f" Trials of all trainings together ({told})." if told else ""
+    counts = ", ".join(f"{variant}: {count} trainings" for variant, count in several.items())
+    return f" Trials of all trainings together ({counts})." if counts else ""
 
 
 def measures(rows: pd.DataFrame) -> str:
-    """How the errors were measured."""
+    """Measurement of the errors."""
     first = rows.iloc[0]
     return (
         f"Errors against the command as given; height is that of {HEIGHTS[str(first['height'])]}; "
@@ -34,14 +32,14 @@ def measures(rows: pd.DataFrame) -> str:
 
 
 def in_common(rows: pd.DataFrame) -> str:
-    """What trials of several suites have in common, and how their errors were measured."""
+    """The conditions that trials of several suites share, and the measurement of their errors."""
     pushes = rows[rows["kind"] == "pushing"]
     rolling = "" if pushes.empty else f", pushes with {rolling_resistance(pushes)}"
     return f"In simulation{rolling}. {measures(rows)}"
 
 
 def partner(rows: pd.DataFrame) -> str:
-    """Who helps."""
+    """The partner's share."""
     shares = rows["partner_share"].unique()
     if len(shares) > 1:
         return "the partner's share by case"
@@ -57,7 +55,7 @@ def rolling_resistance(rows: pd.DataFrame) -> str:
     return "rolling resistance drawn as in training" if np.isnan(value) else f"rolling resistance μ {value:g}"
 
 
-def regime(summary: pd.DataFrame, row: pd.Series, error: str = "E_v") -> list[str]:
+def regime(summary: pd.DataFrame, row: pd.Series, error: str) -> list[str]:
     """Words beside the paper's `error` at the mass of a row of a summary: that its μ is unknown, and our E_v at the
     same mass where our crates resist so much that they stagnate, as its did. None for other errors, and without load.
     """
@@ -69,8 +67,6 @@ def regime(summary: pd.DataFrame, row: pd.Series, error: str = "E_v") -> list[st
         & (summary["mass"] == row["mass"])
         & (summary["rolling_resistance"] >= STAGNATING)
     ]
-    ours = [
-        f"{FAILS if np.isnan(one['E_v']) else format(one['E_v'], '.3f')} at μ {one['rolling_resistance']:g}"
-        for _, one in alike.iterrows()
-    ]
-    return ["the paper's μ is unknown", *([f"ours in its regime {', '.join(ours)}"] if ours else [])]
+    pairs = zip(alike["E_v"], alike["rolling_resistance"], strict=True)
+    ours = ", ".join(f"{FAILS if np.isnan(own) else format(own, '.3f')} at μ {friction:g}" for own, friction in pairs)
+    return ["the paper's μ is unknown", *([f"ours in its regime {ours}"] if ours else [])]

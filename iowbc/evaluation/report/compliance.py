@@ -1,7 +1,5 @@
 """Tables and figure of the interaction with a partner: forces, work, whose motion is followed, mechanical impedance."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -9,66 +7,83 @@ from matplotlib.figure import Figure
 
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner, trainings
-from iowbc.evaluation.report.error_tables import STANDS_STILL
-from iowbc.evaluation.report.figures import Bars, broken, draw_bars, legend, letter, style_of, tidy
-from iowbc.evaluation.trials.impedance import Apparent, apparent
-from iowbc.results.table import ABSENT, FAILS, Cell, Table, heads, measured
+from iowbc.evaluation.report.columns import SUCCESS, SURVIVED, Entry, by_case, still_error, variant_rows, variant_table
+from iowbc.evaluation.report.figures import draw_bars, finish, line_labels, style_of, tidy
+from iowbc.evaluation.trials.impedance import apparent
+from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
 BLOCKED_BEFORE = {"IO-WBC": (113, 231), "w/o Distill.": (73, 109)}
 """Peak forces of a hand on a blocked crate [N] over the trials of the first published controllers, which were trained
 without a bound on them."""
-SPREAD = ("mean", "p95", "peak")
-FIGURE_SIZE = (11.0, 7.0)
+
+
+def _force(head: str, name: str) -> Entry:
+    def cell(row: pd.Series) -> str:
+        sizes = [float(row[f"{name}_{part}"]) for part in ("mean", "p95", "peak")]
+        return ABSENT if np.isnan(sizes).any() else " / ".join(f"{size:.0f}" for size in sizes)
+
+    return Entry(Column(head), cell)
+
+
+def _velocity(head: str, name: str) -> Entry:
+    still = (lambda rows: ABSENT) if name == "E_v_partner" else lambda rows: still_error(rows, "E_v")
+    return Entry(Column(head), lambda row: measured(row[name], none=ABSENT if row["survived"] else FAILS), still)
+
+
+INTERACTION = (
+    SURVIVED,
+    Entry(Column("Success"), SUCCESS.cell, lambda rows: "none"),
+    _force("Handle force [N]", "handle_force"),
+    _force("Hand force [N]", "hand_force"),
+    Entry(Column("Work on partner [J]"), lambda row: measured(row["partner_work"], form="+.1f")),
+    _velocity("E_v [m/s]", "E_v"),
+    _velocity("E_v raw [m/s]", "E_v_raw"),
+    _velocity("E_v partner [m/s]", "E_v_partner"),
+)
+IMPEDANCE = (
+    SURVIVED,
+    Entry(Column("Impedance [N·s/m]"), lambda row: measured(abs(_value(row)), form=".0f", none=FAILS)),
+    Entry(Column("Phase [°]"), lambda row: measured(np.degrees(np.angle(_value(row))), form="+.0f", none=FAILS)),
+)
+FITTED = (Column("Stiffness [N/m]"), Column("Damping [N·s/m]"), Column("Mass [kg]"))
 
 
 def compliance_table(summary: pd.DataFrame) -> Table:
-    """How each variant gets on with each behaviour of the partner, and before a crate that is blocked."""
+    """Forces, work and errors of each variant with each behaviour of the partner, and before a blocked crate."""
     chosen = summary[summary["kind"] == "compliance"]
-    rows = []
-    for (_, case, mass), group in chosen.groupby(["suite", "case", "mass"], sort=False):
-        name = f"{case} ({mass:g} kg)"
-        rows += [(name, str(row["variant"]), *_interaction(row)) for _, row in group.iterrows()]
-        still = f"{float(group['still_E_v'].mean()):.3f}"
-        rows.append((name, STANDS_STILL, ABSENT, "none", *[ABSENT] * 3, still, still, ABSENT))
-    columns = heads(
-        *("Partner", "Algorithm", "Survived", "Success", "Handle force [N]", "Hand force [N]", "Work on partner [J]"),
-        *("E_v [m/s]", "E_v raw [m/s]", "E_v partner [m/s]"),
-    )
     before = ", ".join(f"{variant} {low} to {high} N" for variant, (low, high) in BLOCKED_BEFORE.items())
     caption = (
         "Interaction with partners of different behaviour. Forces are horizontal: mean / 95th percentile / peak over a "
         "trial, at the partner's handle, and at the hand with more; work: horizontal, done on the partner; means over "
         "all trials up to their end. E_v against the command, averaged over a gait period and raw; E_v partner: "
         "velocity of the handle against the one that the partner intends; means over surviving trials. "
-        f"{FAILS}: none survived. {STANDS_STILL}: what doing nothing scores, from the script. Peak force of a hand on "
+        f"{FAILS}: none survived. stands still: what doing nothing scores, from the script. Peak force of a hand on "
         f"a blocked crate, of the first published controllers: {before}. In simulation, undisturbed, {partner(chosen)}."
         f"{trainings(chosen)}"
     )
-    return Table("compliance", caption, columns, rows, chosen)
+    rows = variant_rows(INTERACTION, by_case(chosen), still=True)
+    return variant_table("compliance", caption, "Partner", INTERACTION, rows, chosen)
 
 
 def impedance_table(summary: pd.DataFrame) -> Table:
     """The mechanical impedance to pulls of each direction and frequency, and mass, spring and damper that have it."""
     chosen = summary[summary["kind"] == "impedance"]
+    entries = (*IMPEDANCE, *(Entry(column, lambda row: ABSENT) for column in FITTED))
     rows: list[tuple[Cell, ...]] = []
     numbers = []
     for direction, within in chosen.groupby("pull_direction", sort=False):
-        for frequency, group in within.groupby("pull_frequency"):
-            rows += [
-                (f"{direction}, {frequency:g} Hz", str(row["variant"]), _survived(row), *_polar(_impedance(row)))
-                for _, row in group.iterrows()
-            ]
-        for variant, found in fits(within):
+        pulls = within.groupby("pull_frequency")
+        rows += variant_rows(entries, [(f"{direction}, {frequency:g} Hz", group) for frequency, group in pulls])
+        for variant in dict.fromkeys(within["variant"]):
+            own = within[(within["variant"] == variant) & within["impedance_real"].notna()]
+            if own.empty:
+                continue
+            values = np.array([_value(row) for _, row in own.iterrows()])
+            found = apparent(own["pull_frequency"].to_numpy(np.float64), values)
             spring = [measured(value, form=".0f") for value in (found.stiffness, found.damping)]
-            rows.append((f"{direction}, all", variant, *[ABSENT] * 3, *spring, measured(found.mass, form=".1f")))
-            numbers.append(
-                {"variant": variant, "pull_direction": direction, "stiffness": found.stiffness}
-                | {"damping": found.damping, "mass_apparent": found.mass}
-            )
-    columns = heads(
-        *("Pull", "Algorithm", "Survived", "Impedance [N·s/m]", "Phase [°]"),
-        *("Stiffness [N/m]", "Damping [N·s/m]", "Mass [kg]"),
-    )
+            rows.append((f"{direction}, all", str(variant), *[ABSENT] * 3, *spring, measured(found.mass, form=".1f")))
+            fit = {"stiffness": found.stiffness, "damping": found.damping, "mass_apparent": found.mass}
+            numbers.append({"variant": variant, "pull_direction": direction} | fit)
     caption = (
         f"Mechanical impedance of the standing robot with an object of {float(chosen['mass'].iloc[0]):g} kg to small "
         "sinusoidal pulls on the object: force over velocity at the frequency of the pull, by least squares, mean over "
@@ -77,65 +92,41 @@ def impedance_table(summary: pd.DataFrame) -> Table:
         f"undisturbed, {partner(chosen)}.{trainings(chosen)}"
     )
     keys = ["variant", "pull_direction"]
-    told = chosen.merge(pd.DataFrame(numbers), how="left", on=keys) if numbers else chosen
-    return Table("impedance", caption, columns, rows, told)
-
-
-def fits(within: pd.DataFrame) -> Iterator[tuple[str, Apparent]]:
-    """Mass, spring and damper of each variant by the rows of one direction, where any trial survived."""
-    for variant, rows in within.groupby("variant", sort=False):
-        told = rows[rows["impedance_real"].notna()]
-        if len(told):
-            values = np.array([_impedance(row) for _, row in told.iterrows()])
-            yield str(variant), apparent(told["pull_frequency"].to_numpy(np.float64), values)
+    fitted = chosen.merge(pd.DataFrame(numbers), how="left", on=keys) if numbers else chosen
+    return variant_table("impedance", caption, "Pull", entries, rows, fitted)
 
 
 def compliance_figure(summary: pd.DataFrame) -> Figure:
     """Forces at handle and hands and the deviation from command and partner by behaviour, and the impedance."""
     behaviours = summary[summary["kind"] == "compliance"]
-    pulls = summary[summary["kind"] == "impedance"]
-    figure = Figure(figsize=FIGURE_SIZE, layout="constrained")
+    figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     panels = list(figure.subplots(2, 2).flat)
-    for axes, column, title in zip(
-        panels,
-        ("handle_force_p95", "hand_force_p95", "E_v_partner"),
-        (
-            "horizontal force at the handle, p95 [N]",
-            "horizontal force at a hand, p95 [N]",
-            "handle against partner [m/s]",
-        ),
-        strict=False,
-    ):
-        _behaviour_bars(axes, behaviours, column)
-        axes.set_title(title)
-    _impedance_curves(panels[3], pulls, variants_of(summary))
-    letter(panels)
-    legend(figure, panels[0] if len(behaviours) else panels[3])
-    figure.suptitle(
-        "forces: means over all trials, whiskers: peaks; (c), (d): over surviving trials, × none", fontsize=9
-    )
-    return figure
+    _behaviour_bars(panels[0], behaviours, "handle_force_p95", "horizontal force at the handle, p95 [N]")
+    _behaviour_bars(panels[1], behaviours, "hand_force_p95", "horizontal force at a hand, p95 [N]")
+    _behaviour_bars(panels[2], behaviours, "E_v_partner", "handle against partner [m/s]")
+    _impedance_curves(panels[3], summary[summary["kind"] == "impedance"], variants_of(summary))
+    title = "forces: means over all trials, whiskers: peaks; (c), (d): over surviving trials, × none"
+    return finish(figure, panels, title, panels[0] if len(behaviours) else panels[3])
 
 
-def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str) -> None:
+def _behaviour_bars(axes: Axes, chosen: pd.DataFrame, column: str, title: str) -> None:
     """A bar for each case with such a figure, or a cross where nobody survived; whiskers up to the peak of a force."""
-    names = [
-        (suite, case, mass)
-        for (suite, case, mass), group in chosen.groupby(["suite", "case", "mass"], sort=False)
-        if group["handle_force_p95" if column == "E_v_partner" else column].notna().any()
-    ]
-    groups = {}
+    axes.set_title(title)
+    keys = ["suite", "case", "mass"]
+    force = column.endswith("_p95")
+    met = chosen[chosen[column if force else "handle_force_p95"].notna()]
+    names = list(dict.fromkeys(met[keys].itertuples(index=False, name=None)))
+    heights, texts, intervals = {}, {}, {}
     for variant in variants_of(chosen):
-        rows = chosen[chosen["variant"] == variant].set_index(["suite", "case", "mass"]).reindex(names)
-        heights = rows[column].to_numpy(np.float64)
-        failed = np.isnan(heights) & (rows["survived"].to_numpy(np.float64) == 0)
-        heights = np.where(failed, 0.0, heights)
-        intervals = None
-        if column.endswith("_p95"):
-            above = rows[column.replace("_p95", "_peak")].to_numpy(np.float64) - heights
-            intervals = np.stack([np.zeros(len(names)), np.nan_to_num(above).clip(0.0)])
-        groups[variant] = Bars(heights, ["×" if none else "" for none in failed], intervals)
-    draw_bars(axes, groups, [f"{broken(case)}\n{mass:g} kg" for _, case, mass in names])
+        rows = chosen[chosen["variant"] == variant].set_index(keys).reindex(names)
+        values = rows[column].to_numpy(np.float64)
+        failed = np.isnan(values) & (rows["survived"].to_numpy(np.float64) == 0)
+        heights[variant] = np.where(failed, 0.0, values)
+        texts[variant] = ["×" if none else "" for none in failed]
+        if force:
+            above = rows[column.replace("_p95", "_peak")].to_numpy(np.float64) - heights[variant]
+            intervals[variant] = np.stack([np.zeros(len(names)), np.nan_to_num(above).clip(0.0)])
+    draw_bars(axes, heights, texts, line_labels([(case, mass) for _, case, mass in names]), intervals)
 
 
 def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> None:
@@ -144,16 +135,8 @@ def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> N
     for (variant, direction), rows in pulls.groupby(["variant", "pull_direction"], sort=False):
         ordered = rows.sort_values("pull_frequency")
         size = np.hypot(ordered["impedance_real"], ordered["impedance_imag"])
-        colour, marker = style_of(str(variant), variants)
-        style = "-" if direction == "forward" else "--"
-        axes.plot(
-            ordered["pull_frequency"],
-            size,
-            color=colour,
-            marker=marker,
-            linestyle=style,
-            label=f"{variant}, {direction}",
-        )
+        style = style_of(str(variant), variants) | {"linestyle": "-" if direction == "forward" else "--"}
+        axes.plot(ordered["pull_frequency"], size, label=f"{variant}, {direction}", **style)
     axes.set_xlabel("frequency of the pull [Hz]")
     tidy(axes)
     if len(pulls):
@@ -164,29 +147,5 @@ def _impedance_curves(axes: Axes, pulls: pd.DataFrame, variants: list[str]) -> N
         axes.legend(fontsize=8, frameon=False)
 
 
-def _interaction(row: pd.Series) -> list[Cell]:
-    forces = [[float(row[f"{name}_{part}"]) for part in SPREAD] for name in ("handle_force", "hand_force")]
-    spreads = [ABSENT if np.isnan(sizes).any() else " / ".join(f"{size:.0f}" for size in sizes) for sizes in forces]
-    none = ABSENT if row["survived"] else FAILS
-    return [
-        _survived(row),
-        f"{row['succeeded']}/{row['trials']}",
-        *spreads,
-        measured(float(row["partner_work"]), form="+.1f"),
-        *(measured(float(row[name]), none=none) for name in ("E_v", "E_v_raw", "E_v_partner")),
-    ]
-
-
-def _survived(row: pd.Series) -> str:
-    return f"{row['survived']}/{row['trials']}"
-
-
-def _impedance(row: pd.Series) -> complex:
+def _value(row: pd.Series) -> complex:
     return complex(row["impedance_real"], row["impedance_imag"])
-
-
-def _polar(value: complex) -> list[str]:
-    """Size and phase of a mean impedance; what it says of spring, damper and mass takes several frequencies."""
-    if np.isnan(value):
-        return [FAILS, FAILS, *[ABSENT] * 3]
-    return [f"{abs(value):.0f}", f"{np.degrees(np.angle(value)):+.0f}", *[ABSENT] * 3]

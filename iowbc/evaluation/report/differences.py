@@ -1,27 +1,26 @@
-"""Whether variants differ: trials of one seed are compared in pairs."""
+"""Differences of variants in pairs of trials of one seed."""
 
 import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.report.aggregate import TRAINING, WORLD, variants_of, with_trainings
 from iowbc.evaluation.report.captions import in_common
-from iowbc.evaluation.report.error_tables import HEADS, STANDS_STILL
+from iowbc.evaluation.report.columns import HEADS, STANDS_STILL
 from iowbc.evaluation.report.statistics import mean_half_width, mean_p, sign_flip_p
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.results.table import ABSENT, Cell, Column, Table, heads, measured
+from iowbc.results.table import ABSENT, Column, Table, heads, measured
 
 PAIR = ["suite", "case", "mass", "impulse", "trial", "training"]
-"""What two trials have in common that meet the same world and commands; the first training of a variant is compared
+"""Columns that two trials share that meet the same world and commands; the first training of a variant is compared
 with the first of the other, and so on."""
 
 
 def paired(trials: pd.DataFrame, variant: str, reference: str) -> pd.DataFrame:
     """The trials of two variants side by side, with the suffixes `_variant` and `_reference`."""
-    columns = [*PAIR, "survived", "succeeded", *ERRORS]
     trials = with_trainings(trials)
     places = trials.groupby("variant")[TRAINING].transform(lambda seeds: pd.factorize(seeds)[0])
-    trials = trials.assign(training=places)
-    own, other = (trials.loc[trials["variant"] == name, columns] for name in (variant, reference))
+    trials = trials.assign(training=places)[["variant", *PAIR, "survived", "succeeded", *ERRORS]]
+    own, other = (trials[trials["variant"] == name].drop(columns="variant") for name in (variant, reference))
     return own.merge(other, on=PAIR, suffixes=("_variant", "_reference"), validate="one_to_one")
 
 
@@ -42,61 +41,51 @@ def success_p(pairs: pd.DataFrame) -> float:
 
 
 def difference_table(trials: pd.DataFrame) -> Table | None:
-    """How each variant differs from the first, over all masses of each suite; None for a single variant."""
+    """Differences of each variant to the first, over all masses of each suite; None for a single variant."""
     reference, *others = variants_of(trials)
     rows, numbers = [], []
-    for suite in dict.fromkeys(trials["suite"]):
-        within = trials[trials["suite"] == suite]
-        for variant in others:
-            pairs = paired(within, variant, reference)
+
+    def add(suite: str, variant: str, first: pd.DataFrame, second: pd.DataFrame, last: str, **figures: object) -> None:
+        """A row of error differences between two sets of columns of the same trials."""
+        found = {name: mean_difference(first[name] - second[name], first[WORLD]) for name in ERRORS}
+        cells = [measured(mean, half, "+.3f", note=f" (p {p:.2g})") for mean, half, p in found.values()]
+        rows.append((suite, variant, str(len(first)), *cells, last))
+        numbers.append({"suite": suite, "variant": variant, "reference": reference, **figures, "both": len(first)})
+        for name, values in found.items():
+            parts = ("", "_half", "_p") if variant != STANDS_STILL else ("",)
+            numbers[-1] |= {f"{name}{part}": value for part, value in zip(parts, values, strict=False)}
+
+    for suite, within in trials.groupby("suite", sort=False):
+        compared = {variant: paired(within, variant, reference) for variant in others}
+        for variant, pairs in compared.items():
             if pairs.empty:
                 continue
             both = pairs[pairs["survived_variant"] & pairs["survived_reference"]]
-            found = {
-                name: mean_difference(both[f"{name}_variant"] - both[f"{name}_reference"], both[WORLD])
-                for name in ERRORS
-            }
-            success = float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean())
-            p = success_p(pairs)
-            cells = [_cell(*found[name]) for name in ERRORS]
-            rows.append((suite, variant, str(len(both)), *cells, f"{100 * success:+.0f} % (p {p:.2g})"))
-            numbers.append(
-                {"suite": suite, "variant": variant, "reference": reference, "pairs": len(pairs), "both": len(both)}
-                | {
-                    f"{name}{part}": value
-                    for name in ERRORS
-                    for part, value in zip(("", "_half", "_p"), found[name], strict=True)
-                }
-                | {"success": success, "success_p": p}
+            own, other = (
+                both.rename(columns={f"{name}_{side}": name for name in ERRORS}) for side in ("variant", "reference")
             )
-        if rows and rows[-1][0] == suite:
+            p, success = (
+                success_p(pairs),
+                float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean()),
+            )
+            add(suite, variant, own, other, f"{100 * success:+.0f} % (p {p:.2g})", pairs=len(pairs))
+            numbers[-1] |= {"success": success, "success_p": p}
+        if any(len(pairs) for pairs in compared.values()):
             survivors = within[(within["variant"] == reference) & within["survived"]]
-            still = {
-                name: mean_difference(survivors[f"still_{name}"] - survivors[name], survivors[WORLD]) for name in ERRORS
-            }
-            rows.append((suite, STANDS_STILL, str(len(survivors)), *(_cell(*still[name]) for name in ERRORS), ABSENT))
-            numbers.append(
-                {"suite": suite, "variant": STANDS_STILL, "reference": reference, "both": len(survivors)}
-                | {name: still[name][0] for name in ERRORS}
-            )
+            still = survivors[[WORLD]].assign(**{name: survivors[f"still_{name}"] for name in ERRORS})
+            add(suite, STANDS_STILL, still, survivors, ABSENT)
     if not rows:
         return None
-    return Table(
-        "differences",
+    caption = (
         f"Differences to {reference} in pairs of trials that met the same world and commands, over all masses of a "
         "suite: errors where both survived, with their 95 % interval and Student's p; success with an exact p. Both "
         "take the worlds as clusters, in each of which all masses and trainings stand or fall together. "
         f"Negative errors are better. No p is corrected for how many there are. {STANDS_STILL}: what doing nothing "
-        f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}",
-        heads(
-            *("Suite", "Algorithm", "Pairs"),
-            *(Column(f"Δ{one.name}", one.unit, rf"$\Delta {one.latex[1:]}") for one in HEADS.values()),
-            Column("Δ success", latex=r"$\Delta$ success"),
-        ),
-        rows,
-        pd.DataFrame(numbers),
+        f"scores, from the script, against the trials that {reference} survived. {in_common(trials)}"
     )
-
-
-def _cell(mean: float, half: float, p: float) -> Cell:
-    return measured(mean, half, "+.3f", note=f" (p {p:.2g})")
+    columns = heads(
+        *("Suite", "Algorithm", "Pairs"),
+        *(Column(f"Δ{one.name}", one.unit, rf"$\Delta {one.latex[1:]}") for one in HEADS.values()),
+        Column("Δ success", latex=r"$\Delta$ success"),
+    )
+    return Table("differences", caption, columns, rows, pd.DataFrame(numbers))

@@ -6,30 +6,31 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.paper import VARIANTS, reported
-from iowbc.evaluation.report.aggregate import asks_for_steps
-from iowbc.evaluation.report.captions import conditions, measures, regime
+from iowbc.evaluation.paper import TABLES, VARIANTS, reported
+from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of
+from iowbc.evaluation.report.captions import conditions, in_common, measures, regime
+from iowbc.evaluation.report.columns import (
+    ERROR_HEADS,
+    HEADS,
+    OUTCOME,
+    RAW,
+    STANDS_STILL,
+    SURVIVED,
+    Entry,
+    by_case,
+    error_entry,
+    still_error,
+    still_row,
+    variant_rows,
+    variant_table,
+)
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.transport import SHORTEST_WAY
-from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measured
+from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
 
-RAW = "E_v_raw"
-"""E_v without the mean over a gait period."""
-TOLD = {
-    "E_alpha": Column("E_α", "rad", r"$E_{\alpha}$"),
-    "E_h": Column("E_h", "m", "$E_{h}$"),
-    "E_v": Column("E_v", "m/s", "$E_{v}$"),
-    RAW: Column("E_v raw", "m/s", "$E_{v}$ raw", "detail"),
-    "E_psi": Column("E_ψ", "rad", r"$E_{\psi}$"),
-}
-"""Columns of the errors with it."""
-HEADS = {name: TOLD[name] for name in ERRORS}
 NUMBERS = {"lifting": "II", "pushing": "III"}
+"""The paper's table of a kind."""
 SWEPT = (*NUMBERS, "squeezing")
 """Kinds of suites that go over masses; the paper has no table of the last."""
-STANDS_STILL = "stands still"
-"""The row of a robot that does nothing, computed from the script: who scores no better has done nothing."""
-ANY_MASS = "any"
 NO_LABELS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -43,50 +44,67 @@ def error_table(
     """
     chosen = summary[summary["suite"] == suite]
     kind = str(chosen["kind"].iloc[0])
-    swept = kind in SWEPT
     known = any(labels.get(str(variant), str(variant)) in VARIANTS for variant in chosen["variant"])
-    with_paper = kind in NUMBERS and known and asks_for_steps(chosen)
-    rows = []
-    for first, group in _groups(chosen, swept):
-        for _, row in group.iterrows():
-            variant = str(row["variant"])
-            theirs = _theirs(summary, row, labels.get(variant, variant)) if with_paper else []
-            rows.append((first, variant, *_errors(row), *_outcome(row), *theirs))
-        if not swept:
-            rows.append((first, STANDS_STILL, *_still(group), *_still_outcome(group)))
-    if swept:
-        nothing = [ABSENT] * len(ERRORS) if with_paper else []
-        rows.append((ANY_MASS, STANDS_STILL, *_still(chosen), *_still_outcome(chosen), *nothing))
-    paper = [Column(f"paper {one.name}", latex=f"paper {one.latex}", role="paper") for one in HEADS.values()]
-    outcome = ("Survived", "Success", "Transport", "Kept", *(paper if with_paper else ()))
-    return Table(
-        name or slug(suite),
-        _caption(chosen, kind, with_paper),
-        heads("Mass" if swept else "Case", "Algorithm", *TOLD.values(), *outcome),
-        rows,
-        _with_papers(chosen, kind, labels) if with_paper else chosen,
-    )
+    beside = kind in NUMBERS and known and asks_for_steps(chosen)
+    entries = [*map(error_entry, ERROR_HEADS), *OUTCOME]
+    entries += [_paper_entry(summary, error, labels) for error in ERRORS] if beside else []
+    rows = with_paper(chosen, labels) if beside else chosen
+    return _by_mass_or_case(name or slug(suite), _caption(chosen, kind, beside), entries, rows)
 
 
 def moving_table(summary: pd.DataFrame, suite: str) -> Table:
     """The errors over the part of the trials in which steps are asked for."""
     chosen = summary[summary["suite"] == suite]
-    swept = str(chosen["kind"].iloc[0]) in SWEPT
-    rows = []
-    for first, group in _groups(chosen, swept):
-        rows += [(first, str(row["variant"]), *_errors(row, "_moving")) for _, row in group.iterrows()]
-        if not swept:
-            rows.append((first, STANDS_STILL, *_still(group, "_moving")))
-    if swept:
-        rows.append((ANY_MASS, STANDS_STILL, *_still(chosen, "_moving")))
-    return Table(
-        f"{slug(suite)}_moving",
+    caption = (
         f"Command tracking errors in {suite} while steps are asked for: means over surviving trials with their "
-        f"95 % interval. {conditions(chosen)} {measures(chosen)}",
-        heads("Mass" if swept else "Case", "Algorithm", *TOLD.values()),
-        rows,
-        chosen,
+        f"95 % interval. {conditions(chosen)} {measures(chosen)}"
     )
+    entries = [error_entry(name, "_moving") for name in ERROR_HEADS]
+    return _by_mass_or_case(f"{slug(suite)}_moving", caption, entries, chosen)
+
+
+def paper_table(summary: pd.DataFrame, labels: Mapping[str, str] = NO_LABELS) -> Table | None:
+    """Every cell of the paper's tables that was played walking: ours, the paper's, and the ratio; None without any.
+
+    labels: the paper's name of variants that go by another one here.
+    """
+    entries = (
+        Entry(Column("Mass"), lambda row: f"{row['mass']:g} kg", lambda rows: "any"),
+        SURVIVED,
+        *(_ratio_entry(summary, name) for name in ERROR_HEADS),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    numbers: list[dict[str, object]] = []
+    for suite in suites_of(summary, *NUMBERS):
+        chosen = with_paper(summary[summary["suite"] == suite], labels)
+        if not asks_for_steps(chosen):
+            continue
+        kind, name = chosen["kind"].iloc[0], f"{NUMBERS[chosen['kind'].iloc[0]]}, {suite}"
+        known = chosen[chosen["variant"].map(lambda variant: labels.get(variant, variant)).isin(VARIANTS)]
+        of_paper = known[known["mass"].isin(TABLES[kind])]
+        of_paper = pd.concat([own for _, own in of_paper.groupby("variant", sort=False)] or [of_paper])
+        found = variant_rows(entries, [(name, of_paper)])
+        rows += [*found, still_row(entries, chosen, name)] if found else []
+        numbers += [
+            {"suite": suite, "variant": row["variant"], "mass": row["mass"], "error": error, "ours": row[error]}
+            | {"paper": row[f"paper_{error}"], "ratio": row[f"ratio_{error}"]}
+            for _, row in of_paper.iterrows()
+            for error in ERRORS
+        ]
+    if not rows:
+        return None
+    frame = pd.DataFrame(numbers)
+    counted = [
+        f"{variant} in {suite} {(own['ours'] <= own['paper']).sum()} of {len(own)}"
+        for (suite, variant), own in frame[frame["paper"].notna()].groupby(["suite", "variant"], sort=False)
+    ]
+    caption = (
+        "Tables II and III cell by cell: ours / the paper's = ratio, means over surviving trials; the paper's are for "
+        f"its own commands. {FAILS}: no trial survived. Cells with a number of the paper's in which ours is at most as "
+        f"large: {', '.join(counted)}. {STANDS_STILL}: what doing nothing scores, from the script. "
+        f"{in_common(summary)}"
+    )
+    return variant_table("paper", caption, "Table", entries, rows, frame)
 
 
 def slug(suite: str) -> str:
@@ -94,99 +112,71 @@ def slug(suite: str) -> str:
     return suite.replace(" ", "_")
 
 
-def _groups(chosen: pd.DataFrame, swept: bool) -> list[tuple[str, pd.DataFrame]]:
-    """The rows of each mass, or case with its mass, with what stands in the first column."""
-    groups = [(str(case), float(mass), group) for (case, mass), group in chosen.groupby(["case", "mass"], sort=False)]
-    by_mass = set(chosen["suite"]) if swept else set()
-    return [
-        (f"{mass:g} kg" if case in by_mass else case if swept else f"{case} ({mass:g} kg)", group)
-        for case, mass, group in groups
-    ]
-
-
-def _errors(row: pd.Series, part: str = "") -> list[Cell]:
-    if not row["survived"]:
-        return [FAILS] * len(TOLD)
-    return [measured(row[f"{name}{part}"], row.get(f"{name}{part}_half", np.nan)) for name in TOLD]
-
-
-def _outcome(row: pd.Series) -> list[str]:
-    ways = (float(row["transport_robot"]), float(row["transport_object"]))
-    share = float(row["weight_in_hands"])
-    in_hands = ABSENT if np.isnan(share) else f"{100 * share:.0f} %"
-    return [
-        f"{row['survived']}/{row['trials']}",
-        f"{row['succeeded']}/{row['trials']}",
-        " / ".join(f"{way:.2f}" for way in ways if not np.isnan(way)) or ABSENT,
-        f"{row['kept']}/{row['pushed']}" if row["pushed"] else in_hands,
-    ]
-
-
-def _still(rows: pd.DataFrame, part: str = "") -> list[Cell]:
-    names = ["E_v" if name == RAW else name for name in TOLD]
-    return [measured(float(rows[f"still_{name}{part}"].mean())) for name in names]
-
-
-def asks_for_transport(rows: pd.DataFrame) -> bool:
-    """Whether any of these trials commands a way that has to be covered."""
-    return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
-
-
-def _still_outcome(rows: pd.DataFrame) -> list[str]:
-    walks = asks_for_transport(rows)
-    return [ABSENT, "none" if walks else ABSENT, "0.00" if walks else ABSENT, ABSENT]
-
-
-def _theirs(summary: pd.DataFrame, row: pd.Series, variant: str) -> list[str]:
-    """The paper's errors, and in brackets ours in parts of them; of pushes with what it does not say."""
-    paper = reported(str(row["kind"]), float(row["mass"]), variant)
-    if paper == "absent":
-        return [ABSENT] * len(ERRORS)
-    if paper is None:
-        return [FAILS] * len(ERRORS)
-    cells = []
-    for name, value in zip(ERRORS, paper, strict=True):
-        ratio = float(row[name]) / value
-        said = ([] if np.isnan(ratio) else [f"{ratio:.2f}"]) + regime(summary, row, name)
-        cells.append(f"{value:.3f} ({'; '.join(said)})" if said else f"{value:.3f}")
-    return cells
-
-
-def _with_papers(chosen: pd.DataFrame, kind: str, labels: Mapping[str, str]) -> pd.DataFrame:
+def with_paper(rows: pd.DataFrame, labels: Mapping[str, str]) -> pd.DataFrame:
     """The numbers with the paper's, `paper_<error>`, and ours in parts of them, `ratio_<error>`; NaN without any."""
     found = [
-        reported(kind, float(row["mass"]), labels.get(row["variant"], row["variant"])) for _, row in chosen.iterrows()
+        reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) for _, row in rows.iterrows()
     ]
     paper = np.array([[np.nan] * len(ERRORS) if one is None or one == "absent" else one for one in found], np.float64)
     columns = {f"paper_{name}": paper[:, place] for place, name in enumerate(ERRORS)}
-    ratios = {f"ratio_{name}": chosen[name].to_numpy(np.float64) / columns[f"paper_{name}"] for name in ERRORS}
-    return chosen.assign(**columns, **ratios)
+    ratios = {f"ratio_{name}": rows[name].to_numpy(np.float64) / columns[f"paper_{name}"] for name in ERRORS}
+    return rows.assign(**columns, **ratios)
+
+
+def _by_mass_or_case(name: str, caption: str, entries: list[Entry], chosen: pd.DataFrame) -> Table:
+    """A table of a suite: by mass with one row of standing still, or by case with one in each."""
+    if str(chosen["kind"].iloc[0]) not in SWEPT:
+        rows = variant_rows(entries, by_case(chosen), still=True)
+        return variant_table(name, caption, "Case", entries, rows, chosen)
+    groups = [
+        (f"{mass:g} kg" if case in set(chosen["suite"]) else str(case), group)
+        for (case, mass), group in chosen.groupby(["case", "mass"], sort=False)
+    ]
+    rows = [*variant_rows(entries, groups), still_row(entries, chosen)]
+    return variant_table(name, caption, "Mass", entries, rows, chosen)
+
+
+def _paper_entry(summary: pd.DataFrame, error: str, labels: Mapping[str, str]) -> Entry:
+    """The paper's error, and in brackets ours in parts of it; of pushes with what it does not say."""
+
+    def cell(row: pd.Series) -> str:
+        value, ratio = row[f"paper_{error}"], row[f"ratio_{error}"]
+        if np.isnan(value):
+            failed = reported(row["kind"], row["mass"], labels.get(row["variant"], row["variant"])) is None
+            return FAILS if failed else ABSENT
+        said = ([] if np.isnan(ratio) else [f"{ratio:.2f}"]) + regime(summary, row, error)
+        return f"{value:.3f} ({'; '.join(said)})" if said else f"{value:.3f}"
+
+    head = HEADS[error]
+    return Entry(Column(f"paper {head.name}", latex=f"paper {head.latex}", role="paper"), cell)
+
+
+def _ratio_entry(summary: pd.DataFrame, error: str) -> Entry:
+    """Ours, the paper's, and ours in parts of it; of an error that the paper does not have ours alone."""
+
+    def cell(row: pd.Series) -> Cell:
+        if error == RAW:
+            return measured(row[error], none=FAILS)
+        ours, theirs = (measured(row[name], none=FAILS) for name in (error, f"paper_{error}"))
+        beside = regime(summary, row, error) if np.isfinite(row[f"paper_{error}"]) else []
+        ratio = measured(row[f"ratio_{error}"], form=".2f")
+        return f"{ours} / {theirs} = {ratio}" + (f" ({'; '.join(beside)})" if beside else "")
+
+    return Entry(ERROR_HEADS[error], cell, lambda rows: still_error(rows, error))
 
 
 def _caption(chosen: pd.DataFrame, kind: str, with_paper: bool) -> str:
+    shares = set(chosen["partner_share"])
+    whom = f"{kind} alone" if shares == {0.0} else f"cooperative {kind}" if min(shares) > 0 else kind
     like = f" (paper's Table {NUMBERS[kind]})" if kind in NUMBERS and asks_for_steps(chosen) else ""
-    title = f"{_with_whom(chosen, kind)}{like}" if kind in SWEPT else f"the suite {kind}"
+    title = f"{whom}{like}" if kind in SWEPT else f"the suite {kind}"
     failed = f" {FAILS}: no trial survived." if (chosen["survived"] == 0).any() else ""
-    aim = (
-        " Success here is survival in posture on feet that stay, with a push that goes on: the crate cannot move."
-        if kind == "stagnation"
-        else ""
-    )
-    beside = (
-        " Right, what the paper reports for its own commands, in brackets ours divided by it." if with_paper else ""
-    )
+    aim = " Success here is survival in posture on feet that stay, with a push that goes on: the crate cannot move."
+    beside = " Right, what the paper reports for its own commands, in brackets ours divided by it."
     return (
         f"Command tracking errors under {title}: means over surviving trials with their 95 % interval. "
         f"{conditions(chosen)} {measures(chosen)} Transport: parts of the commanded way that robot / object covered; "
         f"kept: part of the weight that the robot carries which rests in its hands, or how often what is pushed is not "
         f"lost at its side; success: survived, with enough of both; {STANDS_STILL}: what doing nothing scores, from "
-        f"the script.{failed}{aim}{beside}"
+        f"the script.{failed}{aim if kind == 'stagnation' else ''}{beside if with_paper else ''}"
     )
-
-
-def _with_whom(chosen: pd.DataFrame, kind: str) -> str:
-    """What is done, as the paper says it, and that nobody helps where nobody does."""
-    shares = set(chosen["partner_share"])
-    if shares == {0.0}:
-        return f"{kind} alone"
-    return f"cooperative {kind}" if min(shares) > 0 else kind

@@ -1,11 +1,10 @@
-"""The paper's figures: errors against lifting mass, against pushing mass, and the comparison of variants.
-
-Beside them what the paper does not show: success under harder conditions, and pushes survived.
-"""
+"""The paper's figures (errors against lifting mass, against pushing mass, comparison of variants), and robustness."""
 
 import textwrap
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from string import ascii_lowercase
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,9 +16,10 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from iowbc.arrays import Array
 from iowbc.evaluation.paper import TABLES, VARIANTS
 from iowbc.evaluation.report.aggregate import asks_for_steps, suites_of, variants_of
-from iowbc.evaluation.report.capacity import Capacity, load_capacity, push_capacity
+from iowbc.evaluation.report.capacity import Capacities, load_capacities, push_capacities
 from iowbc.evaluation.report.captions import conditions
-from iowbc.evaluation.report.error_tables import NUMBERS, STANDS_STILL
+from iowbc.evaluation.report.columns import STANDS_STILL
+from iowbc.evaluation.report.error_tables import NUMBERS
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.picture import COLOURS
 
@@ -33,7 +33,6 @@ LABELS = {
 MARKS = "means over the trials survived; at the upper edge: how many where not all survived, × none"
 STILL_NOTE = "grey: a robot that stands still"
 PAPER_NOTE = "hollow, dotted: the paper's numbers, for its own commands; the friction of its crates is unknown"
-STILL_COLOUR = "0.55"
 PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
 ROOMY = 4
@@ -47,54 +46,25 @@ HEADROOM = 0.15
 FAILURE_SPACING = 0.035
 """Distance of two variants' crosses and counts of survivors, in heights of the panel."""
 WHISKERS = {"ecolor": "black", "capsize": 3, "elinewidth": 1.0}
-"""How intervals are drawn on bars."""
+"""Style of intervals on bars."""
 
 
-@dataclass(frozen=True)
-class Bars:
-    """A variant's bars, one a name; NaN leaves one out."""
-
-    heights: Array
-    texts: list[str]
-    intervals: Array | None = None
-    """How far each reaches below and above its bar, (2, names)."""
-
-
-def style_of(variant: str, variants: list[str]) -> tuple[str, str]:
+def style_of(variant: str, variants: Sequence[str]) -> dict[str, Any]:
     """Colour and marker of a variant, the same in every figure; `variants`: all that are shown."""
-    known = [*VARIANTS, *(name for name in variants if name not in VARIANTS)]
-    place = known.index(variant)
-    return COLOURS[place % len(COLOURS)], MARKERS[place % len(MARKERS)]
+    place = [*VARIANTS, *(name for name in variants if name not in VARIANTS)].index(variant)
+    return {"color": COLOURS[place % len(COLOURS)], "marker": MARKERS[place % len(MARKERS)], "markersize": 5}
 
 
 def errors_against_mass(summary: pd.DataFrame, suite: str) -> Figure:
     """Four panels, one an error, over the mass of the object; 95 % intervals as bars; the paper's numbers hollow."""
     chosen = summary[summary["suite"] == suite]
-    kind = str(chosen["kind"].iloc[0])
-    with_paper = kind in NUMBERS and asks_for_steps(chosen)
     figure = Figure(figsize=(9.5, 6.6), layout="constrained")
-    for axes, name in zip(figure.subplots(2, 2, sharex=True).flat, ERRORS, strict=True):
-        for variant in variants_of(summary):
-            rows = _rows(summary, suite, variant)
-            colour, marker = style_of(variant, variants_of(summary))
-            half = rows[f"{name}_half"].fillna(0.0)
-            beside = SHIFT * float(np.ptp(summary.loc[summary["suite"] == suite, "mass"]))
-            masses = rows["mass"] + beside * (variants_of(summary).index(variant) - (len(variants_of(summary)) - 1) / 2)
-            axes.errorbar(
-                masses, rows[name], yerr=half, color=colour, marker=marker, capsize=3, label=variant, markersize=5
-            )
-            if with_paper:
-                _paper_curve(axes, kind, variant, ERRORS.index(name), colour, marker)
-            _mark_survivors(axes, rows, variant, variants_of(summary))
-        _still_line(axes, float(summary.loc[summary["suite"] == suite, f"still_{name}"].mean()))
-        axes.set_ylabel(LABELS[name])
-        tidy(axes)
-    for axes in figure.axes[2:]:
-        axes.set_xlabel(f"{kind} mass [kg]")
-    legend(figure, figure.axes[0])
-    heading = f"Tracking errors against {kind} mass, bars: 95 % intervals. {conditions(chosen)}"
-    figure.suptitle(f"{heading}\n{_note(with_paper)}", fontsize=9)
-    return figure
+    panels = list(figure.subplots(2, 2, sharex=True).flat)
+    for place, (axes, name) in enumerate(zip(panels, ERRORS, strict=True)):
+        _sweep_panel(axes, chosen, variants_of(summary), name, chosen[f"still_{name}"].mean(), itemgetter(place))
+        axes.set(ylabel=LABELS[name], xlabel="" if place < 2 else f"{chosen['kind'].iloc[0]} mass [kg]")
+    heading = f"Tracking errors against {chosen['kind'].iloc[0]} mass, bars: 95 % intervals. {conditions(chosen)}"
+    return finish(figure, [], f"{heading}\n{_note(_with_paper(chosen))}", panels[0])
 
 
 def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
@@ -105,77 +75,134 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
     sweeps = [suites_of(summary, kind)[0] for kind in NUMBERS if suites_of(summary, kind)]
     bars = max(1.0, len(variants_of(summary)) / ROOMY)
     widths = [*(1.0 for _ in sweeps), *[bars] * bool(sweeps), bars]
-    figure = Figure(
-        figsize=(max(PANEL_WIDTH * sum(widths), SMALLEST_WIDTH), 4.2), layout=ConstrainedLayoutEngine(wspace=0.06)
-    )
-    panels = list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
+    figure, panels = _row(PANEL_WIDTH, widths, ConstrainedLayoutEngine(wspace=0.06))
     for axes, suite in zip(panels, sweeps, strict=False):
-        _norm_panel(axes, summary, suite)
+        chosen = summary[summary["suite"] == suite]
+        still = error_norm(chosen[[f"still_{name}" for name in ERRORS]].mean().to_numpy())
+        _sweep_panel(
+            axes, chosen, variants_of(summary), "norm", float(still), lambda row: float(error_norm(np.array(row)))
+        )
+        axes.set(title=f"error norm, {suite}", xlabel="mass [kg]", ylabel="norm of the four errors [SI units]")
     if sweeps:
-        _capacity_panel(panels[-2], summary, sweeps, capacity_rate)
-    _success_panel(panels[-1], _heaviest(summary))
-    letter(panels)
-    if sweeps:
-        walked = any(asks_for_steps(summary[summary["suite"] == suite]) for suite in sweeps)
-        figure.suptitle(_note(walked), fontsize=9)
-    legend(figure, panels[0])
-    return figure
+        nothing: Capacities = {variant: {} for variant in variants_of(summary)}
+        found = nothing | load_capacities(summary, capacity_rate)
+        _capacity_bars(panels[-2], found, sweeps)
+        panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
+    _success_panel(panels[-1], _heaviest(summary), "success rate")
+    walked = any(asks_for_steps(summary[summary["suite"] == suite]) for suite in sweeps)
+    return finish(figure, panels, _note(walked) if sweeps else "", panels[0])
 
 
 def robustness(summary: pd.DataFrame, rate: float) -> Figure:
     """Success under harder conditions and in stagnation, and the impulse on the base survived by direction."""
     suites = suites_of(summary, "robustness", "stagnation")
-    pushes = suites_of(summary, "pushes")
-    panels_needed = [*suites, *pushes]
-    widths = [max(2, len(summary.loc[summary["suite"] == suite, "case"].unique())) for suite in panels_needed]
-    bars = max(1.0, len(variants_of(summary)) / ROOMY)
-    figure = Figure(figsize=(max(1.2 * bars * sum(widths), SMALLEST_WIDTH), 4.2), layout="constrained")
-    panels = list(figure.subplots(1, len(panels_needed), squeeze=False, width_ratios=widths).flat)
+    pushes = summary[summary["kind"] == "pushes"]
+    shown = [*suites, *suites_of(summary, "pushes")]
+    widths = [float(max(2, summary.loc[summary["suite"] == suite, "case"].nunique())) for suite in shown]
+    figure, panels = _row(1.2 * max(1.0, len(variants_of(summary)) / ROOMY), widths, "constrained")
     for axes, suite in zip(panels, suites, strict=False):
-        _success_panel(axes, summary[summary["suite"] == suite])
-        axes.set_title(f"success, {suite}")
-    if pushes:
-        _push_panel(panels[-1], summary[summary["kind"] == "pushes"], rate)
-    letter(panels)
-    legend(figure, panels[0])
+        _success_panel(axes, summary[summary["suite"] == suite], f"success, {suite}")
+    if len(pushes):
+        _capacity_bars(panels[-1], push_capacities(summary, rate), list(dict.fromkeys(pushes["case"])))
+        title = f"impulse survived, {float(pushes['mass'].iloc[0]):g} kg"
+        panels[-1].set(title=title, ylabel="impulse [N·s]")
+    return finish(figure, panels, "", panels[0])
+
+
+def draw_bars(
+    axes: Axes,
+    heights: Mapping[str, Array],
+    texts: Mapping[str, Sequence[str]],
+    labels: Sequence[str],
+    intervals: Mapping[str, Array],
+) -> None:
+    """Bars of each variant, side by side over each label, with texts above; NaN leaves a bar out.
+
+    intervals: how far each reaches below and above its bar, (2, labels), of variants that have some.
+    """
+    width = 0.8 / max(len(heights), 3)
+    for place, (variant, values) in enumerate(heights.items()):
+        positions = np.arange(len(labels)) + (place - (len(heights) - 1) / 2) * width
+        colour = style_of(variant, list(heights))["color"]
+        spread = intervals.get(variant)
+        drawn = axes.bar(positions, values, width, yerr=spread, color=colour, label=variant, error_kw=WHISKERS)
+        axes.bar_label(drawn, texts[variant], padding=2, fontsize=8)
+    axes.set_xticks(range(len(labels)), labels, fontsize=8)
+    _from_zero(axes)
+    axes.set_xlim(-0.6, len(labels) - 0.4)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def line_labels(names: Sequence[tuple[str, float]]) -> list[str]:
+    """Cases and masses under bars, long names on several lines."""
+    return [f"{textwrap.fill(case, LABEL_WIDTH)}\n{mass:g} kg" for case, mass in names]
+
+
+def finish(figure: Figure, lettered: Sequence[Axes], title: str, legend_of: Axes | None = None) -> Figure:
+    """Letters before the titles of panels, a title, and one legend below all with what a panel shows."""
+    for axes, letter in zip(lettered, ascii_lowercase, strict=False):
+        axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
+    if title:
+        figure.suptitle(title, fontsize=9)
+    if legend_of is not None:
+        handles, labels = legend_of.get_legend_handles_labels()
+        figure.legend(handles, labels, fontsize=9, ncols=len(labels), loc="outside lower center", frameon=False)
     return figure
 
 
+def tidy(axes: Axes) -> None:
+    """From zero, with a grid, without a frame."""
+    _from_zero(axes)
+    axes.grid(True, color="0.9")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, list[Axes]]:
+    """A figure of panels side by side, in widths of one panel [inch]."""
+    figure = Figure(figsize=(max(panel * sum(widths), SMALLEST_WIDTH), 4.2), layout=layout)
+    return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
+
+
+def _norm(errors: Sequence[float]) -> float:
+    return float(error_norm(np.array(errors)))
+
+
+def _with_paper(rows: pd.DataFrame) -> bool:
+    return rows["kind"].iloc[0] in NUMBERS and asks_for_steps(rows)
+
+
 def _note(with_paper: bool) -> str:
-    """What marks, grey lines and dotted ones mean."""
+    """The meaning of marks, grey lines and dotted ones."""
     return f"{MARKS}\n{'; '.join([PAPER_NOTE] * with_paper + [STILL_NOTE])}"
 
 
-def _norm_panel(axes: Axes, summary: pd.DataFrame, suite: str) -> None:
-    axes.set_title(f"error norm, {suite}")
-    kind = str(summary.loc[summary["suite"] == suite, "kind"].iloc[0])
-    still = summary.loc[summary["suite"] == suite, [f"still_{name}" for name in ERRORS]].mean().to_numpy()
-    _still_line(axes, float(error_norm(still)))
-    for variant in variants_of(summary):
-        rows = _rows(summary, suite, variant)
-        colour, marker = style_of(variant, variants_of(summary))
-        axes.plot(rows["mass"], rows["norm"], color=colour, marker=marker, markersize=5, label=variant)
-        if asks_for_steps(rows):
-            _paper_curve(axes, kind, variant, None, colour, marker)
-        _mark_survivors(axes, rows, variant, variants_of(summary))
-    axes.set_xlabel("mass [kg]")
-    axes.set_ylabel("norm of the four errors [SI units]")
+def _sweep_panel(
+    axes: Axes,
+    chosen: pd.DataFrame,
+    variants: Sequence[str],
+    column: str,
+    still: float,
+    of_paper: Callable[[tuple[float, ...]], float],
+) -> None:
+    """A column over the mass of one suite, with intervals where it has some, for each variant; the score of a robot
+    that stands still, and the paper's numbers: `of_paper` of its four errors."""
+    for place, variant in enumerate(variants):
+        rows = chosen[chosen["variant"] == variant].sort_values("mass")
+        style = style_of(variant, variants)
+        if f"{column}_half" in rows:
+            shift = SHIFT * float(np.ptp(chosen["mass"])) * (place - (len(variants) - 1) / 2)
+            half = rows[f"{column}_half"].fillna(0.0)
+            axes.errorbar(rows["mass"] + shift, rows[column], yerr=half, capsize=3, label=variant, **style)
+        else:
+            axes.plot(rows["mass"], rows[column], label=variant, **style)
+        if _with_paper(chosen):
+            paper = {mass: row.get(variant) for mass, row in TABLES[chosen["kind"].iloc[0]].items()}
+            points = {mass: of_paper(errors) for mass, errors in paper.items() if errors is not None}
+            axes.plot(list(points), list(points.values()), linestyle=":", markerfacecolor="none", **style)
+        _mark_survivors(axes, rows, place, style["color"])
+    axes.axhline(still, label=STANDS_STILL, zorder=0, color="0.55", linestyle="--", linewidth=1.2)
+    axes.update_datalim([(0.0, still)], updatex=False)
     tidy(axes)
-
-
-def _capacity_panel(axes: Axes, summary: pd.DataFrame, suites: list[str], rate: float) -> None:
-    axes.set_title(f"load capacity at {100 * rate:.0f} % success")
-    found = {v: [load_capacity(summary, suite, v, rate) for suite in suites] for v in variants_of(summary)}
-    _capacity_bars(axes, found, suites)
-    axes.set_ylabel("mass [kg]")
-
-
-def _push_panel(axes: Axes, pushes: pd.DataFrame, rate: float) -> None:
-    axes.set_title(f"impulse survived, {float(pushes['mass'].iloc[0]):g} kg")
-    directions = list(dict.fromkeys(pushes["case"]))
-    found = {v: [push_capacity(pushes, one, v, rate) for one in directions] for v in variants_of(pushes)}
-    _capacity_bars(axes, found, directions)
-    axes.set_ylabel("impulse [N·s]")
 
 
 def _heaviest(summary: pd.DataFrame) -> pd.DataFrame:
@@ -187,108 +214,42 @@ def _heaviest(summary: pd.DataFrame) -> pd.DataFrame:
     return swept[swept["mass"] == swept.groupby("suite")["mass"].transform("max")]
 
 
-def _success_panel(axes: Axes, chosen: pd.DataFrame) -> None:
-    axes.set_title("success rate")
+def _success_panel(axes: Axes, chosen: pd.DataFrame, title: str) -> None:
     names = list(dict.fromkeys(zip(chosen["case"], chosen["mass"], strict=True)))
-    groups = {}
+    heights, texts, intervals = {}, {}, {}
     for variant in variants_of(chosen):
         rows = chosen[chosen["variant"] == variant].set_index(["case", "mass"]).reindex(names)
         rate, low, high = (100 * rows[name].to_numpy(float) for name in ("rate", "rate_low", "rate_high"))
         counts = zip(rows["succeeded"], rows["trials"], strict=True)
-        texts = ["" if np.isnan(trials) else f"{succeeded:.0f}/{trials:.0f}" for succeeded, trials in counts]
-        groups[variant] = Bars(rate, texts, np.clip([rate - low, high - rate], 0.0, None))
-    draw_bars(axes, groups, [f"{broken(case)}\n{mass:g} kg" for case, mass in names])
-    axes.set_ylabel("successful trials [%], 95 % interval")
-    axes.set_ylim(0, 110)
+        heights[variant], intervals[variant] = rate, np.clip([rate - low, high - rate], 0.0, None)
+        texts[variant] = ["" if np.isnan(trials) else f"{succeeded:.0f}/{trials:.0f}" for succeeded, trials in counts]
+    draw_bars(axes, heights, texts, line_labels(names), intervals)
+    axes.set(title=title, ylabel="successful trials [%], 95 % interval", ylim=(0, 110))
 
 
-def _capacity_bars(axes: Axes, found: dict[str, list[Capacity | None]], names: list[str]) -> None:
-    groups = {}
-    for variant, row in found.items():
-        heights = np.array([np.nan if one is None else one.value or 0.0 for one in row])
-        groups[variant] = Bars(heights, ["" if one is None else one.text("").strip() for one in row])
-    draw_bars(axes, groups, [broken(name) for name in names])
+def _capacity_bars(axes: Axes, found: Capacities, names: Sequence[str]) -> None:
+    heights = {
+        v: np.array([(own[name].value or 0.0) if name in own else np.nan for name in names]) for v, own in found.items()
+    }
+    texts = {v: [own[name].text("").strip() if name in own else "" for name in names] for v, own in found.items()}
+    draw_bars(axes, heights, texts, [textwrap.fill(name, LABEL_WIDTH) for name in names], {})
 
 
-def draw_bars(axes: Axes, groups: dict[str, Bars], names: list[str]) -> None:
-    """Bars of each variant, side by side over each name."""
-    width = 0.8 / max(len(groups), 3)
-    for place, (variant, bars) in enumerate(groups.items()):
-        positions = np.arange(len(names)) + (place - (len(groups) - 1) / 2) * width
-        colour = style_of(variant, list(groups))[0]
-        drawn = axes.bar(
-            positions, bars.heights, width, yerr=bars.intervals, color=colour, label=variant, error_kw=WHISKERS
-        )
-        axes.bar_label(drawn, bars.texts, padding=2, fontsize=8)
-    axes.set_xticks(range(len(names)), names, fontsize=8)
-    _from_zero(axes)
-    axes.set_xlim(-0.6, len(names) - 0.4)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _rows(summary: pd.DataFrame, suite: str, variant: str) -> pd.DataFrame:
-    chosen = summary[(summary["suite"] == suite) & (summary["variant"] == variant)]
-    return chosen.sort_values("mass")
-
-
-def _paper_curve(axes: Axes, suite: str, variant: str, error: int | None, colour: str, marker: str) -> None:
-    points = [
-        (mass, float(error_norm(np.array(errors))) if error is None else errors[error])
-        for mass, row in TABLES[suite].items()
-        if (errors := row.get(variant)) is not None
-    ]
-    if points:
-        masses, values = zip(*points, strict=True)
-        axes.plot(masses, values, color=colour, marker=marker, markersize=5, linestyle=":", markerfacecolor="none")
-
-
-def _mark_survivors(axes: Axes, rows: pd.DataFrame, variant: str, variants: list[str]) -> None:
+def _mark_survivors(axes: Axes, rows: pd.DataFrame, place: int, colour: str) -> None:
     """At the panel's upper edge, one line a variant: how many survived a mass where not all did, a cross for none."""
-    colour, transform = style_of(variant, variants)[0], axes.get_xaxis_transform()
-    height = 0.98 - FAILURE_SPACING * variants.index(variant)
+    transform, height = axes.get_xaxis_transform(), 0.98 - FAILURE_SPACING * place
     failed = rows[rows["survived"] == 0]["mass"]
+    crosses = axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False)
+    text: dict[str, Any] = {"color": colour, "transform": transform, "ha": "center", "va": "center", "fontsize": 7}
     marks: list[Artist] = [
-        *axes.plot(failed, [height] * len(failed), "x", color=colour, transform=transform, clip_on=False, markersize=6)
+        *crosses,
+        *(
+            axes.text(float(row.mass), height, f"{row.survived}/{row.trials}", **text)
+            for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples()
+        ),
     ]
-    for row in rows[(rows["survived"] > 0) & (rows["survived"] < rows["trials"])].itertuples():
-        text = f"{row.survived}/{row.trials}"
-        marks.append(
-            axes.text(
-                float(row.mass), height, text, color=colour, transform=transform, ha="center", va="center", fontsize=7
-            )
-        )
     for mark in marks:
         mark.set_in_layout(False)
-
-
-def _still_line(axes: Axes, value: float) -> None:
-    """What a robot that stands still scores."""
-    axes.axhline(value, label=STANDS_STILL, zorder=0, color=STILL_COLOUR, linestyle="--", linewidth=1.2)
-    axes.update_datalim([(0.0, value)], updatex=False)
-
-
-def letter(panels: list[Axes]) -> None:
-    """Letters before the titles of panels."""
-    for axes, letter in zip(panels, ascii_lowercase, strict=False):
-        axes.set_title(f"({letter}) {axes.get_title()}", fontsize=10)
-
-
-def broken(text: str) -> str:
-    """A long name on several lines."""
-    return textwrap.fill(text, LABEL_WIDTH)
-
-
-def legend(figure: Figure, axes: Axes) -> None:
-    """One legend below all panels, with what a panel shows."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, fontsize=9, ncols=len(labels), loc="outside lower center", frameon=False)
-
-
-def tidy(axes: Axes) -> None:
-    """From zero, with a grid, without a frame."""
-    _from_zero(axes)
-    axes.grid(True, color="0.9")
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _from_zero(axes: Axes) -> None:

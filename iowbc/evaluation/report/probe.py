@@ -1,4 +1,4 @@
-"""Table and figure of the linear probe: the object's mass as it is, and as it is read from what the policy sees."""
+"""Table and figure of the linear probe: the object's mass, and its value inferred from the policy's observations."""
 
 from pathlib import Path
 
@@ -7,18 +7,16 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from iowbc.evaluation.probe.readings import PRIVILEGED
+from iowbc.evaluation.probe import PRIVILEGED
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner
-from iowbc.evaluation.report.figures import style_of
+from iowbc.evaluation.report.figures import finish, style_of
 from iowbc.evaluation.report.statistics import determination, determination_interval, root_mean_square
 from iowbc.results.picture import write_figure
 from iowbc.results.table import Column, Table, heads, measured, write_table
 
 LINES = ("-", "--", ":")
-"""Of what the mass is read from, in order; s_priv, which holds it, has none."""
-LINES_OF_SEVERAL = ("-", "--")
-"""The same, where several variants are shown."""
+"""Lines of the sources, in order; s_priv, which holds the mass, has none. Of several variants two sources are shown."""
 LOWEST = -0.25
 """Least R² that the figure shows: less than 0 says less than the mean of all masses does."""
 LEAST_TRIALS = 10
@@ -37,31 +35,37 @@ def write_probe(inferred: pd.DataFrame, folder: Path) -> pd.DataFrame:
 
 
 def probe_table(inferred: pd.DataFrame) -> Table:
-    """How well the mass is read: from one reading, from the mean of a second's, and of all of a trial's."""
+    """Accuracy of the inferred mass: of one reading, of the mean of a second's, and of all of a trial's."""
     settled = inferred[inferred["settled"]]
-    rows, numbers = [], []
-    for source in dict.fromkeys(settled["source"]):
-        for variant in variants_of(settled):
-            found = settled[(settled["source"] == source) & (settled["variant"] == variant)]
-            if found.empty:
-                continue
-            one = figures_of(found)
-            numbers.append({"source": source, "variant": variant, **one})
-            rows.append(
-                (
-                    f"{source} ({one['size']:.0f})",
-                    variant,
-                    f"{one['readings']:.0f}",
-                    f"{one['R2']:.3f}",
-                    f"{one['R2_low']:.2f} to {one['R2_high']:.2f}",
-                    f"{one['RMSE']:.2f}",
-                    measured(one["R2_second"]),
-                    measured(one["R2_trial"]),
-                )
-            )
+    variants = variants_of(settled)
+    numbers = [
+        {"source": source, "variant": variant, **figures_of(own)}
+        for source, found in settled.groupby("source", sort=False)
+        for variant in variants
+        if len(own := found[found["variant"] == variant])
+    ]
+    rows = [
+        (
+            f"{one['source']} ({one['size']:.0f})",
+            one["variant"],
+            f"{one['readings']:.0f}",
+            f"{one['R2']:.3f}",
+            f"{one['R2_low']:.2f} to {one['R2_high']:.2f}",
+            f"{one['RMSE']:.2f}",
+            measured(one["R2_second"]),
+            measured(one["R2_trial"]),
+        )
+        for one in numbers
+    ]
     head = ("Read from", "Algorithm", "Readings", "R²", "95 % interval", "RMSE [kg]", "R² of 1 s", "R² of a trial")
     columns = [Column(name, latex=name.replace("R²", "$R^2$")) for name in head]
-    return Table("probe", _caption(inferred), heads(*columns), rows, pd.DataFrame(numbers))
+    caption = (
+        "Linear probe: a ridge regression of the object's mass, fitted to half of the trials and tested on the others. "
+        f"{_circumstances(inferred)} In brackets, how many numbers it is read from. A reading is made as soon as the "
+        "history is full; R² of 1 s, and of a trial: of the means of its readings; the interval is over trials. "
+        "s_priv holds the mass itself, among all else that was drawn: it checks the probe."
+    )
+    return Table("probe", caption, heads(*columns), rows, pd.DataFrame(numbers))
 
 
 def figures_of(found: pd.DataFrame) -> dict[str, float]:
@@ -87,37 +91,29 @@ def figures_of(found: pd.DataFrame) -> dict[str, float]:
 def probe_figure(inferred: pd.DataFrame) -> Figure:
     """True against inferred mass in the trials tested, and R² against the time since the grasp."""
     figure = Figure(figsize=(10.5, 4.9), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    source = str(inferred["source"].iloc[0])
-    _scatter(left, inferred[inferred["settled"]], source)
-    _growth(right, inferred)
-    for axes, title in ((left, f"(a) mass read from the {source}"), (right, "(b) how soon it is known")):
-        axes.set_title(title, fontsize=10)
+    panels = list(figure.subplots(1, 2))
+    source, settled = str(inferred["source"].iloc[0]), inferred[inferred["settled"]]
+    _scatter(panels[0], settled[settled["source"] == source], source)
+    _growth(panels[1], inferred)
+    for axes in panels:
         axes.grid(True, color="0.9")
         axes.spines[["top", "right"]].set_visible(False)
-    figure.suptitle(
-        f"Linear probe of the object's mass. {_circumstances(inferred)}\n"
-        "rings: mean of a trial; dots: single readings; grey: as it is",
-        fontsize=9,
-    )
-    return figure
+    title = f"Linear probe of the object's mass. {_circumstances(inferred)}\n"
+    return finish(figure, panels, f"{title}rings: mean of a trial; dots: single readings; grey: as it is")
 
 
-def _scatter(axes: Axes, settled: pd.DataFrame, source: str) -> None:
-    variants = variants_of(settled)
-    chosen = settled[settled["source"] == source]
+def _scatter(axes: Axes, chosen: pd.DataFrame, source: str) -> None:
     ends = (float(chosen["mass"].min()), float(chosen["mass"].max()))
     axes.plot(ends, ends, color="0.55", linestyle="--", linewidth=1.2, zorder=0)
     for variant in variants_of(chosen):
         found = chosen[chosen["variant"] == variant]
         one, means = figures_of(found), found.groupby("trial")[["mass", "inferred"]].mean()
-        colour, _ = style_of(variant, variants)
+        colour = style_of(variant, variants_of(chosen))["color"]
         axes.plot(found["mass"], found["inferred"], ".", color=colour, markersize=2, alpha=0.35, zorder=1)
         label = f"{variant}: R² {one['R2']:.2f}, RMSE {one['RMSE']:.2f} kg\n(trial's mean {one['R2_trial']:.2f}, "
         label += f"{one['RMSE_trial']:.2f} kg)"
         axes.plot(means["mass"], means["inferred"], "o", color=colour, markerfacecolor="white", label=label, zorder=2)
-    axes.set_xlabel("true mass [kg]")
-    axes.set_ylabel("inferred mass [kg]")
+    axes.set(title=f"mass read from the {source}", xlabel="true mass [kg]", ylabel="inferred mass [kg]")
     axes.legend(fontsize=8, loc="upper left", frameon=False)
 
 
@@ -125,32 +121,22 @@ def _growth(axes: Axes, inferred: pd.DataFrame) -> None:
     """R² over the trials that go on at each time."""
     variants = variants_of(inferred)
     sources = [each for each in dict.fromkeys(inferred["source"]) if each != PRIVILEGED]
-    lines = LINES if len(variants) == 1 else LINES_OF_SEVERAL
+    lines = LINES if len(variants) == 1 else LINES[:2]
     for variant in variants:
         for source, line in zip(sources, lines, strict=False):
             found = inferred[(inferred["source"] == source) & (inferred["variant"] == variant)]
-            points = [
-                (seconds, determination(at["mass"].to_numpy(), at["inferred"].to_numpy()))
+            values = {
+                seconds: determination(at["mass"].to_numpy(), at["inferred"].to_numpy())
                 for seconds, at in found.groupby("seconds")
                 if len(at) >= LEAST_TRIALS
-            ]
-            if points:
+            }
+            if values:
                 label = source if len(variants) == 1 else f"{variant}, {source}"
-                times, values = zip(*points, strict=True)
-                axes.plot(times, values, color=style_of(variant, variants)[0], linestyle=line, label=label)
+                colour = style_of(variant, variants)["color"]
+                axes.plot(list(values), list(values.values()), color=colour, linestyle=line, label=label)
+    axes.set(title="how soon it is known", xlabel="time since the grasp [s]", ylabel="R² of a single reading")
     axes.set_ylim(LOWEST, 1.05)
-    axes.set_xlabel("time since the grasp [s]")
-    axes.set_ylabel("R² of a single reading")
     axes.legend(fontsize=8, loc="lower right", frameon=False)
-
-
-def _caption(inferred: pd.DataFrame) -> str:
-    return (
-        "Linear probe: a ridge regression of the object's mass, fitted to half of the trials and tested on the others. "
-        f"{_circumstances(inferred)} In brackets, how many numbers it is read from. A reading is made as soon as the "
-        "history is full; R² of 1 s, and of a trial: of the means of its readings; the interval is over trials. "
-        "s_priv holds the mass itself, among all else that was drawn: it checks the probe."
-    )
 
 
 def _circumstances(inferred: pd.DataFrame) -> str:

@@ -2,23 +2,20 @@
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import measures, partner, trainings
-from iowbc.evaluation.report.figures import letter
+from iowbc.evaluation.report.figures import finish
 from iowbc.results.table import ABSENT, FAILS, Table, heads
 
 MAP = "map"
 PANELS = {
-    "rate": ("success", "viridis", (0.0, 1.0)),
-    "E_v": ("E_v [m/s]", "viridis_r", (0.0, 0.5)),
-    "push_force": ("push force [N]", "magma", (0.0, None)),
+    "rate": ("success", "viridis", 1.0),
+    "E_v": ("E_v [m/s]", "viridis_r", 0.5),
+    "push_force": ("push force [N]", "magma", None),
 }
-"""Columns that are drawn: title, colours, and range; the force up to the largest."""
-PANEL = (4.2, 2.9)
-"""Width and height of a panel [inch]."""
+"""Columns that are drawn: title, colours, and end of the range from 0; the force up to the largest."""
 DARK = 0.55
 """Brightness of a cell below which its number is white."""
 
@@ -43,37 +40,28 @@ def map_table(summary: pd.DataFrame) -> Table:
 
 
 def map_figure(summary: pd.DataFrame) -> Figure:
-    """A row of heat maps for each variant: success, E_v, push force."""
+    """A row of heat maps for each variant: success, E_v, push force; the lowest rolling resistance below."""
     chosen = summary[summary["kind"] == MAP]
     variants = variants_of(chosen)
-    figure = Figure(figsize=(PANEL[0] * len(PANELS), PANEL[1] * len(variants) + 0.4), layout="constrained")
-    grid = figure.subplots(len(variants), len(PANELS), squeeze=False)
-    for row, variant in zip(grid, variants, strict=True):
+    figure = Figure(figsize=(4.2 * len(PANELS), 2.9 * len(variants) + 0.4), layout="constrained")
+    panels = list(figure.subplots(len(variants), len(PANELS), squeeze=False).flat)
+    places = [(variant, column) for variant in variants for column in PANELS]
+    for axes, (variant, column) in zip(panels, places, strict=True):
+        title, colours, high = PANELS[column]
         own = chosen[chosen["variant"] == variant]
-        for axes, (column, (title, colours, (low, high))) in zip(row, PANELS.items(), strict=True):
-            values = own.pivot_table(index="rolling_resistance", columns="mass", values=column, dropna=False)
-            largest = float(chosen[column].max()) if high is None else high
-            _heat_map(axes, values, colours, (low, largest if largest > low else low + 1.0))
-            axes.set_title(f"{variant}: {title}")
-    letter(list(grid.flat))
-    figure.suptitle("pushes; E_v and force: means over surviving trials, empty where none survived", fontsize=9)
-    return figure
-
-
-def _heat_map(axes: Axes, values: pd.DataFrame, colours: str, ends: tuple[float, float]) -> None:
-    """Cells with their numbers; the lowest rolling resistance below."""
-    table = values.to_numpy(np.float64)
-    image = axes.imshow(table, origin="lower", aspect="auto", cmap=colours, vmin=ends[0], vmax=ends[1])
-    places = 0 if ends[1] > 10 else 2
-    for (below, along), value in np.ndenumerate(table):
-        if np.isfinite(value):
-            brightness = float(np.mean(image.cmap(image.norm(value))[:3]))
-            colour = "white" if brightness < DARK else "black"
-            axes.text(along, below, f"{value:.{places}f}", ha="center", va="center", fontsize=7, color=colour)
-    axes.set_xticks(range(table.shape[1]), [f"{mass:g}" for mass in values.columns])
-    axes.set_yticks(range(table.shape[0]), [f"{resistance:g}" for resistance in values.index])
-    axes.set_xlabel("mass [kg]")
-    axes.set_ylabel("rolling resistance μ")
+        values = own.pivot_table(index="rolling_resistance", columns="mass", values=column, dropna=False)
+        high = high or float(chosen[column].max())
+        high = high if high > 0.0 else 1.0
+        image = axes.imshow(values, origin="lower", aspect="auto", cmap=colours, vmin=0.0, vmax=high)
+        for (below, along), value in np.ndenumerate(values.to_numpy(np.float64)):
+            if np.isfinite(value):
+                dark = float(np.mean(image.cmap(image.norm(value))[:3])) < DARK
+                text = {"ha": "center", "va": "center", "fontsize": 7, "color": "white" if dark else "black"}
+                axes.text(along, below, f"{value:.{0 if high > 10 else 2}f}", **text)
+        axes.set_xticks(range(values.shape[1]), [f"{mass:g}" for mass in values.columns])
+        axes.set_yticks(range(values.shape[0]), [f"{resistance:g}" for resistance in values.index])
+        axes.set(title=f"{variant}: {title}", xlabel="mass [kg]", ylabel="rolling resistance μ")
+    return finish(figure, panels, "pushes; E_v and force: means over surviving trials, empty where none survived")
 
 
 def _cell(row: pd.Series) -> str:

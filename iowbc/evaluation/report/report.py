@@ -6,20 +6,13 @@ from pathlib import Path
 import pandas as pd
 
 from iowbc.evaluation.report.aggregate import TRAINING, aggregate, asks_for_steps, suites_of, with_trainings
-from iowbc.evaluation.report.beside_paper import paper_table
+from iowbc.evaluation.report.capacity import capacity_table, push_table
 from iowbc.evaluation.report.compliance import compliance_figure, compliance_table, impedance_table
 from iowbc.evaluation.report.differences import difference_table
-from iowbc.evaluation.report.error_tables import NO_LABELS, SWEPT, error_table, moving_table, slug
+from iowbc.evaluation.report.error_tables import NO_LABELS, SWEPT, error_table, moving_table, paper_table, slug
 from iowbc.evaluation.report.figures import comparison, errors_against_mass, robustness
 from iowbc.evaluation.report.interquartile import interquartile_table
-from iowbc.evaluation.report.other_tables import (
-    capacity_table,
-    contact_table,
-    heaviest,
-    joint_table,
-    push_table,
-    success_table,
-)
+from iowbc.evaluation.report.other_tables import contact_table, heaviest, joint_table, success_table
 from iowbc.evaluation.report.push_map import MAP, map_figure, map_table
 from iowbc.results.picture import write_figure
 from iowbc.results.table import Table, write_table
@@ -35,20 +28,20 @@ def write_report(
     capacity_rate: success rate that a mass must reach to count as carried.
     labels: `eval.label` of each variant that goes by another name here, to find the paper's numbers for it.
     """
-    tables, figures = folder / "tables", folder / "figures"
-    summary = aggregate(trials)
+    tables, summary = folder / "tables", aggregate(trials)
     for table in report_tables(trials, summary, capacity_rate, labels):
         write_table(table, tables)
-    for suite in suites_of(summary, *SWEPT):
-        write_figure(errors_against_mass(summary, suite), figures / f"{slug(suite)}_errors.png")
+    pictures = {f"{slug(suite)}_errors": errors_against_mass(summary, suite) for suite in suites_of(summary, *SWEPT)}
     if suites_of(summary, *SWEPT, "heavy"):
-        write_figure(comparison(summary, capacity_rate), figures / "comparison.png")
+        pictures["comparison"] = comparison(summary, capacity_rate)
     if suites_of(summary, "robustness", "stagnation", "pushes"):
-        write_figure(robustness(summary, capacity_rate), figures / "robustness.png")
+        pictures["robustness"] = robustness(summary, capacity_rate)
     if suites_of(summary, "compliance", "impedance"):
-        write_figure(compliance_figure(summary), figures / "compliance.png")
+        pictures["compliance"] = compliance_figure(summary)
     if suites_of(summary, MAP):
-        write_figure(map_figure(summary), figures / "push_map.png")
+        pictures["push_map"] = map_figure(summary)
+    for name, figure in pictures.items():
+        write_figure(figure, folder / "figures" / f"{name}.png")
     summary.to_csv(tables / "summary.csv", index=False)
     return summary
 
@@ -58,21 +51,24 @@ def report_tables(
 ) -> list[Table]:
     """All tables that the trials give; of walking and of joints only where somebody was to walk, or survived."""
     swept, kinds = suites_of(summary, *SWEPT), set(summary["kind"])
-    tables = [error_table(summary, suite, labels) for suite in swept]
-    beside = paper_table(summary, labels)
-    tables += [] if beside is None else [beside]
-    tables += [moving_table(summary, suite) for suite in swept if asks_for_steps(summary[summary["suite"] == suite])]
-    tables += [error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")]
-    if "heavy" in kinds:
-        tables += [success_table(summary, labels), error_table(summary, "heavy", name="heavy_errors")]
-    if swept:
-        tables.append(capacity_table(summary, capacity_rate))
-    if "pushes" in kinds:
-        tables.append(push_table(summary, capacity_rate))
-    special = {"compliance": compliance_table, "impedance": impedance_table, MAP: map_table}
-    tables += [table(summary) for kind, table in special.items() if kind in kinds]
-    if not heaviest(summary).empty:
-        tables += [joint_table(summary), contact_table(summary)]
+    walked = [suite for suite in swept if asks_for_steps(summary[summary["suite"] == suite])]
     several = len(with_trainings(trials)[["variant", TRAINING]].drop_duplicates()) > 1
-    together = [difference_table(trials), interquartile_table(trials)] if several else []
-    return [*tables, *(table for table in together if table is not None)]
+    survived = not heaviest(summary).empty
+    tables = [
+        *(error_table(summary, suite, labels) for suite in swept),
+        paper_table(summary, labels),
+        *(moving_table(summary, suite) for suite in walked),
+        *(error_table(summary, suite) for suite in suites_of(summary, "stagnation", "robustness")),
+        success_table(summary, labels) if "heavy" in kinds else None,
+        error_table(summary, "heavy", name="heavy_errors") if "heavy" in kinds else None,
+        capacity_table(summary, capacity_rate) if swept else None,
+        push_table(summary, capacity_rate) if "pushes" in kinds else None,
+        compliance_table(summary) if "compliance" in kinds else None,
+        impedance_table(summary) if "impedance" in kinds else None,
+        map_table(summary) if MAP in kinds else None,
+        joint_table(summary) if survived else None,
+        contact_table(summary) if survived else None,
+        difference_table(trials) if several else None,
+        interquartile_table(trials) if several else None,
+    ]
+    return [table for table in tables if table is not None]

@@ -76,7 +76,7 @@ def _flipped(chances: NDArray[np.float64], size: int) -> NDArray[np.float64]:
 
 
 def design_effect(successes: NDArray[np.bool_], worlds: NDArray[np.int64]) -> float:
-    """How many times fewer independent trials say as much as these (n,), of which some share a world: between 1 and the
+    """The factor by which fewer independent trials say as much as these (n,), of which some share a world: 1 to the
     trials of a world. Where all went alike, as many as these: trials of one world might always do so."""
     clusters = len(np.unique(worlds))
     most, values = len(successes) / clusters, successes.astype(np.float64)

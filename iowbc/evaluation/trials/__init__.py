@@ -1,1 +1,1 @@
-"""Which trials there are, and how they are played and measured."""
+"""Trials: plan, play and measurement."""

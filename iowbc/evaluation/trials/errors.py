@@ -1,39 +1,32 @@
 """The paper's tracking errors (eq. 9): means of absolute deviations from the command."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.control import gait
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
-from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.task.commands.script import CommandScript
 
 ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 """The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""
 
 
-@dataclass(frozen=True)
-class Deviations:
-    """How far a trial was from a command, one row a control step, each of shape (T,)."""
+class Deviations(NamedTuple):
+    """Deviations of a trial from a command, in the order of `ERRORS`, one row a control step, each of shape (T,)."""
 
     pitch: Array
-    """[rad]."""
     height: Array
-    """[m]."""
     velocity: Array
-    """Planar |v_sys - v_coll| [m/s]."""
+    """Planar |v_sys - v_coll|."""
     heading: Array
-    """[rad]."""
 
     def means(self, suffix: str = "", part: Mask | slice = slice(None)) -> dict[str, float]:
         """The four errors over a part of the trial, by `ERRORS` and a suffix; NaN where the part is empty."""
-        values = (self.pitch[part], self.height[part], self.velocity[part], self.heading[part])
-        means = (float(np.mean(value)) if len(value) else np.nan for value in values)
-        return {f"{name}{suffix}": mean for name, mean in zip(ERRORS, means, strict=True)}
+        parts = {f"{name}{suffix}": values[part] for name, values in zip(ERRORS, self, strict=True)}
+        return {name: float(np.mean(values)) if len(values) else np.nan for name, values in parts.items()}
 
 
 def given_commands(script: CommandScript, steps: int, dt: float) -> Array:
@@ -43,29 +36,19 @@ def given_commands(script: CommandScript, steps: int, dt: float) -> Array:
     return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
 
 
-def moving(given: Array, settings: GaitPrior) -> Mask:
-    """Where a command (T, 11) asks for steps, (T,)."""
-    return gait.wants_to_move(given, settings)
-
-
 def start_heading(trace: Trace) -> float:
     """Heading reference before the first step [rad]; the trace begins after it."""
     return float(trace.heading_reference[0] - trace.commanded_velocity[0, YAW_RATE] * trace.dt)
 
 
-def given_heading(trace: Trace, given: Array) -> Array:
-    """The heading that the given yaw rates lead to, (T,) [rad]."""
-    heading: Array = start_heading(trace) + trace.dt * np.cumsum(given[:, YAW_RATE])
-    return heading
-
-
 def deviations_from_given(trace: Trace, given: Array, window: int) -> Deviations:
     """Against the commands (T, 11) as given; `window`: control steps over which v_sys is averaged, one gait period."""
+    heading = start_heading(trace) + trace.dt * np.cumsum(given[:, YAW_RATE])
     return Deviations(
         pitch=np.abs(trace.torso_pitch - given[:, PITCH]),
         height=np.abs(trace.pelvis_height - given[:, HEIGHT]),
         velocity=velocity_deviation(trace.system_velocity, given, window),
-        heading=np.abs(wrapped(trace.heading - given_heading(trace, given))),
+        heading=np.abs(wrapped(trace.heading - heading)),
     )
 
 
@@ -80,7 +63,7 @@ def deviations_from_clamped(trace: Trace, window: int) -> Deviations:
 
 
 def deviations_standing_still(given: Array, commands: Commands, dt: float) -> Deviations:
-    """What a robot that stands still in the nominal posture would be off, from the commands (T, 11) alone."""
+    """Deviations of a robot that stands still in the nominal posture, from the commands (T, 11) alone."""
     return Deviations(
         pitch=np.abs(given[:, PITCH] - commands.nominal_pitch),
         height=np.abs(given[:, HEIGHT] - commands.nominal_height),

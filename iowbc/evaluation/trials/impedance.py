@@ -1,6 +1,6 @@
 """The mechanical impedance that a robot shows to a sinusoidal pull on the object that it holds."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,8 +9,7 @@ from iowbc.evaluation.trials.trace import Trace
 from iowbc.task.episodes import PlannedPull
 
 
-@dataclass(frozen=True)
-class Apparent:
+class Apparent(NamedTuple):
     """A mass on a spring and a damper, m ẍ + c ẋ + k x = F, that answers pulls as the robot with its object does."""
 
     stiffness: float

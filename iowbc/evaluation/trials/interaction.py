@@ -1,25 +1,34 @@
-"""What passes between robot, object and partner: horizontal forces, work, and whose motion is followed."""
-
-from dataclasses import dataclass
+"""Interaction of robot, object and partner: shares of the weight, horizontal forces, work, velocity of the handle."""
 
 import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.errors import moving_average
-from iowbc.evaluation.trials.ground import HIGH
+from iowbc.evaluation.trials.feet import HIGH
 from iowbc.evaluation.trials.trace import Trace
 
+SETTLING = 1.0
+"""The first second, in which the weight comes to bear, is left out [s]."""
 
-@dataclass(frozen=True)
-class Push:
-    """What limits a push, and what is asked of it."""
 
-    friction: float
-    """Coefficient between feet and ground."""
-    resistance: float
-    """Rolling resistance of the object [N]."""
-    part: float
-    """Of the largest possible force, that counts as pushing."""
+def load_metrics(trace: Trace, weight: float, least: float) -> dict[str, float]:
+    """Shares of a held object's weight [N], means over the trial without its first second; NaN where nothing is held.
+
+    `hand_weight_share`: the hands' vertical force over the weight. `partner_weight_share`: the partner's.
+    `weight_in_hands`: the hands' part of what the robot carries at all, links included; NaN where that is less than
+    `least` [N], and a touch of the torso would be several times as much.
+    """
+    begin = round(SETTLING / trace.dt)
+    if not weight > 0 or len(trace) <= begin:
+        return dict.fromkeys(("hand_weight_share", "partner_weight_share", "weight_in_hands"), np.nan)
+    hands = float(np.mean(-trace.grip_force[begin:, [2, 5]].sum(axis=1))) / weight
+    partner = float(np.mean(trace.partner_force[begin:, 2])) / weight
+    left = 1.0 - partner
+    return {
+        "hand_weight_share": hands,
+        "partner_weight_share": partner,
+        "weight_in_hands": hands / left if left * weight > least else np.nan,
+    }
 
 
 def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
@@ -46,14 +55,17 @@ def interaction_metrics(trace: Trace, window: int) -> dict[str, float]:
     }
 
 
-def push_metrics(trace: Trace, directions: Array, window: int, push: Push) -> dict[str, float]:
-    """How hard the hands push along the command, where one is given; NaN without one, or without an object.
+def push_metrics(
+    trace: Trace, directions: Array, window: int, friction: float, resistance: float, part: float
+) -> dict[str, float]:
+    """Force of the hands along the command, where one is given; NaN without one, or without an object.
 
     directions: of the commanded motion in the world, zero while it stands, (T or more, 2); window: control steps of a
-    gait period.
+    gait period; friction: coefficient between feet and ground; resistance: of the rolling object [N]; part: of the
+    largest possible force, that counts as pushing.
 
     `push_force`: mean horizontal force of the hands on the object along the command [N]. `push_force_share`: part of
-    the time in which it is at least `push.part` of what can be pushed with: friction times the vertical force of the
+    the time in which it is at least `part` of what can be pushed with: friction times the vertical force of the
     ground, or the resistance of the object where that is smaller; forces averaged over a gait period.
     """
     directions = directions[: len(trace)]
@@ -61,8 +73,8 @@ def push_metrics(trace: Trace, directions: Array, window: int, push: Push) -> di
     if not (commanded.any() and np.any(trace.object_position)):
         return {"push_force": np.nan, "push_force_share": np.nan}
     along = -np.vecdot(hand_forces(trace).sum(axis=1), directions)
-    most = np.minimum(push.friction * moving_average(trace.foot_load.sum(axis=1), window), push.resistance)
-    enough = moving_average(along, window) >= push.part * most
+    most = np.minimum(friction * moving_average(trace.foot_load.sum(axis=1), window), resistance)
+    enough = moving_average(along, window) >= part * most
     return {"push_force": float(np.mean(along[commanded])), "push_force_share": float(np.mean(enough[commanded]))}
 
 

@@ -5,21 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iowbc.arrays import Array, Mask
-from iowbc.evaluation.trials.errors import (
-    deviations_from_clamped,
-    deviations_from_given,
-    deviations_standing_still,
-    given_commands,
-    moving,
-    start_heading,
-    velocity_deviation,
-)
-from iowbc.evaluation.trials.feet import foot_metrics
-from iowbc.evaluation.trials.ground import ground_metrics
+from iowbc.arrays import Array
+from iowbc.control.gait import wants_to_move
+from iowbc.evaluation.trials import errors
+from iowbc.evaluation.trials.feet import foot_metrics, ground_metrics
 from iowbc.evaluation.trials.impedance import impedance_metrics
-from iowbc.evaluation.trials.interaction import Push, interaction_metrics, push_metrics
-from iowbc.evaluation.trials.load import load_metrics
+from iowbc.evaluation.trials.interaction import interaction_metrics, load_metrics, push_metrics
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.task.commands import Commands
@@ -30,14 +21,14 @@ from iowbc.task.episodes import PlannedPull
 
 @dataclass(frozen=True)
 class Measure:
-    """What is the same for all trials of an evaluation."""
+    """Settings of the measurement, the same for all trials of an evaluation."""
 
     control_frequency: float
     """[Hz]."""
     gait: GaitPrior
     commands: Commands
     least_weight: float
-    """Weight on the robot under which the hands' part of it is not told [N]."""
+    """Weight on the robot under which the hands' part of it has no value [N]."""
     foot_load: float
     """Vertical force from which a foot counts as loaded [N]."""
     push_part: float
@@ -53,7 +44,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class Met:
-    """What a trial met, as far as its metrics depend on it."""
+    """Drawn conditions of a trial on which its metrics depend."""
 
     held_weight: float = 0.0
     """Of the object in the hands [N]; 0 without."""
@@ -68,57 +59,51 @@ class Met:
 def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Met) -> dict[str, float]:
     """Everything that is measured in a trial.
 
-    The paper's errors are told against the command as given: over the whole trial (`E_v`), over the part in which
+    The paper's errors are against the command as given: over the whole trial (`E_v`), over the part in which
     steps are asked for (`E_v_moving`), against the command as clamped to what is feasible (`E_v_clamped`), and, from
     the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`). `E_v_raw` is without averaging,
-    `E_v_raw_moving` over the part in which steps are asked for.
+    `E_v_raw_moving` over the part in which steps are asked for. `transport_robot`, `_object`: parts of the commanded
+    way, of length `commanded_distance`, that they cover; `object_beside`: see `beside` [m].
     """
     if len(trace) == 0:
         raise ValueError("a trial without a single step has no metrics")
-    whole = given_commands(script, round(script.duration / trace.dt), trace.dt)
-    given = given_commands(script, len(trace), trace.dt)
-    steps_asked = moving(given, measure.gait)
-    deviations = deviations_from_given(trace, given, measure.window)
-    still = deviations_standing_still(whole, measure.commands, trace.dt)
-    raw = velocity_deviation(trace.system_velocity, given, 1)
-    directions, length = commanded_path(whole, start_heading(trace), trace.dt)
-    push = Push(met.ground_friction, met.rolling_resistance, measure.push_part)
+    whole = errors.given_commands(script, round(script.duration / trace.dt), trace.dt)
+    given = errors.given_commands(script, len(trace), trace.dt)
+    moving = wants_to_move(given, measure.gait)
+    deviations = errors.deviations_from_given(trace, given, measure.window)
+    still = errors.deviations_standing_still(whole, measure.commands, trace.dt)
+    raw = errors.velocity_deviation(trace.system_velocity, given, 1)
+    directions, length = commanded_path(whole, errors.start_heading(trace), trace.dt)
     walked = float(np.sum(np.linalg.norm(np.diff(trace.base_position[:, :2], axis=0), axis=1)))
-    still_errors = still.means() | still.means("_moving", moving(whole, measure.gait))
+    has_object = bool(np.any(trace.object_position))
+    still_errors = still.means() | still.means("_moving", wants_to_move(whole, measure.gait))
+    push = (met.ground_friction, met.rolling_resistance, measure.push_part)
     return {
         **deviations.means(),
-        **deviations.means("_moving", steps_asked),
-        **deviations_from_clamped(trace, measure.window).means("_clamped"),
+        **deviations.means("_moving", moving),
+        **errors.deviations_from_clamped(trace, measure.window).means("_clamped"),
         **{f"still_{name}": value for name, value in still_errors.items()},
         "E_v_raw": float(np.mean(raw)),
-        "E_v_raw_moving": float(np.mean(raw[steps_asked])) if steps_asked.any() else np.nan,
-        **transport_metrics(trace, directions, length, steps_asked),
+        "E_v_raw_moving": float(np.mean(raw[moving])) if moving.any() else np.nan,
+        "commanded_distance": length,
+        "transport_robot": covered(trace.base_position, directions, length),
+        "transport_object": covered(trace.object_position, directions, length) if has_object else np.nan,
+        "object_beside": beside(trace.base_position, trace.heading, trace.object_position, moving)
+        if has_object
+        else np.nan,
         "distance": walked,
         **foot_metrics(trace, measure.foot_load, walked),
         **ground_metrics(trace, measure.foot_load, met.ground_friction),
         **load_metrics(trace, met.held_weight, measure.least_weight),
         **interaction_metrics(trace, measure.window),
-        **push_metrics(trace, directions, measure.window, push),
+        **push_metrics(trace, directions, measure.window, *push),
         **impedance_metrics(trace, met.pull),
         **effort_metrics(trace, measure.efforts),
     }
 
 
-def transport_metrics(trace: Trace, directions: Array, length: float, moving: Mask) -> dict[str, float]:
-    """The parts of the commanded way that robot and object cover, and how far the object comes to be at the robot's
-    side [m]; `directions`, `length`: of the whole trial's commanded path; `moving`: where steps are asked for, (T,)."""
-    has_object = bool(np.any(trace.object_position))
-    aside = beside(trace.base_position, trace.heading, trace.object_position, moving)
-    return {
-        "commanded_distance": length,
-        "transport_robot": covered(trace.base_position, directions, length),
-        "transport_object": covered(trace.object_position, directions, length) if has_object else np.nan,
-        "object_beside": aside if has_object else np.nan,
-    }
-
-
 def effort_metrics(trace: Trace, efforts: Mapping[str, float]) -> dict[str, float]:
-    """What the trial cost: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
+    """Costs of the trial: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
     root mean square of its second difference over a control period and the support joints [rad].
 
     efforts: torque limits by joint [N·m]. `torque_rms/<joint>`: root mean square of a joint's torque as a part of its

@@ -1,4 +1,4 @@
-"""How one episode went."""
+"""The outcome of one episode."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one episode went."""
+    """Signals and end of one episode."""
 
     trace: Trace
     seconds: float
@@ -21,7 +21,7 @@ class Outcome:
     fallen: bool
     dropped: bool
     finished: bool
-    """Whether it reached its time limit."""
+    """True where it reached its time limit."""
     drawn: Mapping[str, Array]
     """Everything that was drawn for it, by name, each of shape (k,)."""
 
@@ -32,7 +32,7 @@ class Outcome:
 
     @property
     def ending(self) -> str:
-        """How it ended; "diverged" where the simulation broke off without a fall or a drop."""
+        """The kind of its end; "diverged" where the simulation broke off without a fall or a drop."""
         if self.fallen:
             return "fell"
         if self.dropped:

@@ -1,15 +1,16 @@
-"""Which trials an evaluation consists of: sweeps, cases, seeds, and what is held fixed in each."""
+"""The trials of an evaluation: sweeps, cases, seeds, and the quantities that are held fixed in each."""
 
+import functools
+import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iowbc.evaluation.trials.scripts import drawn_script
-from iowbc.recipe.evaluation.compliance import Impedance
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
-from iowbc.recipe.evaluation.suites import EIGHT, Case, PushLadder, Sweep
+from iowbc.recipe.evaluation.suites import EIGHT, Case, Sweep
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.partner import BEHAVIOURS
@@ -20,7 +21,7 @@ from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
 NO_OBJECT = "no object"
 """Case of a sweep in the scene without an object."""
 SPLITS = {"development": 0, "test": 2**33}
-"""What is added to the seeds of each split: no seed of a recipe is as great, so that the two never meet."""
+"""Offset of the seeds of each split: no seed of a recipe is as great, so that the two never meet."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """Factors on the impulses on the object and the pushes on the base."""
 DIRECTIONS: dict[str, tuple[float, float]] = {
@@ -102,7 +103,7 @@ def trial_seed(evaluation: Evaluation, number: int) -> int:
 
 @dataclass(frozen=True)
 class Condition:
-    """What trials at any mass have in common."""
+    """The conditions that trials at any mass share."""
 
     scene: str
     script: CommandScript
@@ -116,6 +117,47 @@ class Condition:
         held = dict(self.fixed) if mass == 0 else {**self.fixed, "object_mass": mass}
         scene = FREE if mass == 0 else self.scene
         return Episode(scene, seed, self.script.duration, held, self.script, self.push, self.pull)
+
+
+@dataclass(frozen=True)
+class TrialCell:
+    """One cell of the tables: trials that differ in their seeds alone."""
+
+    kind: str
+    suite: str
+    case: str
+    scene: str
+    mass: float
+    """[kg]."""
+    fixed: Mapping[str, float]
+    """Randomised quantities that are held, by name."""
+    sequence: Sequence[Segment] = ()
+    """Commands of its own; see `script_for`."""
+    repetitions: int = 1
+    trials: int | None = None
+    """Number of trials, by default `eval.trials`."""
+    push: PlannedPush | None = None
+    pull: PlannedPull | None = None
+    impulse: float = 0.0
+    """Of the push [N·s]."""
+
+    def planned(self, recipe: Recipe) -> Iterator[Trial]:
+        """Its trials."""
+        for number in range(self.trials or recipe.eval.trials):
+            seed = trial_seed(recipe.eval, number)
+            script = script_for(recipe, self.scene, seed, self.sequence, self.repetitions)
+            episode = Condition(self.scene, script, self.fixed, self.push, self.pull).episode(self.mass, seed)
+            yield Trial(self.kind, self.suite, self.case, self.mass, number, episode, self.impulse)
+
+
+def _planned(cells: Callable[[Recipe], Iterator[TrialCell]]) -> Callable[[Recipe], list[Trial]]:
+    """A function that lists the trials of cells."""
+
+    @functools.wraps(cells)
+    def trials(recipe: Recipe) -> list[Trial]:
+        return [trial for cell in cells(recipe) for trial in cell.planned(recipe)]
+
+    return trials
 
 
 def held_fixed(part: Sweep | Case, partner_share: float | None, *, disturbed: bool) -> dict[str, float]:
@@ -137,13 +179,13 @@ class PlannedSweep:
     sweep: Sweep
     """As it is with that share (`Sweep.at`)."""
     disturbed: bool
-    """Whether impulses and pushes act."""
+    """True where impulses and pushes act."""
     no_object: bool = False
-    """Whether the row without an object belongs to it."""
+    """True where the row without an object belongs to it."""
 
     @property
     def partner_share(self) -> float | None:
-        """Of the partner; None draws it."""
+        """Share of the partner; None draws it."""
         return self.sweep.partner_shares[0]
 
     @property
@@ -162,52 +204,19 @@ class PlannedSweep:
 
     def named(self) -> list[Trial]:
         """The trials that the recipe names: those without an object, and those at each mass."""
-        alone = self._trials(NO_OBJECT, (0.0,)) if self.no_object else []
-        return alone + self.trials(self.masses)
+        return (self.trials((0.0,), NO_OBJECT) if self.no_object else []) + self.trials(self.masses)
 
-    def trials(self, masses: Iterable[float]) -> list[Trial]:
-        """The trials at some masses [kg]."""
-        return self._trials(self.suite, masses)
-
-    def _trials(self, case: str, masses: Iterable[float]) -> list[Trial]:
+    def trials(self, masses: Iterable[float], case: str | None = None) -> list[Trial]:
+        """The trials at some masses [kg]; `case`: another one than that of the suite's name."""
         fixed = held_fixed(self.sweep, self.partner_share, disturbed=self.disturbed)
-        return [
-            trial
-            for mass in masses
-            for trial in trials_of(
-                self.recipe, (self.kind, self.suite, case), self.sweep.scene, mass, fixed, self.sweep.sequence
-            )
-        ]
+        place, scene, sequence = (self.kind, self.suite, case or self.suite), self.sweep.scene, self.sweep.sequence
+        cells = [TrialCell(*place, scene, mass, fixed, sequence) for mass in masses]
+        return [trial for cell in cells for trial in cell.planned(self.recipe)]
 
     def heavier(self, last: float) -> float | None:
         """The next mass past the end of the sweep [kg], or None where the recipe stops."""
         beyond = self.sweep.beyond
         return None if beyond is None or last + beyond.step > beyond.limit else last + beyond.step
-
-
-def trials_of(
-    recipe: Recipe,
-    place: tuple[str, str, str],
-    scene: str,
-    mass: float,
-    fixed: Mapping[str, float],
-    sequence: Sequence[Segment] = (),
-    *,
-    repetitions: int = 1,
-    trials: int | None = None,
-    push: PlannedPush | None = None,
-    pull: PlannedPull | None = None,
-    impulse: float = 0.0,
-) -> list[Trial]:
-    """The trials of one cell; `place`: its kind, suite and case. `trials`: how many, by default `eval.trials`."""
-    evaluation = recipe.eval
-    found = []
-    for number in range(trials or evaluation.trials):
-        seed = trial_seed(evaluation, number)
-        script = script_for(recipe, scene, seed, sequence, repetitions)
-        episode = Condition(scene, script, fixed, push, pull).episode(mass, seed)
-        found.append(Trial(*place, mass, number, episode, impulse))
-    return found
 
 
 def planned_sweeps(recipe: Recipe) -> list[PlannedSweep]:
@@ -227,134 +236,68 @@ def planned_sweeps(recipe: Recipe) -> list[PlannedSweep]:
     return planned
 
 
-def case_trials(recipe: Recipe) -> list[Trial]:
-    """The trials of all single cases: heavy, stagnation, robustness."""
-    evaluation = recipe.eval
-    suites: dict[str, Sequence[Case]] = {
-        "heavy": evaluation.heavy,
-        "stagnation": () if evaluation.stagnation is None else evaluation.stagnation.cases,
-        "robustness": () if evaluation.robustness is None else evaluation.robustness.cases,
-    }
-    return [
-        trial
-        for kind, cases in suites.items()
-        for case in cases
-        for trial in _trials_of_case(recipe, kind, case, disturbed=evaluation.disturbances)
-    ]
-
-
-def _trials_of_case(
-    recipe: Recipe, kind: str, case: Case, *, disturbed: bool, trials: int | None = None
-) -> list[Trial]:
+def _case_cell(kind: str, case: Case, disturbed: bool, trials: int | None = None) -> TrialCell:
     fixed = held_fixed(case, case.partner_share, disturbed=disturbed)
-    return trials_of(
-        recipe,
-        (kind, kind, case.name),
-        case.scene,
-        case.mass,
-        fixed,
-        case.sequence,
-        repetitions=case.repetitions,
-        trials=trials,
-    )
+    return TrialCell(kind, kind, case.name, case.scene, case.mass, fixed, case.sequence, case.repetitions, trials)
 
 
-def push_trials(recipe: Recipe) -> list[Trial]:
+@_planned
+def case_trials(recipe: Recipe) -> Iterator[TrialCell]:
+    """The trials of all single cases: heavy, stagnation, robustness."""
+    asked = recipe.eval
+    suites = {"stagnation": asked.stagnation, "robustness": asked.robustness}
+    cases = {"heavy": asked.heavy, **{kind: suite.cases for kind, suite in suites.items() if suite is not None}}
+    yield from (_case_cell(kind, case, asked.disturbances) for kind, own in cases.items() for case in own)
+
+
+@_planned
+def push_trials(recipe: Recipe) -> Iterator[TrialCell]:
     """The trials in which the base is pushed, standing and walking, at every size in every direction."""
-    robustness = recipe.eval.robustness
-    if robustness is None:
-        return []
-    ladders = {"": robustness.pushes, ", walking": robustness.walking_pushes}
-    return [
-        trial
-        for words, ladder in ladders.items()
-        if ladder is not None
-        for direction in ladder.directions
-        for impulse in ladder.impulses
-        for trial in trials_of(
-            recipe,
-            ("pushes", "pushes", f"{direction}{words}"),
-            ladder.scene,
-            ladder.mass,
-            UNDISTURBED | {"partner_share": 0.0},
-            ladder.sequence,
-            trials=ladder.trials,
-            push=planned_push(ladder, direction, impulse),
-            impulse=impulse,
-        )
-    ]
+    robustness, fixed = recipe.eval.robustness, UNDISTURBED | {"partner_share": 0.0}
+    ladders = {} if robustness is None else {"": robustness.pushes, ", walking": robustness.walking_pushes}
+    for words, ladder in ladders.items():
+        if ladder is None:
+            continue
+        for direction in ladder.directions:
+            forward, left = DIRECTIONS[direction]
+            place = ("pushes", "pushes", f"{direction}{words}", ladder.scene, ladder.mass)
+            for impulse in ladder.impulses:
+                push = PlannedPush(ladder.time, ladder.duration, (impulse * forward, impulse * left))
+                yield TrialCell(*place, fixed, ladder.sequence, trials=ladder.trials, push=push, impulse=impulse)
 
 
-def planned_push(ladder: PushLadder, direction: str, impulse: float) -> PlannedPush:
-    """A push of a ladder; `impulse` [N·s]."""
-    forward, left = DIRECTIONS[direction]
-    return PlannedPush(ladder.time, ladder.duration, (impulse * forward, impulse * left))
-
-
-def compliance_trials(recipe: Recipe) -> list[Trial]:
-    """The trials with partners of every behaviour and before a blocked crate, then those with pulls."""
+@_planned
+def compliance_trials(recipe: Recipe) -> Iterator[TrialCell]:
+    """The trials with partners of every behaviour and before a blocked crate, then those with sinusoidal pulls."""
     asked = recipe.eval.compliance
     if asked is None:
-        return []
-    found = [
-        trial
-        for share in asked.partner_shares
-        for mass in asked.masses
-        for behaviour in asked.behaviours
-        for held in [{"partner_behaviour": float(BEHAVIOURS.index(behaviour)), "partner_share": share}]
-        for suite in ["compliance" if len(asked.partner_shares) == 1 else f"compliance with partner {share:g}"]
-        for trial in trials_of(
-            recipe,
-            ("compliance", suite, behaviour),
-            asked.scene,
-            mass,
-            UNDISTURBED | held,
-            asked.sequence,
-            trials=asked.trials,
-        )
-    ]
+        return
+    for share, mass, behaviour in itertools.product(asked.partner_shares, asked.masses, asked.behaviours):
+        fixed = UNDISTURBED | {"partner_behaviour": float(BEHAVIOURS.index(behaviour)), "partner_share": share}
+        suite = "compliance" if len(asked.partner_shares) == 1 else f"compliance with partner {share:g}"
+        place = ("compliance", suite, behaviour, asked.scene, mass)
+        yield TrialCell(*place, fixed, asked.sequence, trials=asked.trials)
     if asked.blocked is not None:
-        found += _trials_of_case(recipe, "compliance", asked.blocked, disturbed=False, trials=asked.trials)
-    return found + ([] if asked.impedance is None else _pulled(recipe, asked.impedance, asked.trials))
+        yield _case_cell("compliance", asked.blocked, False, asked.trials)
+    pulls = asked.impedance
+    if pulls is None:
+        return
+    for axis, frequency in itertools.product(pulls.directions, pulls.frequencies):
+        duration = max(pulls.cycles, math.ceil(pulls.shortest * frequency)) / frequency
+        force = (pulls.amplitude * AXES[axis][0], pulls.amplitude * AXES[axis][1])
+        place = ("impedance", "impedance", f"{axis} {frequency:g} Hz", pulls.scene, pulls.mass)
+        sequence = (Segment(duration=pulls.begin + duration, ramp=0.0), *pulls.walk)
+        pull = PlannedPull(pulls.begin, duration, frequency, force)
+        yield TrialCell(*place, UNDISTURBED | {"partner_share": 0.0}, sequence, trials=asked.trials, pull=pull)
 
 
-def _pulled(recipe: Recipe, asked: Impedance, trials: int | None) -> list[Trial]:
-    """The trials with sinusoidal pulls."""
-    found = []
-    for axis in asked.directions:
-        for frequency in asked.frequencies:
-            duration = max(asked.cycles, math.ceil(asked.shortest * frequency)) / frequency
-            force = (asked.amplitude * AXES[axis][0], asked.amplitude * AXES[axis][1])
-            found += trials_of(
-                recipe,
-                ("impedance", "impedance", f"{axis} {frequency:g} Hz"),
-                asked.scene,
-                asked.mass,
-                UNDISTURBED | {"partner_share": 0.0},
-                (Segment(duration=asked.begin + duration, ramp=0.0), *asked.walk),
-                trials=trials,
-                pull=PlannedPull(asked.begin, duration, frequency, force),
-            )
-    return found
-
-
-def map_trials(recipe: Recipe) -> list[Trial]:
+@_planned
+def map_trials(recipe: Recipe) -> Iterator[TrialCell]:
     """The pushes at every rolling resistance and mass."""
-    asked, evaluation = recipe.eval.map, recipe.eval
+    asked, calm = recipe.eval.map, {} if recipe.eval.disturbances else UNDISTURBED
     if asked is None:
-        return []
-    calm = {} if evaluation.disturbances else UNDISTURBED
-    return [
-        trial
-        for resistance in asked.rolling_resistances
-        for mass in asked.masses
-        for trial in trials_of(
-            recipe,
-            ("map", "map", f"μ {resistance:g}"),
-            asked.scene,
-            mass,
-            calm | {"object_ground_friction": resistance, "partner_share": asked.partner_share},
-            asked.sequence,
-            trials=asked.trials,
-        )
-    ]
+        return
+    for resistance, mass in itertools.product(asked.rolling_resistances, asked.masses):
+        fixed = calm | {"object_ground_friction": resistance, "partner_share": asked.partner_share}
+        place = ("map", "map", f"μ {resistance:g}", asked.scene, mass)
+        yield TrialCell(*place, fixed, asked.sequence, trials=asked.trials)

@@ -1,13 +1,12 @@
-"""A small fixed evaluation that a training plays again and again, to tell its better policies from its worse."""
+"""A small fixed evaluation that a training repeats, to tell its better policies from its worse."""
 
-from collections.abc import Sequence
-from types import TracebackType
-from typing import Self
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
 
 import numpy as np
 
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, Trial, script_for
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import measure_of, trial_row
@@ -22,9 +21,9 @@ FIGURES = {
     "transport_robot": "transport",
     "weight_in_hands": "weight_in_hands",
 }
-"""Columns of the long table that are told, and their names here."""
+"""Columns of the long table, and their names here."""
 BY_LOAD = ("survived", "succeeded", *ERRORS)
-"""Figures that are also told of each load."""
+"""Figures of each load, too."""
 
 
 def quick_trials(world: Specification, scene: str, masses: Sequence[float], count: int, seed: int) -> list[Trial]:
@@ -41,7 +40,7 @@ def quick_trials(world: Specification, scene: str, masses: Sequence[float], coun
     ]
 
 
-class QuickEvaluation:
+class QuickEvaluation(AbstractContextManager["QuickEvaluation"]):
     """Plays the same trials with one policy after another. Use as a context manager, or `close` it."""
 
     def __init__(
@@ -61,34 +60,27 @@ class QuickEvaluation:
 
     def play(self, policy: Acting) -> dict[str, float]:
         """Means over all trials, see `figures`, and over those of each load: `push_30_kg/survived`, `…/E_v`."""
-        outcomes = play_in(self._environment, policy)
-        rows = [self._row(trial, outcome) for trial, outcome in zip(self.trials, outcomes, strict=True)]
-        loads: dict[str, list[dict[str, float]]] = {}
-        for trial, row in zip(self.trials, rows, strict=True):
-            loads.setdefault(f"{trial.case}_{trial.mass:g}_kg", []).append(row)
-        told = {load: figures(own, self._check) for load, own in loads.items()}
-        return figures(rows, self._check) | {f"{load}/{name}": told[load][name] for load in told for name in BY_LOAD}
+        outcomes = zip(self.trials, play_in(self._environment, policy), strict=True)
+        rows = [
+            trial_row(self.recipe, self._measure, trial, outcome)
+            | {"upright": outcome.seconds / trial.episode.duration, "load": f"{trial.case}_{trial.mass:g}_kg"}
+            for trial, outcome in outcomes
+        ]
+        found = figures(rows, self._check)
+        for load in dict.fromkeys(row["load"] for row in rows):
+            own = figures([row for row in rows if row["load"] == load], self._check)
+            found |= {f"{load}/{name}": own[name] for name in BY_LOAD}
+        return found
 
-    def _row(self, trial: Trial, outcome: Outcome) -> dict[str, float]:
-        row = trial_row(self.recipe, self._measure, trial, outcome)
-        return {name: float(row[name]) for name in (*FIGURES, *ERRORS)} | {
-            "upright": outcome.seconds / trial.episode.duration
-        }
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
     def close(self) -> None:
         """Ends the environments."""
         self._environment.close()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-def figures(rows: Sequence[dict[str, float]], check: Check) -> dict[str, float]:
+def figures(rows: Sequence[Mapping[str, Any]], check: Check) -> dict[str, float]:
     """Means over trials: survived, succeeded, transport, weight_in_hands, upright (part of the time), four errors up
     to the end of each trial, and `score`.
 
@@ -96,13 +88,12 @@ def figures(rows: Sequence[dict[str, float]], check: Check) -> dict[str, float]:
     of 1 / (1 + error / scale): 1 without any error, 1/2 at its scale (`check.scales`); times `check.fall` where it is
     not survived.
     """
+    names = FIGURES | {name: name for name in (*ERRORS, "upright")}
+    columns = {name: np.array([row[name] for row in rows], np.float64) for name in names}
     means = {
-        told: float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
-        for name, told in [*FIGURES.items(), *((error, error) for error in ERRORS), ("upright", "upright")]
-        for values in [np.array([row[name] for row in rows])]
+        names[name]: float(np.nanmean(values)) if np.isfinite(values).any() else 0.0 for name, values in columns.items()
     }
-    scaled = [np.array([row[name] for name in ERRORS]) / check.scales for row in rows]
-    quality = [np.mean(1.0 / (1.0 + errors)) for errors in scaled]
+    quality = [np.mean(1.0 / (1.0 + np.array([row[name] for name in ERRORS]) / check.scales)) for row in rows]
     lasted = [row["upright"] * (1.0 if row["survived"] else check.fall) for row in rows]
     score = np.mean([one * part for one, part in zip(quality, lasted, strict=True)])
     return means | {"score": float(score)}

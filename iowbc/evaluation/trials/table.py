@@ -20,7 +20,7 @@ COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
 def measure_of(recipe: Recipe, robot: Robot) -> Measure:
-    """How the trials of a recipe are measured."""
+    """Settings of the measurement of a recipe's trials."""
     task = recipe.task
     return Measure(
         control_frequency=task.control_frequency,
@@ -34,7 +34,7 @@ def measure_of(recipe: Recipe, robot: Robot) -> Measure:
 
 
 def met(recipe: Recipe, episode: Episode, outcome: Outcome) -> Met:
-    """What a trial met."""
+    """Drawn conditions of a trial."""
     kind = getattr(recipe.simulation.scenes, episode.scene).kind
     drawn = {name: float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")}
     return Met(
@@ -84,13 +84,13 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
 
 
 def survived(success: Success, outcome: Outcome) -> bool:
-    """Whether a trial counts as survived; by recipe only where no hand ever let go."""
+    """True for a trial that counts as survived; by recipe only where no hand ever let go."""
     slipped = success.slip_fails and bool(np.any(outcome.trace.slipped > 0))
     return outcome.survived and not slipped
 
 
 def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked: bool = False) -> bool:
-    """Whether a trial that was survived is a success: transport of what the hands carry or do not lose, with bounded
+    """True for a survived trial that is a success: transport of what the hands carry or do not lose, with bounded
     force in trials of compliance; where a push is infeasible posture and a push that goes on, in the one kind with at
     least a force and on feet that stay, in the other with at most one.
 
@@ -110,7 +110,7 @@ def succeeded(success: Success, kind: str, metrics: dict[str, float], *, blocked
 
 
 def carried_along(asked: Success | Acceptance, metrics: dict[str, float], transport: float | None = None) -> bool:
-    """Whether robot and object cover enough of the way, with enough of the weight in the hands, and stay together.
+    """True where robot and object cover enough of the way, with enough of the weight in the hands, and stay together.
 
     transport: part of the way that is enough, by default that of `asked`.
     """
@@ -130,7 +130,7 @@ def replayed(row: "pd.Series[Any]") -> Episode:
 
 
 def _blocked(outcome: Outcome) -> bool:
-    """Whether a crate resists with more than the greatest force that the feet could push with."""
+    """True where a crate resists with more than the greatest force that the feet could push with."""
     drawn, trace = outcome.drawn, outcome.trace
     hold = float(drawn["ground_friction"][0]) * float(trace.foot_load.sum(axis=1).mean())
     return float(drawn["rolling_resistance"][0]) > hold

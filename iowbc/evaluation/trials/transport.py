@@ -1,4 +1,4 @@
-"""How much of the commanded way robot and object cover, and whether they stay together."""
+"""Parts of the commanded way that robot and object cover, and their distance to the side."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from iowbc.arrays import Array, Mask
 from iowbc.control.command import YAW_RATE
 
 SHORTEST_WAY = 0.1
-"""Where less than this is commanded [m], there is no transport to speak of."""
+"""Least commanded way with a transport [m]."""
 
 
 def commanded_path(given: Array, heading: float, dt: float) -> tuple[Array, float]:
@@ -37,7 +37,7 @@ def covered(position: Array, directions: Array, length: float) -> float:
 
 
 def beside(robot: Array, heading: Array, body: Array, moving: Mask) -> float:
-    """How far to the side of the robot a body is at most while steps are asked for [m]; NaN where none are.
+    """The largest distance of a body to the side of the robot while steps are asked for [m]; NaN where none are.
 
     robot, body: (T, 2 or more) [m]; heading: (T,) [rad]; moving: (T,).
     """

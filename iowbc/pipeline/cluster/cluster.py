@@ -1,23 +1,24 @@
 """The driver's side: a connection to Ray, on whose nodes stages run."""
 
+import atexit
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from iowbc.errors import Interrupted, StageFailed, UsageError
-from iowbc.pipeline.cluster import loopback
-from iowbc.pipeline.cluster.folders import Folder, files_of, write_files
-from iowbc.pipeline.cluster.identity import identity
-from iowbc.pipeline.cluster.mailbox import Event, Mailbox
-from iowbc.pipeline.cluster.remote import TOKEN, Order, StageOutcome, execute
+from iowbc.errors import Interrupted, IowbcError, StageFailed, UsageError
+from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
 from iowbc.pipeline.cluster.spread import NodeSpread
+from iowbc.pipeline.cluster.stage_task import TOKEN, Event, Mailbox, Order, execute
+from iowbc.pipeline.machine import identity
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
+from iowbc.processes import available_cores
 
 TRIES = 5
 """Times that a stage is begun whose node or worker is lost, before it counts as failed."""
@@ -32,27 +33,38 @@ SETTINGS = {
 }
 """Environment of Ray: it sends nothing to its makers, leaves accelerators' variables as they are, and its workers have
 the priority that those of a local run have."""
+LOCAL = "local"
+"""Address of a cluster of this machine alone, which listens on 127.0.0.1 and ends with this process."""
+ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+"""Environment in which Ray listens on 127.0.0.1 (on Linux it otherwise takes an address that others reach), to those
+alone who know a token."""
+OBJECT_STORE = 1 << 30
+"""Bytes of memory for objects in such a cluster; what is more goes to disk."""
+STARTS = 4
+"""Attempts to start it: on a busy machine Ray's own processes give each other up after 15 to 30 s."""
 HEAD = "node:__internal_head__"
 """Resource that Ray gives to the head node alone."""
+
+
+class Lost(Exception):
+    """The node or worker of a stage is gone."""
 
 
 class Cluster:
     """A connection to Ray. Runs stages on its nodes; several threads may ask for one each."""
 
     def __init__(self, address: str, *, copy: bool) -> None:
-        """address: `auto`, `host:port` or `ray://host:port`. copy: nodes keep to their own disks.
+        """address: `local`, `auto`, `host:port` or `ray://host:port`. copy: nodes keep to their own disks.
 
-        Raises `UsageError` where Ray does not answer, or a node is not as this machine.
+        Raises `UsageError` where Ray does not answer.
         """
         self.copy = copy
         self.aborted = False
-        self._folders: dict[Path, Folder] = {}
-        self._begun: dict[str, bool] = {}
+        self._folders: dict[Path, SharedFolder] = {}
         self._ray = _initialised(address)
         remote = self._ray.remote
         self._mailbox = remote(num_cpus=0, resources={HEAD: 0.001}, max_concurrency=1)(Mailbox).remote()
         self._execute = remote(max_retries=0, scheduling_strategy="SPREAD")(execute)
-        self._require_alike()
 
     @property
     def cores(self) -> int:
@@ -66,25 +78,13 @@ class Cluster:
 
     @property
     def text(self) -> str:
-        """Where it listens and how large it is, in a line."""
-        address = self._ray.get_runtime_context().gcs_address
-        return f"Ray at {address}: {self._nodes()}, {self.cores} cores"
-
-    @property
-    def load(self) -> str:
-        """How much of it is in use, in a line."""
-        free, whole = self._ray.available_resources(), self._ray.cluster_resources()
-        store = whole.get("object_store_memory", 0.0)
-        used = store - free.get("object_store_memory", store)
-        cores = whole.get("CPU", 0.0)
-        stages = list(self._begun.values())
-        return (
-            f"{self._nodes()}, {cores - free.get('CPU', 0.0):g} of {cores:g} cores, {used / 1e6:.0f} MB of objects; "
-            f"stages: {sum(stages)} run, {len(stages) - sum(stages)} wait for cores"
-        )
+        """Address and size in a line."""
+        count = len(self._alive())
+        nodes = f"{count} node{'s' if count != 1 else ''}"
+        return f"Ray at {self._ray.get_runtime_context().gcs_address}: {nodes}, {self.cores} cores"
 
     def run(self, stage: Stage, job: Job) -> None:
-        """Run a stage on a node, as `stage.run(job)` would here. A lost node costs what it had not told yet.
+        """Run a stage on a node, as `stage.run(job)` would here. A lost node costs what it had not reported yet.
 
         Raises what the stage raises; RuntimeError with the node's traceback for an unexpected error.
         """
@@ -92,21 +92,20 @@ class Cluster:
         (job.work / TOKEN).write_text(token, encoding="utf-8")
         try:
             for _ in range(TRIES):
-                outcome = self._tried(stage, job, token)
-                if outcome is not None:
-                    self._conclude(stage, job, outcome)
+                try:
+                    write_files(job.out, self._attempt(stage, job, token) or {})
                     return
-                job.report.say("its node or worker was lost; it goes on elsewhere")
-                shutil.rmtree(job.out)
-                job.out.mkdir()
+                except Lost:
+                    job.report.say("its node or worker was lost; it goes on elsewhere")
+                    shutil.rmtree(job.out)
+                    job.out.mkdir()
             raise StageFailed(f"lost its node or worker {TRIES} times; is there too little memory for it?")
         finally:
             (job.work / TOKEN).unlink(missing_ok=True)
 
     def spread(self, paths: Iterable[Path]) -> NodeSpread:
-        """Shares out pieces that read these folders of this machine."""
-        folders = {path: self._folder(path) for path in paths}
-        return NodeSpread(identity(), folders, lambda: False, lambda slow: None, copy=self.copy)
+        """The nodes for calls that read these folders of this machine."""
+        return NodeSpread({path: self._folder(path) for path in paths}, lambda: False, lambda text: None)
 
     def abort(self) -> None:
         """End all that runs, at once."""
@@ -116,12 +115,11 @@ class Cluster:
         """End all tasks and the connection."""
         self._ray.shutdown()
 
-    def _tried(self, stage: Stage, job: Job, token: str) -> StageOutcome | None:
-        """One attempt; None where its node or worker was lost."""
+    def _attempt(self, stage: Stage, job: Job, token: str) -> Files | None:
+        """One attempt; the stage's output, or None where the node wrote it here. Raises `Lost`."""
         ray = self._ray
         order = Order(
             task=secrets.token_hex(8),
-            identity=identity(),
             run=stage.run,
             recipe=job.recipe,
             key=job.key,
@@ -132,140 +130,95 @@ class Cluster:
             work=str(job.work.absolute()),
             token=token,
             workers=min(job.workers, self.largest),
-            copy=self.copy,
         )
         scratch = (ray.put({name: content for name, content in files_of(job.work).items() if name != TOKEN}),)
         # One that only waits for its pieces must not keep them waiting.
         cores = 0 if stage.spreads(job.recipe) else order.workers
         task = self._execute.options(num_cpus=cores, name=stage.name).remote(order, scratch, self._mailbox)
-        self._begun[order.task] = told = False
+        begun = stopping = False
         try:
             while True:
                 ready, _ = ray.wait([task], timeout=POLL)
                 for event in ray.get(self._mailbox.collect.remote(order.task)):
-                    self._begun[order.task] = True
-                    _tell(job, event)
+                    begun = True
+                    _pass_on(job, event)
                 if ready:
-                    outcome: StageOutcome = ray.get(task)
-                    return outcome
+                    output: Files | None = ray.get(task)
+                    return output
                 if self.aborted:
                     raise KeyboardInterrupt
-                if job.interrupted() and not self._begun[order.task]:
+                if job.interrupted() and not begun:
                     raise Interrupted("waited for a node")
-                if job.interrupted() and not told:
-                    told = True
+                if job.interrupted() and not stopping:
+                    stopping = True
                     ray.get(self._mailbox.stop.remote(order.task))
-        except ray.exceptions.RayTaskError:
-            raise
-        except ray.exceptions.RayError:
-            return None
+        except ray.exceptions.RayError as error:
+            cause = getattr(error, "cause", None)
+            if isinstance(cause, IowbcError):
+                raise cause from None
+            if isinstance(error, ray.exceptions.RayTaskError) and not isinstance(cause, ray.exceptions.RayError):
+                raise RuntimeError(f"on a node:\n{error}") from None
+            raise Lost from error
         except BaseException:
             ray.cancel(task, force=True)
             ray.wait([task], timeout=ABORT_PATIENCE)
             raise
-        finally:
-            del self._begun[order.task]
 
-    def _conclude(self, stage: Stage, job: Job, outcome: StageOutcome) -> None:
-        if outcome.state == "mismatch":
-            raise StageFailed(f"a node is not as this machine: {outcome.text}; install the same on both")
-        if outcome.state == "stopped":
-            raise Interrupted(outcome.text)
-        if outcome.state == "failed":
-            raise StageFailed(outcome.text)
-        if outcome.state == "error":
-            raise RuntimeError(f"on a node:\n{outcome.text}")
-        if outcome.out is not None:
-            write_files(job.out, outcome.out)
-
-    def _folder(self, path: Path) -> Folder:
+    def _folder(self, path: Path) -> SharedFolder:
         """A folder that nodes can fetch; each goes into the object store once."""
         if path not in self._folders:
-            files = self._ray.put(files_of(path))
-            self._folders[path] = Folder(str(path.absolute()), folder_digest(path), (files,))
+            files = (self._ray.put(files_of(path)),)
+            self._folders[path] = SharedFolder(
+                str(path.absolute()), folder_digest(path), files, identity(), copy=self.copy
+            )
         return self._folders[path]
-
-    def _nodes(self) -> str:
-        count = len(self._alive())
-        return f"{count} node{'s' if count != 1 else ''}"
 
     def _alive(self) -> list[dict[str, Any]]:
         return [node for node in self._ray.nodes() if node["Alive"]]
-
-    def _require_alike(self) -> None:
-        """Raises `UsageError` naming each node whose packages or code differ from this machine's.
-
-        A node that dies while it is asked is as one that died before.
-        """
-        from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
-
-        ask = self._ray.remote(num_cpus=0, max_retries=0)(identity)
-        nodes = self._alive()
-        asked = [
-            ask.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)).remote()
-            for node in nodes
-        ]
-        problems = []
-        for node, reference in zip(nodes, asked, strict=True):
-            try:
-                different = identity().mismatch(self._ray.get(reference))
-            except self._ray.exceptions.RayError as error:
-                if node["NodeID"] not in [one["NodeID"] for one in self._alive()]:
-                    continue
-                different = f"cannot run iowbc: {str(error).strip().splitlines()[-1]}"
-            if different:
-                problems.append(f"node {node['NodeManagerAddress']}: {different}")
-        if problems:
-            self.close()
-            raise UsageError("\n".join([*problems, "install the same version of iowbc on all nodes"]))
 
 
 @contextmanager
 def connected(address: str, *, copy: bool) -> Iterator[Cluster]:
     """A connection to the end of the block; so long lives a local cluster, too. Raises `UsageError`."""
-    if shares := loopback.shares(address):
-        with begun_here(shares, copy=copy) as cluster:
-            yield cluster
-        return
-    _require_ray()
-    with closing(Cluster(address, copy=copy)) as cluster:
-        yield cluster
-
-
-@contextmanager
-def begun_here(cores: Sequence[int], *, copy: bool) -> Iterator[Cluster]:
-    """A cluster of this machine alone to the end of the block, with the cores of each node. Raises `UsageError`."""
-    _require_ray()
-    os.environ.update(loopback.ALONE)
-    for name, value in loopback.secured().items():
-        os.environ.setdefault(name, value)  # Ray reads a token once in a process
-    with loopback.nodes(cores) as address, closing(Cluster(address, copy=copy)) as cluster:
-        yield cluster
-
-
-def _require_ray() -> None:
-    """Raises `UsageError` where it is not installed; else sets it up as iowbc wants it."""
     if find_spec("ray") is None:
         raise UsageError("Ray is needed, which this installation leaves out: `pip install 'iowbc[cluster]'`")
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
+    with closing(Cluster(address, copy=copy)) as cluster:
+        yield cluster
 
 
 def _initialised(address: str) -> Any:
+    """Ray, connected. Raises `UsageError`."""
+    if address != LOCAL:
+        return _connected(address)
+    os.environ.update(ALONE)
+    os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # Ray reads a token once in a process
+    settings = {"num_cpus": available_cores(), "object_store_memory": OBJECT_STORE, "include_dashboard": False}
+    folder = tempfile.mkdtemp(prefix="iowbc-ray-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    for _ in range(STARTS - 1):
+        with suppress(UsageError):
+            return _connected(address, **settings, _temp_dir=folder)
+    return _connected(address, **settings, _temp_dir=folder)
+
+
+def _connected(address: str, **settings: Any) -> Any:
     import ray
 
     try:
-        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+        ray.init(address=address, log_to_driver=False, logging_level="ERROR", **settings)
     except Exception as error:  # Ray raises this and that
+        ray.shutdown()
         raise UsageError(
-            f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local, or local:NODES (this machine "
-            "alone), auto (the one that `ray start` began here), HOST:PORT, or ray://HOST:PORT"
+            f"--address {address}: {str(error).strip().splitlines()[0]}; valid: local (this machine alone), auto (the "
+            "one that `ray start` began here), HOST:PORT, or ray://HOST:PORT"
         ) from error
     return ray
 
 
-def _tell(job: Job, event: Event) -> None:
-    """Pass on what a task has told."""
+def _pass_on(job: Job, event: Event) -> None:
+    """Pass on what a task has reported."""
     kind, *rest = event
     if kind == "metrics":
         job.report.metrics(*rest)

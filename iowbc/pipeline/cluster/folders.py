@@ -3,13 +3,14 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iowbc.errors import Damaged
+from iowbc.errors import Damaged, StageFailed
 from iowbc.files import replacing
+from iowbc.pipeline.machine import Identity, identity
 from iowbc.pipeline.store.digests import folder_digest, folder_files
 
 Files = Mapping[str, bytes]
@@ -17,15 +18,18 @@ Files = Mapping[str, bytes]
 
 
 @dataclass(frozen=True)
-class Folder:
-    """A folder that a stage reads."""
+class SharedFolder:
+    """A folder of the driver that tasks on other nodes read."""
 
     path: str
-    """Where it lies on the driver."""
+    """Its place on the driver."""
     digest: str
     """Of its files, names and contents."""
     content: tuple[Any, ...]
     """Ray's reference to its files; inside a tuple, so that a node fetches it only when it asks."""
+    driver: Identity
+    copy: bool
+    """True where a node reads a copy of its own although it may see the driver's folder."""
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
@@ -40,14 +44,18 @@ def write_files(folder: Path, files: Files) -> None:
             fresh.write_bytes(content)
 
 
-def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path:
-    """Where a folder lies on this machine: where the driver has it, if this machine sees it; else a copy of its own.
+def placed(folder: SharedFolder) -> Path:
+    """The folder on this machine: the driver's own, if this machine sees it; else a copy.
 
-    The copy stays for later stages, under the folder's own name, which is the key of an artifact. copy: take a copy in
-    any case. Raises `Damaged` where what arrives differs.
+    The copy stays for later stages, under the folder's own name, which is the key of an artifact. Raises `StageFailed`
+    where this machine would give other results than the driver, `Damaged` where what arrives differs.
     """
+    import ray
+
+    if different := folder.driver.mismatch(identity()):
+        raise StageFailed(f"a node is not as the driver: {different}; install the same on both")
     there = Path(folder.path)
-    if not copy and there.is_dir() and folder_digest(there) == folder.digest:
+    if not folder.copy and there.is_dir() and folder_digest(there) == folder.digest:
         return there
     own = _cache() / folder.digest / there.name
     if own.is_dir():
@@ -55,7 +63,7 @@ def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path
             return own
         shutil.rmtree(own, ignore_errors=True)
     fresh = Path(tempfile.mkdtemp(dir=_cache()))
-    write_files(fresh, fetch(folder.content[0]))
+    write_files(fresh, ray.get(folder.content[0]))
     if folder_digest(fresh) != folder.digest:
         shutil.rmtree(fresh)
         raise Damaged(f"{folder.path} differs from its digest after its way through Ray's object store")
@@ -68,7 +76,7 @@ def placed(folder: Folder, fetch: Callable[[Any], Files], *, copy: bool) -> Path
 
 
 def _cache() -> Path:
-    """Where this user's nodes keep what they have fetched. Raises `Damaged` where it belongs to somebody else."""
+    """Folder of this user's fetched copies. Raises `Damaged` where it belongs to somebody else."""
     own = Path(tempfile.gettempdir(), f"iowbc-{os.getuid()}")
     own.mkdir(exist_ok=True, mode=0o700)
     if own.stat().st_uid != os.getuid():

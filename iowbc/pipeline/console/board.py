@@ -1,4 +1,4 @@
-"""What the console shows of many runs at once: how each stands, and the last line that it has said."""
+"""Many runs on the console: the state of each, and the last line of its log."""
 
 import time
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.pipeline.console.display import StageView
 from iowbc.pipeline.console.live_table import STYLES
 from iowbc.pipeline.console.wording import duration
 
@@ -22,23 +23,11 @@ LAST_SHOWN = 5
 
 
 @dataclass
-class RunView:
-    """What is known of one of many runs."""
+class RunView(StageView):
+    """State of one of many runs."""
 
-    name: str
-    log: Path
-    """What it prints."""
-    state: str = "waits"
-    note: str = ""
-    began: float = 0.0
-    """On the monotonic clock [s]."""
-    ended: float = 0.0
-    """On the monotonic clock [s]."""
-
-    @property
-    def spent(self) -> float | None:
-        """Time since its beginning, or until its end [s]; None before it runs."""
-        return (self.ended or time.monotonic()) - self.began if self.began else None
+    log: Path = Path()
+    """Log of its output."""
 
 
 @dataclass
@@ -50,10 +39,10 @@ class Board:
     """Seconds between two lines of progress where the output is not a terminal."""
     quiet: bool = False
     stopping: Callable[[], str] = lambda: ""
-    """What to show once a stop was asked for; empty before."""
+    """Text about a requested stop; empty before."""
     views: dict[str, RunView] = field(default_factory=dict)
-    load: Callable[[], str] = lambda: ""
-    """How much of a cluster is in use; empty without one."""
+    _over: list[RunView] = field(default_factory=list)
+    """In the order in which they have ended."""
     _live: Live | None = None
     _shown: float = field(default_factory=time.monotonic)
 
@@ -77,10 +66,9 @@ class Board:
     def ended(self, name: str, state: str, note: str) -> None:
         """A run has ended: `done`, `failed` or `stopped`."""
         view = self.views[name]
-        view.state, view.note = state, note
-        if view.began:
-            view.ended = time.monotonic()
-        took = f" in {duration(view.spent)}" if view.began else ""
+        view.state, view.note, view.seconds = state, note, view.spent
+        self._over.append(view)
+        took = f" in {duration(view.seconds)}" if view.seconds is not None else ""
         self._say(f"{name}: {state}{took}{f' - {note}' if note else ''} ({self._counts()})", lost=state == "failed")
 
     def refresh(self) -> None:
@@ -91,8 +79,6 @@ class Board:
             self._live.refresh()
         elif self._live is None and now - self._shown > self.interval:
             self._shown = now
-            if self.load():
-                self._say(self.load())
             for view in self.views.values():
                 if view.state == "runs":
                     self._say(f"{view.name}: {last_line(view.log)}")
@@ -111,16 +97,13 @@ class Board:
         table = Table(box=None, padding=(0, 1, 0, 0))
         for name in ("run", "state", "spent", "says"):
             table.add_column(name, no_wrap=True, overflow="ellipsis")
-        over = [view for view in self.views.values() if view.state not in ("waits", "runs")]
-        over.sort(key=lambda view: view.ended)
         running = [view for view in self.views.values() if view.state == "runs"]
-        for view in (*over[-LAST_SHOWN:], *running):
+        for view in (*self._over[-LAST_SHOWN:], *running):
             text = view.note or (last_line(view.log) if view.state == "runs" else "")
             state = Text(view.state, style=STYLES.get(view.state, ""))
             table.add_row(Text(view.name), state, duration(view.spent), Text(text, style="dim"))
         stopping = self.stopping()
-        counts = ", ".join(filter(None, (self._counts(), self.load())))
-        return Group(table, Text(counts), *([Text(stopping, style="magenta")] if stopping else []))
+        return Group(table, Text(self._counts()), *([Text(stopping, style="magenta")] if stopping else []))
 
 
 def last_line(log: Path) -> str:

@@ -1,10 +1,10 @@
-"""What the console shows of a run: the state of each stage, and its output as plain lines."""
+"""Displays of a run: the state of each stage, and plain lines for logs."""
 
 import os
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import IO
 
@@ -18,7 +18,7 @@ CURVE_POINTS = 200
 
 @dataclass
 class StageView:
-    """What is known of a stage while a recipe runs."""
+    """State of a stage while a recipe runs."""
 
     name: str
     state: str = "waits"
@@ -87,7 +87,7 @@ class StageView:
 
 
 class Display:
-    """Where a run shows how it goes; this one shows nothing."""
+    """Display of a run; this one shows nothing."""
 
     def begin(self, views: Sequence[StageView]) -> None:
         """Start to show these stages."""
@@ -108,11 +108,10 @@ class Display:
 class PlainDisplay(Display):
     """Lines for logs: each change of state, and progress once in a while."""
 
-    def __init__(self, interval: float, stream: IO[str] | None = None, load: Callable[[], str] = lambda: "") -> None:
-        """interval: seconds between two lines of progress. load: how much of a cluster is in use; empty without one."""
+    def __init__(self, interval: float, stream: IO[str] | None = None) -> None:
+        """interval: seconds between two lines of progress."""
         self.interval = interval
         self.stream = stream or sys.stdout
-        self._load = load
         self._last = time.monotonic()
 
     def changed(self, view: StageView) -> None:
@@ -133,8 +132,6 @@ class PlainDisplay(Display):
             parts.append(f"{duration(view.left)} left")
         if view.curve:
             parts.append(f"{view.metric} {view.values[-1]:.4g}")
-        if load := self._load():
-            self.say(load)
         self.say("  ".join([*parts, view.note] if view.note else parts))
 
     def say(self, text: str) -> None:

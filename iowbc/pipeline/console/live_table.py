@@ -49,14 +49,10 @@ def sparkline(values: Sequence[float], width: int = CURVE_WIDTH) -> str:
 class LiveTable(Display):
     """One row a stage, redrawn in place, with what the stages note beneath; lines that are said scroll by above it."""
 
-    def __init__(
-        self, console: Console, stopping: Callable[[], str] = lambda: "", load: Callable[[], str] = lambda: ""
-    ) -> None:
-        """stopping: what to show once the run was asked to stop; empty before. load: how much of a cluster is in use;
-        empty without one."""
+    def __init__(self, console: Console, stopping: Callable[[], str] = lambda: "") -> None:
+        """stopping: text about a requested stop; empty before."""
         self.console = console
         self._stopping = stopping
-        self._load = load
         self._views: Sequence[StageView] = ()
         self._live = Live(console=console, get_renderable=self._drawn, refresh_per_second=REFRESH_RATE)
 
@@ -80,8 +76,8 @@ class LiveTable(Display):
     def _drawn(self) -> Constrain:
         width = self.console.width
         notes = [_note(view) for view in self._views if view.note] if width >= WITH_NOTES else []
-        said = (Text(self._load(), style="dim"), Text(self._stopping(), style="magenta"))
-        return Constrain(Group(self._table(width), *notes, *filter(None, said)), width - ECHO)
+        stopping = [Text(self._stopping(), style="magenta")] if self._stopping() else []
+        return Constrain(Group(self._table(width), *notes, *stopping), width - ECHO)
 
     def _table(self, width: int) -> Table:
         table = Table(box=None, padding=(0, 1, 0, 0), expand=False)
@@ -108,7 +104,7 @@ def _row(view: StageView) -> tuple[Text | ProgressBar | str, ...]:
 
 
 def _note(view: StageView) -> Text:
-    """What a stage notes, in one line."""
+    """A stage's note in one line."""
     return Text(f"{view.name}: {view.note}", style="dim", no_wrap=True, overflow="ellipsis")
 
 

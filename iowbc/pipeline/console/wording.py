@@ -33,7 +33,7 @@ def pace(rate: float | None) -> str:
 
 
 def ago(moment: float) -> str:
-    """How long ago a moment [s since 1970] was; empty for 0."""
+    """Time since a moment [s since 1970], in words; empty for 0."""
     return f"{duration(max(0.0, time.time() - moment))} ago" if moment else ""
 
 

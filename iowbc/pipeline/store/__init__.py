@@ -1,1 +1,1 @@
-"""What runs leave on disk: artifacts, locks, work folders."""
+"""Files of runs: artifacts, locks, work folders."""

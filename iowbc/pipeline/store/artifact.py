@@ -23,7 +23,7 @@ MANIFEST = "manifest.json"
 INGREDIENTS = "key.json"
 RECIPE = "recipe.yaml"
 BESIDE = (INGREDIENTS, RECIPE)
-"""What is written beside a stage's own files."""
+"""Files beside a stage's own."""
 
 
 class FileRecord(BaseModel):
@@ -36,7 +36,7 @@ class FileRecord(BaseModel):
 
 
 class Manifest(BaseModel):
-    """What an artifact is, written last."""
+    """Description of an artifact, written last."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -52,7 +52,7 @@ class Manifest(BaseModel):
     omitted: tuple[str, ...] = ()
     """Those among them that a published copy leaves out, for their size or kind."""
     beside: dict[str, FileRecord]
-    """What the key was computed from, and the recipe."""
+    """The key's ingredients, and the recipe."""
     recipe: str
     """Name of the recipe that made it."""
     made: float
@@ -80,16 +80,16 @@ class Artifact:
     folder: Path
     manifest: Manifest
     published: bool = False
-    """Whether it came with the repository, and is only read."""
+    """True where it came with the repository, and is only read."""
 
     @property
     def whole(self) -> bool:
-        """Whether all results are there; of a published one, what is large may be missing."""
+        """True where all results are there; of a published one, large files may be missing."""
         return not set(self.manifest.omitted) & set(self.manifest.results)
 
     @property
     def ingredients(self) -> dict[str, Any]:
-        """What its key was computed from; empty where that is not readable or does not give the key."""
+        """Ingredients of its key; empty where they are not readable or do not give the key."""
         found = read_json(self.folder / INGREDIENTS)
         try:
             return found if isinstance(found, dict) and data_digest(found) == self.manifest.key else {}
@@ -197,7 +197,7 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
 
 
 def _sealed(found: Any) -> bool:
-    """Whether a manifest is what was written, also by a newer version with more entries."""
+    """True for a manifest as it was written, also by a newer version with more entries."""
     if not isinstance(found, dict):
         return False
     try:

@@ -1,4 +1,4 @@
-"""What each recipe used last, of which `status` and `show` tell, and ever, which `gc` spares."""
+"""Artifacts that each recipe used last, for `status` and `show`, and ever, which `gc` spares."""
 
 import json
 import shlex
@@ -52,7 +52,7 @@ def recall(runs: Runs, recipe: str) -> dict[str, Any]:
 
 
 def record_path(runs: Runs, recipe: str) -> Path:
-    """Where the record of a recipe stands."""
+    """Path of the record of a recipe."""
     return runs.recipes / f"{recipe}.json"
 
 

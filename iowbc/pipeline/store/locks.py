@@ -18,7 +18,7 @@ POLL = 0.2
 
 @dataclass(frozen=True)
 class Holder:
-    """Who holds a lock."""
+    """Holder of a lock."""
 
     pid: int
     host: str
@@ -35,7 +35,7 @@ def lock_path(runs: Runs, key: str) -> Path:
 
 
 def holder(runs: Runs, key: str) -> Holder | None:
-    """Who works on a key at this moment, or None."""
+    """Holder of a key at this moment, or None."""
     path = lock_path(runs, key)
     if not path.exists():
         return None

@@ -1,4 +1,4 @@
-"""Where everything that runs leave behind is kept."""
+"""Folders of everything that runs leave behind."""
 
 import json
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Runs:
 
     @property
     def recipes(self) -> Path:
-        """What each recipe used last, `<name>.json`."""
+        """Artifacts that each recipe used last, `<name>.json`."""
         return self.root / "recipes"
 
     @property
@@ -70,7 +70,7 @@ class Runs:
 
     @property
     def sweeps(self) -> Path:
-        """What each sweep consists of and came to, `<name>/`."""
+        """Points and results of each sweep, `<name>/`."""
         return self.root / "sweeps"
 
     @property
@@ -85,7 +85,7 @@ class Runs:
 
     @property
     def npm(self) -> Path:
-        """What npm fetched for web pages, a folder for each set of versions."""
+        """Packages that npm fetched for web pages, a folder for each set of versions."""
         return self.root / "npm"
 
     @property

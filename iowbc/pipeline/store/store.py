@@ -17,7 +17,7 @@ class Store:
         self.runs = runs
 
     def folder(self, stage: str, key: str) -> Path:
-        """Where the artifact of a stage and key stands, or would stand."""
+        """Folder of the artifact of a stage and key, whether or not it is there."""
         return self.runs.store / stage / key
 
     def find(self, stage: str, key: str) -> Artifact | None:

@@ -6,20 +6,39 @@ import shutil
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from iowbc.files import write_whole
 from iowbc.pipeline.machine import host
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE
-from iowbc.pipeline.store.runs import Runs, read_json
+from iowbc.pipeline.store.runs import Runs
 
 PROGRESS = "progress.json"
-NUMBERS = ("attempts", "before", "seconds", "updated", "done", "total")
-"""Entries of the progress that are numbers."""
-LARGEST = 1e18
-"""No entry is larger: neither steps nor seconds; infinity is none of them."""
+Number = Annotated[float, Field(strict=True, gt=-1e18, lt=1e18)]
+"""Steps or seconds, of which there are not so many."""
 WRITE_INTERVAL = 1.0
 """Seconds between two records of the progress on disk."""
+
+
+class Progress(BaseModel):
+    """Record of a work folder; a number that was not recorded, or whose name a flipped bit changed, is 0."""
+
+    model_config = ConfigDict(extra="allow")
+
+    attempts: int = Field(default=0, strict=True, ge=0, lt=10**9)
+    before: Number = 0.0
+    """Time spent in earlier attempts [s]."""
+    seconds: Number = 0.0
+    """Time spent over all attempts [s]."""
+    updated: Number = 0.0
+    """Time of the record [s since 1970]."""
+    done: Number = 0.0
+    total: Number = 0.0
+    curve: list[tuple[Number, float]] = Field(default_factory=list)
+    """Steps and values of the small curve."""
+    code: dict[str, str] = Field(default_factory=dict)
 
 
 class Workspace:
@@ -37,7 +56,7 @@ class Workspace:
 
     @property
     def record(self) -> dict[str, Any]:
-        """What the last attempt recorded; empty where there was none."""
+        """Record of the last attempt; empty where there was none."""
         return _record(self.root)
 
     def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> bool:
@@ -110,7 +129,7 @@ class Workspace:
 
     @property
     def leftover(self) -> bool:
-        """Whether the output has gone to the store and the rest stayed."""
+        """True where the output has gone to the store and the rest stayed."""
         return self.root.is_dir() and not self.out.is_dir()
 
     def remove(self) -> None:
@@ -119,32 +138,15 @@ class Workspace:
 
 
 def _record(root: Path) -> dict[str, Any]:
-    """What a work folder says of its stage; empty where that is missing or not what was written.
-
-    A number that was not recorded, or whose name a flipped bit changed, is 0.
-    """
-    found = read_json(root / PROGRESS)
-    if not found or not isinstance(found, dict):
+    """`Progress` of a work folder; empty where that is missing or not as it was written."""
+    try:
+        return Progress.model_validate_json((root / PROGRESS).read_bytes()).model_dump()
+    except (OSError, ValueError):
         return {}
-    curve = found.get("curve", [])
-    numbers = all(_is_number(found.get(name, 0.0)) for name in NUMBERS)
-    numbers &= isinstance(curve, list) and all(_is_point(point) for point in curve)
-    whole = numbers and isinstance(found.get("code", {}), dict)
-    return dict.fromkeys(NUMBERS, 0.0) | found if whole else {}
-
-
-def _is_number(entry: Any) -> bool:
-    """Whether an entry is a number that can be counted with."""
-    return isinstance(entry, (int, float)) and abs(entry) < LARGEST
-
-
-def _is_point(point: Any) -> bool:
-    """Whether a point of a small curve is its step and value."""
-    return isinstance(point, list) and len(point) == 2 and all(isinstance(part, (int, float)) for part in point)
 
 
 def _finished(runs: Runs, root: Path) -> bool:
-    """Whether the output of a work folder is in the store already."""
+    """True where the output of a work folder is in the store already."""
     return not (root / "out").is_dir() and any(runs.store.glob(f"*/{root.name}"))
 
 

@@ -15,10 +15,8 @@ from iowbc.pipeline.tracking.delivery import Delivery
 
 POLL = 0.5
 """Seconds between two looks at the journals of living processes."""
-RETRIES = 3
-"""Attempts at a server that does not answer, after the last living process has gone."""
-RETRY_WAIT = 2.0
-"""Seconds before another attempt at a server that did not answer."""
+RETRIES, RETRY_WAIT = 3, 2.0
+"""Attempts at a server that does not answer, after the last living process has gone, and seconds between them."""
 
 
 def main(root: Path) -> int:
@@ -26,16 +24,14 @@ def main(root: Path) -> int:
     os.environ["MLFLOW_DISABLE_TELEMETRY"] = "true"
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "10")
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "1")
-    runs = Runs(root)
-    deliveries: dict[Path, Delivery] = {}
+    runs, deliveries = Runs(root), dict[Path, Delivery]()
     with named_lock(runs.tracking / "sender.lock"):
         failures = 0
         while True:
+            paths = sorted(runs.tracking.glob("*.jsonl"))
+            deliveries = {path: deliveries.get(path) or Delivery(runs, path) for path in paths}
             living, failed = False, False
-            for path in sorted(runs.tracking.glob("*.jsonl")):
-                if path not in deliveries:
-                    deliveries[path] = Delivery(runs, path)
-                delivery = deliveries[path]
+            for delivery in deliveries.values():
                 living |= delivery.lives()
                 failed |= not delivery.advance()
             failures = failures + 1 if failed else 0

@@ -1,7 +1,4 @@
-"""What a run tells MLflow.
-
-It is written to a journal at once; a process of its own sends it, so that nothing here waits for a server.
-"""
+"""Records of runs: written to a journal at once, sent by a process of its own, so that no run waits for a server."""
 
 import contextlib
 import os
@@ -23,7 +20,6 @@ from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
 from iowbc.processes import SINGLE_THREADED
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.reading.loading import LoadedRecipe
-from iowbc.recipe.reading.writing import as_yaml
 
 PARENT = "recipe"
 """Identifier of the parent run within a journal; a nested run has its stage's name."""
@@ -35,41 +31,113 @@ DESCRIPTION = "mlflow.note.content"
 """Tag that MLflow shows as a run's description."""
 
 
-class Tracker:
+class RunRecord:
+    """A run in its journal, and the process that sends the journal to MLflow."""
+
+    def __init__(self, runs: Runs, journal: Journal | None, patience: float = 0.0) -> None:
+        """journal: None for one that begins later. patience: time that MLflow has at the end to take everything [s]."""
+        self.runs, self.patience = runs, patience
+        self._open = journal
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def _journal(self) -> Journal:
+        assert self._open is not None
+        return self._open
+
+    def send(self) -> None:
+        """Start a sender where none is at work."""
+        if self._process is None or self._process.poll() is not None:
+            with contextlib.suppress(OSError):  # without a sender the journal waits for that of the next run
+                self._process = start_sender(self.runs)
+
+    def describe(self, text: str, figures: Mapping[str, float] | None = None, files: Sequence[Path] = ()) -> None:
+        """Add a description in Markdown, numbers by name, and files below `runs`; of a run that has begun."""
+        if self._open is None:
+            return
+        if text:
+            self._journal.write("tags", id=PARENT, tags={DESCRIPTION: text})
+        if figures:
+            self.metrics(PARENT, figures, 0)
+        if files:
+            self._files(PARENT, files)
+
+    def metrics(self, name: str, values: Mapping[str, float], step: int) -> None:
+        """Values of a run at a step, under names that MLflow accepts."""
+        cleaned = {re.sub(r"[^\w\-. :/]", "_", known): float(value) for known, value in values.items()}
+        self._journal.write("metrics", id=name, values=cleaned, step=step)
+
+    def close(self, status: str, *, wait: bool = True) -> bool:
+        """End the run with MLflow's status and let the sender take what is left; True where MLflow has everything.
+
+        A run that has not begun has nothing to send.
+        """
+        if self._open is None:
+            return True
+        path = self._open.path
+        with contextlib.suppress(OSError):  # the run has ended as it did, whether or not that can be written
+            self._open.write("end", id=PARENT, status=status)
+        self._open.close()
+        self.send()
+        limit = time.monotonic() + (self.patience if wait else 0.0)
+        while unsent(path) and time.monotonic() <= limit:
+            if self._process is not None and self._process.poll() is not None:
+                break
+            time.sleep(0.05)
+        return not unsent(path)
+
+    def _files(self, name: str, paths: Sequence[Path]) -> None:
+        self._journal.write("files", id=name, paths=[os.path.relpath(path, self.runs.root) for path in paths])
+
+
+class SweepRecord(RunRecord):
+    """The run above those of a sweep's points, which record themselves. One that did not finish is continued."""
+
+    def __init__(
+        self, runs: Runs, name: str, experiment: str, settings: Mapping[str, Mapping[str, object]], patience: float
+    ) -> None:
+        """settings: of each point by its name. patience: see `RunRecord`."""
+        digest = data_digest({"sweep": name, "points": {point: dict(varied) for point, varied in settings.items()}})
+        axes: dict[str, dict[str, None]] = {}
+        for path, value in (item for varied in settings.values() for item in varied.items()):
+            axes.setdefault(path, {})[str(value)] = None
+        params = {"sweep": name, "points": str(len(settings)), **{path: ", ".join(axis) for path, axis in axes.items()}}
+        journal = unfinished_journal(runs, name, digest) or new_journal(runs, name, experiment, digest, params)
+        super().__init__(runs, journal, patience)
+
+    @property
+    def origin(self) -> str:
+        """The run's name in other journals."""
+        return f"{self._journal.path.stem}/{PARENT}"
+
+
+class Tracker(RunRecord):
     """Records one recipe run and its stages. A run of the same recipe that did not finish is continued."""
 
     def __init__(self, runs: Runs, loaded: LoadedRecipe, within: str | None = None) -> None:
         """within: the run of another journal above this one, which sees to the sender, too."""
-        self.runs = runs
         self.within = within
-        self.patience = loaded.recipe.execution.tracking_patience
-        self._sender = Sender(runs)
-        self._loaded = loaded
+        self._recipe = loaded.recipe
+        self._resolved = loaded.recipe.model_dump(mode="json")
         self._cached: list[tuple[str, Artifact]] = []
         """Cached stages of a run that has made nothing yet: it is recorded once it makes something."""
-        self._open = self._continued(loaded)
+        journal = unfinished_journal(runs, self._recipe.name, data_digest(self._resolved))
+        super().__init__(runs, journal, loaded.recipe.execution.tracking_patience)
 
     @property
     def _journal(self) -> Journal:
         """The journal, which begins when it is first needed."""
         if self._open is None:
-            self._open = self._begun(self._loaded)
-            for name, artifact in self._cached:
-                self.finished(name, artifact, cached=True)
+            name, experiment = self._recipe.name, self._recipe.execution.experiment
+            params, digest = parameters(self._resolved), data_digest(self._resolved)
+            self._open = new_journal(self.runs, name, experiment, digest, params, self.within)
+            for stage, artifact in self._cached:
+                self.finished(stage, artifact, cached=True)
         return self._open
 
-    def _begun(self, loaded: LoadedRecipe) -> Journal:
-        recipe = loaded.recipe
-        resolved = recipe.model_dump(mode="json")
-        journal = new_journal(self.runs, recipe.name, recipe.execution.experiment, data_digest(resolved))
-        journal.write(
-            "run", id=PARENT, parent=self.within, name=recipe.name, tags=process_tags(), params=parameters(resolved)
-        )
-        journal.write("text", id=PARENT, file=RECIPE, text=as_yaml(recipe))
-        return journal
-
-    def _continued(self, loaded: LoadedRecipe) -> Journal | None:
-        return unfinished_journal(self.runs, loaded.recipe.name, data_digest(loaded.recipe.model_dump(mode="json")))
+    def send(self) -> None:
+        if self.within is None:
+            super().send()
 
     def stage(self, name: str, key: str, slices: Mapping[str, Any], resumed: bool) -> None:
         """A stage begins to run, or goes on; `slices` is its part of the recipe."""
@@ -80,13 +148,9 @@ class Tracker:
             self._journal.write("run", id=name, parent=PARENT, name=name, tags=tags, params=parameters(slices))
         self.send()
 
-    def metrics(self, name: str, values: Mapping[str, float], step: int) -> None:
-        """Values of a stage at a step."""
-        self._journal.write("metrics", id=name, values=cleaned(values), step=step)
-
     def files(self, name: str, path: Path) -> None:
         """A file or folder of a stage that is still running; a folder's further files follow when it is told again."""
-        self._journal.write("files", id=name, paths=[os.path.relpath(path, self.runs.root)])
+        self._files(name, [path])
 
     def end(self, name: str, status: str, message: str = "") -> None:
         """A stage that ran has ended with MLflow's status FAILED or KILLED."""
@@ -109,65 +173,21 @@ class Tracker:
             self.metrics(name, {f"summary/{key}": value for key, value in artifact.metrics.items()}, 0)
             self.metrics(PARENT, {f"{name}/{key}": value for key, value in artifact.metrics.items()}, 0)
         files = [INGREDIENTS, RECIPE] if cached else [INGREDIENTS, RECIPE, *SHOWN_FOLDERS]
-        folder = os.path.relpath(artifact.folder, self.runs.root)
-        present = [f"{folder}/{file}" for file in files if (artifact.folder / file).exists()]
-        self._journal.write("files", id=name, paths=present)
+        self._files(name, [artifact.folder / file for file in files if (artifact.folder / file).exists()])
+        if not cached:
+            self._files(PARENT, [artifact.folder / RECIPE])
         self._journal.write("end", id=name, status="FINISHED")
 
-    def describe(self, text: str) -> None:
-        """Markdown that MLflow shows with the run."""
-        if self._open is not None:
-            self._journal.write("tags", id=PARENT, tags={DESCRIPTION: text})
 
-    def close(self, status: str, wait: bool) -> bool:
-        """End the parent run and let the sender take what is left; True where MLflow has everything.
-
-        A run that made nothing has nothing to tell.
-        """
-        if self._open is None:
-            return True
-        path = self._journal.path
-        with contextlib.suppress(OSError):  # the run has ended as it did, whether or not that can be written
-            self._journal.write("end", id=PARENT, status=status)
-        self._journal.close()
-        self.send()
-        return self._sender.took(path, self.patience if wait else 0.0)
-
-    def send(self) -> None:
-        """See to it that a sender is at work."""
-        if self.within is None:
-            self._sender.start()
-
-
-class Sender:
-    """The process that sends what the runs of a folder tell; it outlives this one."""
-
-    def __init__(self, runs: Runs) -> None:
-        self.runs = runs
-        self._process: subprocess.Popen[bytes] | None = None
-
-    def start(self) -> None:
-        """See to it that one is at work."""
-        if self._process is None or self._process.poll() is not None:
-            with contextlib.suppress(OSError):  # without a sender the journal waits for that of the next run
-                self._process = start_sender(self.runs)
-
-    def took(self, journal: Path, patience: float) -> bool:
-        """Wait until MLflow has all of a journal, at most so long [s]; whether it has."""
-        limit = time.monotonic() + patience
-        while journal.exists() and unsent(journal):
-            if time.monotonic() > limit or (self._process is not None and self._process.poll() is not None):
-                return not (journal.exists() and unsent(journal))
-            time.sleep(0.05)
-        return True
-
-
-def new_journal(runs: Runs, name: str, experiment: str, digest: str) -> Journal:
-    """A journal that begins; `digest` is of what its run does."""
+def new_journal(
+    runs: Runs, name: str, experiment: str, digest: str, params: Mapping[str, str], within: str | None = None
+) -> Journal:
+    """A journal whose run begins; `digest` is of what the run does. within: see `Tracker`."""
     stamp = time.strftime("%Y%m%d-%H%M%S")
     journal = Journal(runs.tracking / f"{stamp}-{name}-{os.getpid()}.jsonl")
     journal.acquire(CHECKING_TIME)
     journal.write("journal", uri=tracking_uri(), experiment=experiment, recipe=name, digest=digest)
+    journal.write("run", id=PARENT, parent=within, name=name, tags=process_tags(), params=dict(params))
     return journal
 
 
@@ -193,21 +213,9 @@ def record_figures(
 ) -> None:
     """Record a run that has no stages, such as a benchmark: its figures by name, Markdown that describes it, and files
     below `runs`."""
-    with new_journal(runs, name, Execution.model_fields["experiment"].default, "") as journal:
-        journal.write("run", id=PARENT, parent=None, name=name, tags=process_tags(), params={})
-        if figures:
-            journal.write("metrics", id=PARENT, values=cleaned(figures), step=0)
-        if text:
-            journal.write("tags", id=PARENT, tags={DESCRIPTION: text})
-        if files:
-            journal.write("files", id=PARENT, paths=[os.path.relpath(path, runs.root) for path in files])
-        journal.write("end", id=PARENT, status="FINISHED")
-    start_sender(runs)
-
-
-def cleaned(values: Mapping[str, float]) -> dict[str, float]:
-    """Values under names that MLflow accepts."""
-    return {re.sub(r"[^\w\-. :/]", "_", name): float(value) for name, value in values.items()}
+    record = RunRecord(runs, new_journal(runs, name, Execution.model_fields["experiment"].default, "", {}))
+    record.describe(text, figures, files)
+    record.close("FINISHED")
 
 
 def parameters(resolved: Mapping[str, Any]) -> dict[str, str]:
@@ -230,7 +238,7 @@ def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
 
 
 def _log(runs: Runs) -> BinaryIO:
-    """What the sender writes to: its log, or nothing where that cannot be written."""
+    """The sender's log, or nothing where that cannot be written."""
     try:
         return (runs.tracking / "sender.log").open("ab")
     except OSError:
@@ -243,5 +251,5 @@ def backlog(runs: Runs) -> list[Path]:
 
 
 def process_tags() -> dict[str, str]:
-    """This process, by which a run tells whose it is."""
+    """Tags by which a run names its process."""
     return {"iowbc.pid": str(os.getpid()), "iowbc.host": host(), "iowbc.boot": boot()}

@@ -70,6 +70,17 @@ class ArmReference(Section):
     """Bound on the speed of the references [rad/s]; empty takes each joint's own limit from `robot.yaml`."""
 
 
+class Recovery(Section):
+    """Steps that catch the robot while no velocity is commanded: the gait clock runs while the base is felt to fall."""
+
+    tilt: float = Field(default=0.1, gt=0.0)
+    """Felt tilt from the pelvis of the reference posture at which the clock starts [rad]: pitch and roll where the
+    gyroscope carries them within `horizon`. Above it, 20 N·s tip a standing robot; sensor noise stays below."""
+    horizon: float = Field(default=0.25, ge=0.0)
+    """Time over which the tilt goes on at the measured rate [s]: sqrt(h / g) of a pelvis at 0.7 m, so that the sum is
+    the capture point's angle."""
+
+
 class GaitPrior(Section):
     """The gait clock, and the stride that it adds to the support reference while a velocity is commanded."""
 
@@ -97,6 +108,8 @@ class GaitPrior(Section):
     """Commanded planar speed above which the clock runs [m/s]."""
     moving_yaw_rate: float = Field(default=0.1, gt=0.0)
     """Commanded yaw rate above which the clock runs [rad/s]."""
+    recovery: Recovery | None = Field(default=None, json_schema_extra=LATER)
+    """Steps while standing, after a push; empty leaves the clock to the command alone."""
 
 
 class References(Section):

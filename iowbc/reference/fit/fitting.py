@@ -1,6 +1,7 @@
 """Fits the reference network in torch: joint errors, and what they do to feet, height and torso to first order."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +16,7 @@ from iowbc.reference.fit.task_error import LENGTH_ROWS, ROWS
 SMALLEST_SPREAD = 1e-3
 """Least standard deviation by which an input or output is divided: a constant stays constant."""
 FINAL_RATE = 0.01
-"""Last step size over the first."""
+"""Last learning rate over the first."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,17 @@ class Fitted:
     validation_loss: tuple[float, ...]
 
 
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+@_one_thread()
 def fit(
     train: FitData,
     validation: FitData,
@@ -57,22 +69,6 @@ def fit(
 
     One thread and one seeded generator: the result is the same on every run.
     """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        return _fit(train, validation, recipe, seed, epoch_done, interrupted)
-    finally:
-        torch.set_num_threads(threads)
-
-
-def _fit(
-    train: FitData,
-    validation: FitData,
-    recipe: Fit,
-    seed: int,
-    epoch_done: Callable[[int, float, float], None],
-    interrupted: Callable[[], bool],
-) -> Fitted:
     generator = torch.Generator().manual_seed(seed)
     input_mean, input_std = _moments(train.inputs)
     output_mean, output_std = _moments(train.outputs)
@@ -138,14 +134,12 @@ def _moments(values: Array) -> tuple[Array, Array]:
 
 def _network(sizes: list[int], generator: torch.Generator) -> torch.nn.Sequential:
     modules: list[torch.nn.Module] = []
-    for i, (width_in, width_out) in enumerate(pairwise(sizes)):
+    for width_in, width_out in pairwise(sizes):
         layer = torch.nn.Linear(width_in, width_out)
         torch.nn.init.kaiming_uniform_(layer.weight, nonlinearity="linear", generator=generator)
         torch.nn.init.zeros_(layer.bias)
-        modules.append(layer)
-        if i < len(sizes) - 2:
-            modules.append(torch.nn.ELU())
-    return torch.nn.Sequential(*modules)
+        modules += [layer, torch.nn.ELU()]
+    return torch.nn.Sequential(*modules[:-1])
 
 
 def _numbers(network: torch.nn.Sequential) -> tuple[tuple[Array, Array], ...]:

@@ -1,6 +1,5 @@
 """The gates of the fitted network on held-out samples."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +15,7 @@ WORST = 10
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the held-out samples say."""
+    """Metrics and gates on held-out samples."""
 
     metrics: dict[str, float]
     gates: dict[str, dict[str, float | bool | None]]
@@ -46,16 +45,14 @@ def judge_fit(
         "jump": float(jumps.largest.max()),
         "jump_median": float(np.median(jumps.largest)),
     }
-    below: Callable[[float, float], bool] = lambda value, limit: value <= limit  # noqa: E731
-    above: Callable[[float, float], bool] = lambda value, limit: value >= limit  # noqa: E731
     judged: dict[str, dict[str, float | bool | None]] = {}
     failures: list[str] = []
     for name, limit in gates.model_dump().items():
-        holds = above if name == "margin_p1" else below
-        passed = True if limit is None else holds(metrics[name], limit)
-        judged[name] = {"value": metrics[name], "limit": limit, "passed": passed}
+        value = metrics[name]
+        passed = limit is None or (value >= limit if name == "margin_p1" else value <= limit)
+        judged[name] = {"value": value, "limit": limit, "passed": passed}
         if not passed:
-            failures.append(f"{name} is {metrics[name]:.4g}, the limit {limit:.4g}")
+            failures.append(f"{name} is {value:.4g}, the limit {limit:.4g}")
     order = np.argsort(-per_sample)[:WORST]
     worst = [
         f"number {dataset.index[held[i]]} "

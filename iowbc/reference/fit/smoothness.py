@@ -1,4 +1,4 @@
-"""How far the reference jumps for a small step of the command."""
+"""Jumps of the reference for a small step of the command."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a support posture does to feet, height and torso: errors by forward kinematics, and their Jacobian."""
+"""Errors of feet, height and torso of a support posture by forward kinematics, and their Jacobian."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -9,7 +9,7 @@ from iowbc.errors import Rejected
 REGULARISATION = 1e-9
 """Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""
 UNBOUNDED = 1e30
-"""What daqp takes for no bound."""
+"""A bound that daqp takes for none."""
 SOLVED = 1
 """daqp's exit flag of an optimum."""
 

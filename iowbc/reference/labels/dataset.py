@@ -90,7 +90,7 @@ def assemble(plan: SamplePlan, result: Shard) -> Dataset:
 
 
 def reasons(result: Shard) -> dict[str, int]:
-    """How often each reason for rejection came up, most frequent first."""
+    """Counts of the reasons for rejection, most frequent first."""
     names, counts = np.unique(np.array(result.reasons, dtype=np.str_), return_counts=True)
     order = np.argsort(-counts, kind="stable")
     return {str(names[i]): int(counts[i]) for i in order}

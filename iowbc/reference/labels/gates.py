@@ -17,7 +17,7 @@ from iowbc.reference.labels.support_model import SupportModel
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a label was found to be."""
+    """Findings of the gates about a label."""
 
     torque: Array
     """Torques of the support joints in equilibrium, shape (15,) [N·m]."""
@@ -27,7 +27,7 @@ class Evidence:
     """Height reached [m]."""
 
 
-class Judge:
+class LabelJudge:
     """Holds the limits and buffers; one judge serves many labels."""
 
     def __init__(self, support: SupportModel, gates: LabelGates, height: Literal["pelvis", "com"]) -> None:
@@ -64,29 +64,26 @@ class Judge:
         torque = pinocchio.computeStaticTorque(model, data, q, self.forces).copy()
         pinocchio.framesForwardKinematics(model, data, q)
         com = pinocchio.centerOfMass(model, data, q)
-        for sole, place in zip(self.soles, support.stance, strict=True):
-            error = place.actInv(data.oMf[sole])
-            if np.linalg.norm(error.translation) > gates.foot_position:
-                raise Rejected("feet")
-            if np.linalg.norm(pinocchio.log3(error.rotation)) > gates.foot_rotation:
-                raise Rejected("feet")
+        errors = [place.actInv(data.oMf[sole]) for sole, place in zip(self.soles, support.stance, strict=True)]
         height = float(com[2] if self.height == "com" else data.oMf[self.base].translation[2])
-        if abs(height - sample.height) > gates.height:
-            raise Rejected("height")
         turned = pinocchio.log3(sample.torso_rotation().T @ data.oMf[self.torso].rotation)
-        if np.linalg.norm(turned) > gates.orientation:
-            raise Rejected("orientation")
-        if np.abs(torque[:6]).max() > gates.equilibrium:
-            raise Rejected("equilibrium")
-        if (np.abs(torque[6:]) > self.effort + gates.equilibrium).any():
-            raise Rejected("torque")
-        if (posture.wrench @ self.cone.T > self.bound + gates.wrench).any():
-            raise Rejected("friction or centre of pressure")
-        if (q[7:] < robot.lower).any() or (q[7:] > robot.upper).any():
-            raise Rejected("joint limits")
         margin = float(support_margin(self.edges, com[:2]))
-        if margin < gates.support_margin:
-            raise Rejected("support margin")
-        if self.collision.clearance(data)[0] < gates.collision_clearance:
-            raise Rejected("self-collision")
+        moved, tilted = (
+            max(map(np.linalg.norm, sizes))
+            for sizes in ([one.translation for one in errors], [pinocchio.log3(one.rotation) for one in errors])
+        )
+        failed = {
+            "feet": moved > gates.foot_position or tilted > gates.foot_rotation,
+            "height": abs(height - sample.height) > gates.height,
+            "orientation": np.linalg.norm(turned) > gates.orientation,
+            "equilibrium": np.abs(torque[:6]).max() > gates.equilibrium,
+            "torque": (np.abs(torque[6:]) > self.effort + gates.equilibrium).any(),
+            "friction or centre of pressure": (posture.wrench @ self.cone.T > self.bound + gates.wrench).any(),
+            "joint limits": (q[7:] < robot.lower).any() or (q[7:] > robot.upper).any(),
+            "support margin": margin < gates.support_margin,
+            "self-collision": self.collision.clearance(data)[0] < gates.collision_clearance,
+        }
+        for reason, found in failed.items():
+            if found:
+                raise Rejected(reason)
         return Evidence(torque[6 + robot.support], margin, height)

@@ -1,22 +1,26 @@
-"""Labels samples by number: what runs in each worker process."""
+"""The labeller of a worker process: samples by number, posture, gates."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.gates import LabelJudge
 from iowbc.reference.labels.plan import SamplePlan
-from iowbc.reference.labels.sample import Posture, Sample
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.static import StaticMethod
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import load_robot
 
+if TYPE_CHECKING:
+    from iowbc.reference.labels.optimal_control import OptimalControlMethod
+
 
 class Solver(Protocol):
-    """What a worker process holds: it draws samples and labels them one at a time."""
+    """Draws samples and labels them one at a time, in a worker process."""
 
     def draw(self, indices: Indices) -> list[Sample]:
         """The samples of these numbers."""
@@ -25,16 +29,9 @@ class Solver(Protocol):
         """Arrays of one label, the same shapes for every sample. Raises `Rejected` with a reason."""
 
 
-class Method(Protocol):
-    """A way to find the support posture of a sample."""
-
-    def solve(self, sample: Sample) -> Posture:
-        """The posture; raises `Rejected`."""
-
-
 @dataclass(frozen=True)
 class LabelTask:
-    """How to make a labeller in a worker process."""
+    """Description of a labeller, from which a worker process makes it."""
 
     robot: Path
     """The robot's folder."""
@@ -52,14 +49,10 @@ class Labeller:
 
     def __init__(self, task: LabelTask) -> None:
         robot, recipe = load_robot(task.robot), task.recipe
-        self.plan = SamplePlan(robot, recipe, task.seed)
-        self.support = SupportModel(robot, recipe.problem)
-        self.judge = Judge(self.support, recipe.gates, recipe.height)
-        self.method = make_method(task.method, self.support, recipe)
-
-    def draw(self, indices: Indices) -> list[Sample]:
-        """The samples of these numbers."""
-        return self.plan.draw(indices)
+        self.draw = SamplePlan(robot, recipe, task.seed).draw
+        support = SupportModel(robot, recipe.problem)
+        self.judge = LabelJudge(support, recipe.gates, recipe.height)
+        self.method = make_method(task.method, support, recipe)
 
     def solve(self, index: int, sample: Sample) -> dict[str, Array]:
         """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""
@@ -77,11 +70,11 @@ class Labeller:
         }
 
 
-def make_method(name: Literal["static", "ocp"], support: SupportModel, recipe: ReferenceGenerator) -> Method:
-    """The named way to find postures; crocoddyl is loaded only where it is used."""
+def make_method(
+    name: Literal["static", "ocp"], support: SupportModel, recipe: ReferenceGenerator
+) -> "StaticMethod | OptimalControlMethod":
+    """The named way to find postures, whose `solve` raises `Rejected`; crocoddyl is loaded only where it is used."""
     if name == "static":
-        from iowbc.reference.labels.static import StaticMethod
-
         return StaticMethod(support, recipe.height)
     from iowbc.reference.labels.optimal_control import OptimalControlMethod
 

@@ -1,4 +1,4 @@
-"""Which arms and commands are labelled: a scrambled Sobol sequence, with edges, nominal arms and mirror images."""
+"""Arms and commands to label: a scrambled Sobol sequence, with edges, nominal arms and mirror images."""
 
 import numpy as np
 from scipy.stats import qmc

@@ -36,11 +36,11 @@ STARTS_WITHOUT_WORK = 3
 IDLE = -1
 
 
-class Task(Protocol):
-    """A picklable recipe for a solver."""
+class SolverTask(Protocol):
+    """A picklable description of a solver."""
 
     def prepare(self) -> Solver:
-        """Makes the solver; called once in each worker."""
+        """The solver; called once in each worker."""
 
 
 @dataclass
@@ -54,7 +54,7 @@ class _Worker:
 
 @dataclass
 class _Book:
-    """Which chunks remain, and which samples brought a worker down."""
+    """The chunks that remain, and the samples that brought a worker down."""
 
     waiting: list[int]
     crashed: dict[int, list[int]] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class _Book:
 
 
 def label_all(
-    task: Task,
+    task: SolverTask,
     indices: Sequence[int],
     *,
     folder: Path,
@@ -82,8 +82,7 @@ def label_all(
     chunks, paths = cut(indices, chunk_size, folder)
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
     book = _Book([number for number in range(len(chunks)) if number not in done])
-    ready = sum(len(chunks[number]) for number in done)
-    progress(ready, len(indices))
+    progress(sum(len(chunks[number]) for number in done), len(indices))
     team = [_start_worker(task, key) for _ in range(min(max(workers, 1), len(book.waiting)))]
     try:
         while len(done) < len(chunks):
@@ -91,7 +90,8 @@ def label_all(
                 raise Interrupted("finished shards are kept")
             for worker in team:
                 _assign(worker, book, chunks, paths)
-            for worker in _with_news(team):
+            ready = wait([worker.connection for worker in team], timeout=POLL)
+            for worker in [worker for worker in team if worker.connection in ready]:
                 number = _receive(worker)
                 if number is None:
                     _on_death(worker, book)
@@ -103,8 +103,7 @@ def label_all(
                         f"{paths[number]}: the shard just written cannot be read back; is the disk full?"
                     )
                 done[number], worker.chunk = shard, None
-                ready += len(chunks[number])
-                progress(ready, len(indices))
+                progress(sum(len(chunks[number]) for number in done), len(indices))
     finally:
         for worker in team:
             worker.process.kill()
@@ -113,7 +112,7 @@ def label_all(
     return merge([done[number] for number in range(len(chunks))])
 
 
-def _start_worker(task: Task, key: str) -> _Worker:
+def _start_worker(task: SolverTask, key: str) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     current = context.Value("q", IDLE, lock=False)
@@ -132,11 +131,6 @@ def _assign(worker: _Worker, book: _Book, chunks: Sequence[Sequence[int]], paths
     job = (worker.chunk, chunks[worker.chunk], book.crashed.get(worker.chunk, []), paths[worker.chunk])
     with suppress(BrokenPipeError, ConnectionResetError):  # of a dead worker _receive hears
         worker.connection.send(job)
-
-
-def _with_news(team: Sequence[_Worker]) -> list[_Worker]:
-    ready = wait([worker.connection for worker in team], timeout=POLL)
-    return [worker for worker in team if worker.connection in ready]
 
 
 def _receive(worker: _Worker) -> int | None:
@@ -176,7 +170,7 @@ def _on_death(worker: _Worker, book: _Book) -> None:
         book.waiting.insert(0, worker.chunk)
 
 
-def _work(task: Task, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
+def _work(task: SolverTask, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:
     for ignored in (signal.SIGINT, signal.SIGHUP):
         signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -195,23 +189,19 @@ def _work(task: Task, key: str, connection: Connection, current: Any, parent: in
 
 
 def _label_chunk(solver: Solver, indices: Sequence[int], crashed: Sequence[int], current: Any) -> Shard:
-    kept: list[int] = []
-    labels: list[dict[str, Any]] = []
-    rejected: list[int] = []
-    reasons: list[str] = []
+    labels: dict[int, dict[str, Any]] = {}
+    rejected: dict[int, str] = {}
     for index, sample in zip(indices, solver.draw(np.array(indices)), strict=True):
         if index in crashed:
-            rejected.append(index)
-            reasons.append(CRASHED)
+            rejected[index] = CRASHED
             continue
         current.value = index
         try:
-            labels.append(solver.solve(index, sample))
-            kept.append(index)
+            labels[index] = solver.solve(index, sample)
         except Rejected as reason:
-            rejected.append(index)
-            reasons.append(str(reason))
+            rejected[index] = str(reason)
     current.value = IDLE
-    names = labels[0].keys() if labels else ()
-    stacked = {name: np.stack([label[name] for label in labels]) for name in names}
-    return Shard(np.array(kept, dtype=np.int64), stacked, np.array(rejected, dtype=np.int64), reasons)
+    names = next(iter(labels.values()), {})
+    stacked = {name: np.stack([label[name] for label in labels.values()]) for name in names}
+    kept, lost = (np.array(list(found), dtype=np.int64) for found in (labels, rejected))
+    return Shard(kept, stacked, lost, list(rejected.values()))

@@ -52,7 +52,7 @@ def _placed(capsule: Capsule) -> tuple[Any, Any]:
 
 
 def _may_touch(robot: Robot, a: str, b: str) -> bool:
-    """Whether two bodies are checked for collision; what is fixed to a body is as near to others as that one."""
+    """True for two bodies that are checked for collision; what is fixed to a body is as near to others as that one."""
     tree = robot.tree
     movers = [tree.mover(name) for name in (a, b)]
     inward = [None if body.parent is None else tree.mover(body.parent).name for body in movers]

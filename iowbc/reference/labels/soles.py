@@ -1,4 +1,4 @@
-"""What two soles on the ground can carry: wrenches, the support polygon, and the wrenches that hold a posture."""
+"""Limits of two soles on the ground: wrenches, support polygon, and the wrenches that hold a posture."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class SoleLimits:
-    """What one flat sole can carry: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
+    """Limits of one flat sole: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
 
     friction: float
     """Friction coefficient."""

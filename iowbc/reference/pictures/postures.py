@@ -1,20 +1,21 @@
 """A picture of rendered postures over height and torso pitch: what the robot can hold."""
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.gates import Judge
+from iowbc.reference.labels.gates import LabelJudge
 from iowbc.reference.labels.labelling import make_method
 from iowbc.reference.labels.plan import SamplePlan
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.support_model import SupportModel
+from iowbc.results.picture import write_figure
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.offscreen import Image, Offscreen
 
@@ -33,67 +34,51 @@ def draw_strip(path: Path, robot: Robot, recipe: ReferenceGenerator, plan: Sampl
 
     The arms are in the default posture, or keep the wrists ahead of the pelvis where that one has no label.
     """
-    support = SupportModel(robot, recipe.problem)
-    method, judge = make_method("static", support, recipe), Judge(support, recipe.gates, recipe.height)
     heights = np.interp((np.arange(HEIGHTS)[::-1] + 0.5) / HEIGHTS, [0.0, 1.0], plan.heights[[0, -1]])
-    columns = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
-    studio = _Studio(robot)
-    try:
-        figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.subplots(HEIGHTS, PITCHES)
-        for row, height in enumerate(heights):
-            for column, place in enumerate(columns):
-                axis, pitch = axes[row, column], plan.pitches[place]
-                axis.axis("off")
-                axis.set_title(f"{height:.2f} m, {pitch:+.2f} rad", fontsize=8)
-                command = np.array([height, pitch])
-                reason = ""
-                for arms in plan.grid_arms[:, place]:
-                    sample = Sample(arms, command)
-                    try:
-                        posture = method.solve(sample)
-                        judge.label(sample, posture)
-                    except Rejected as rejected:
-                        reason = str(rejected)
-                        continue
-                    axis.imshow(studio.picture(sample, posture))
-                    break
-                else:
-                    axis.imshow(np.full((SIZE, SIZE, 3), EMPTY, dtype=np.uint8))
-                    axis.text(0.5, 0.5, reason, ha="center", va="center", transform=axis.transAxes, fontsize=8)
-        figure.suptitle(
-            f"Support postures by {recipe.height} height and torso pitch (grey: no label, and why)", fontsize=11
-        )
-        figure.savefig(path, dpi=110)
-    finally:
-        studio.offscreen.close()
+    places = np.linspace(0, len(plan.pitches) - 1, PITCHES).round().astype(int)
+    support, model = SupportModel(robot, recipe.problem), _scene(robot)
+    method, judge = make_method("static", support, recipe), LabelJudge(support, recipe.gates, recipe.height)
+    figure = Figure(figsize=(1.75 * PITCHES, 1.85 * HEIGHTS), layout="constrained")
+    axes = figure.subplots(HEIGHTS, PITCHES)
+    with Offscreen(
+        model, width=SIZE, height=SIZE, distance=DISTANCE, azimuth=AZIMUTH, elevation=ELEVATION
+    ) as offscreen:
+        offscreen.camera.lookat[:] = LOOK_AT
+        for axis, (height, place) in zip(axes.flat, product(heights, places), strict=True):
+            axis.axis("off")
+            axis.set_title(f"{height:.2f} m, {plan.pitches[place]:+.2f} rad", fontsize=8)
+            for arms in plan.grid_arms[:, place]:
+                sample = Sample(arms, np.array([height, plan.pitches[place]]))
+                try:
+                    posture = method.solve(sample)
+                    judge.label(sample, posture)
+                except Rejected as rejected:
+                    reason = str(rejected)
+                    continue
+                axis.imshow(_picture(offscreen, model, robot, sample, posture))
+                break
+            else:
+                axis.imshow(np.full((SIZE, SIZE, 3), EMPTY, dtype=np.uint8))
+                axis.text(0.5, 0.5, reason, ha="center", va="center", transform=axis.transAxes, fontsize=8)
+    title = f"Support postures by {recipe.height} height and torso pitch (grey: no label, and why)"
+    figure.suptitle(title, fontsize=11)
+    write_figure(figure, path)
 
 
-class _Studio:
-    """The robot on a plain floor, drawn off screen."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.robot, self.model = robot, _scene(robot)
-        self.data = mujoco.MjData(self.model)
-        self.offscreen = Offscreen(
-            self.model, width=SIZE, height=SIZE, distance=DISTANCE, azimuth=AZIMUTH, elevation=ELEVATION
-        )
-        self.offscreen.camera.lookat[:] = LOOK_AT
-
-    def picture(self, sample: Sample, posture: Posture) -> Image:
-        """The posture as an image, shape (SIZE, SIZE, 3)."""
-        robot, data = self.robot, self.data
-        data.qpos[:3] = posture.configuration[:3]
-        data.qpos[3:7] = np.roll(posture.configuration[3:7], 1)
-        data.qpos[7 + robot.support] = posture.support
-        data.qpos[7 + robot.interaction] = sample.arm
-        mujoco.mj_kinematics(self.model, data)
-        mujoco.mj_camlight(self.model, data)
-        return self.offscreen.draw(data)
+def _picture(offscreen: Offscreen, model: Any, robot: Robot, sample: Sample, posture: Posture) -> Image:
+    """The posture as an image, shape (SIZE, SIZE, 3)."""
+    data = mujoco.MjData(model)
+    data.qpos[:3] = posture.configuration[:3]
+    data.qpos[3:7] = np.roll(posture.configuration[3:7], 1)
+    data.qpos[7 + robot.support] = posture.support
+    data.qpos[7 + robot.interaction] = sample.arm
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_camlight(model, data)
+    return offscreen.draw(data)
 
 
 def _scene(robot: Robot) -> Any:
+    """The robot on a plain floor."""
     spec = mujoco.MjSpec.from_file(str(robot.mjcf))
     spec.visual.global_.offwidth, spec.visual.global_.offheight = SIZE, SIZE
     spec.visual.headlight.ambient, spec.visual.headlight.diffuse = (0.45, 0.45, 0.45), (0.5, 0.5, 0.5)

@@ -121,12 +121,12 @@ def test_no_neighbour_that_is_in_equilibrium_costs_less(
     support.lock(sample)
     lowest = cost(method, support, sample, best)
     random = np.random.default_rng(0)
-    torso, rest = pinocchio.SE3(sample.torso_rotation(), np.zeros(3)), support.rest(sample)[7:]
+    rest = support.rest(sample)[7:]
     for _ in range(30):
         q = pinocchio.integrate(support.model, best.configuration, 0.02 * random.normal(size=support.model.nv))
         wrench = best.wrench.copy()
         for _ in range(5):  # back onto feet and equilibrium, by the least change
-            *_, equality, error = method._linearise(q, wrench, sample, rest, torso)
+            *_, equality, error = method.equilibrium(q, wrench, sample, rest)
             change = -np.linalg.pinv(equality) @ error
             q = pinocchio.integrate(support.model, q, change[: support.model.nv])
             wrench = wrench + change[support.model.nv :].reshape(2, 6)

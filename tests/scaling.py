@@ -1,5 +1,6 @@
-"""`iowbc bench scale`: labels, trials and rollouts on one node of Ray and on two, and what its engine costs."""
+"""`make scale`: labels, trials and rollouts on one node of Ray and on two, and the cost of its engine."""
 
+import argparse
 import pickle
 import statistics
 import tempfile
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import psutil
 import torch
+from local_nodes import connected_nodes
 
 from iowbc.benchmarks.standing_generator import generator_of
 from iowbc.evaluation.trials.plan import Trial, planned_sweeps
@@ -21,10 +23,11 @@ from iowbc.evaluation.trials.protocol import Batches
 from iowbc.learning.as_numpy import teacher_policy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import load_teacher, save_network
-from iowbc.pipeline.cluster.cluster import Cluster, begun_here
+from iowbc.pipeline.cluster.cluster import Cluster
 from iowbc.pipeline.cluster.folders import files_of
-from iowbc.pipeline.stage import Spread
+from iowbc.pipeline.cluster.spread import NodeSpread
 from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.labelling import LabelTask
 from iowbc.robot.description import load_robot, robot_folder
@@ -111,7 +114,7 @@ def main(recipe: Recipe | None = None, *, turns: int = 3, say: Callable[[str], N
         for _ in range(turns):
             turn: Turn = {}
             for nodes in NODES:
-                with begun_here([1] * nodes, copy=True) as cluster:
+                with connected_nodes([1] * nodes) as cluster:
                     turn[nodes], sizes = _paces(cluster, world, nodes)
                     figures |= sizes
             measured.append(turn)
@@ -142,7 +145,7 @@ def _world(recipe: Recipe) -> Iterator[Workload]:
     asked = recipe.eval.model_copy(update={"trials": TRIALS, "sequence": (Segment(duration=DURATION, ramp=0.0),)})
     recipe = recipe.model_copy(update={"eval": asked})
     sweep = planned_sweeps(recipe)[0]
-    with generator_of(None, folder, recipe) as generator, tempfile.TemporaryDirectory() as place:
+    with generator_of(folder, recipe) as generator, tempfile.TemporaryDirectory() as place:
         robot = load_robot(folder)
         architecture: dict[str, Any] = {
             "inputs": full_layout(recipe, robot).size,
@@ -180,7 +183,7 @@ def _paces(cluster: Cluster, world: Workload, nodes: int) -> tuple[dict[str, Thr
     return paces, sizes | {"answer_bytes": max(len(content) for _, content in answers)}
 
 
-def _rolled(spread: Spread, world: Workload, nodes: int) -> tuple[Throughput, dict[str, float]]:
+def _rolled(spread: NodeSpread, world: Workload, nodes: int) -> tuple[Throughput, dict[str, float]]:
     """How fast a training's rollouts are made, one actor on each node; and the bytes of an update, of one actor."""
     recipe, count = world.recipe, ENVIRONMENTS * nodes
     specification = Specification(recipe, world.folders["robot"], world.folders["generator"])
@@ -219,7 +222,7 @@ def _processor_time() -> float:
     return total
 
 
-def _label(spread: Spread, world: Workload, shards: int) -> None:
+def _label(spread: NodeSpread, world: Workload, shards: int) -> None:
     """Label some shards."""
     rg = world.recipe.rg
     with tempfile.TemporaryDirectory(prefix="iowbc-bench-") as folder:
@@ -237,3 +240,11 @@ def _label(spread: Spread, world: Workload, shards: int) -> None:
 
 def _nothing(recipe: Recipe, trials: Sequence[Trial], *, robot: Path, policy: Path, generator: Path) -> None:
     """A piece that has all that one of trials has, and does nothing with it."""
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--recipe", type=Path, help="The default recipe if empty.")
+    parser.add_argument("--turns", type=int, default=3, help="Number of repetitions.")
+    asked = parser.parse_args()
+    main(None if asked.recipe is None else load_recipe(asked.recipe).recipe, turns=asked.turns)

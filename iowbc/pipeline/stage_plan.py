@@ -1,4 +1,4 @@
-"""What is to be done for a stage, and how a run was asked for."""
+"""Planned stages, and the options of a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ OnCodeChange = Literal["report", "rerun"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a run was asked for."""
+    """Options of a run."""
 
     until: str | None = None
     force: frozenset[str] = frozenset()
@@ -23,7 +23,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Step:
+class StagePlan:
     """A stage of a recipe: its key, whether its artifact can be used, and why not."""
 
     stage: Stage
@@ -36,13 +36,13 @@ class Step:
     """Why it would run; empty where it is cached."""
     notes: tuple[str, ...] = ()
     damage: str = ""
-    """What is wrong with the stored artifact with this key."""
+    """The damage of the stored artifact with this key."""
     expected: float | None = None
     """Time that it takes by its last runs on this machine or by its last attempt [s]; None where there are none."""
     spread: tuple[float, float] = (1.0, 1.0)
     """Ends of the range in which that will lie, as parts of it."""
     roughly: float | None = None
-    """Where there are none: a guess at the rate of the stored artifact that differs least [s]."""
+    """A guess where there are none, at the rate of the stored artifact that differs least [s]."""
     rate_of: str = ""
     """Recipe, and other machine, whose rate that is."""
     code: Mapping[str, str] = field(default_factory=dict)

@@ -1,13 +1,19 @@
-"""Trials with masses spread over a range, and what the policy sees in them every so often."""
+"""Linear probe of the load: trials with masses spread over a range, and a ridge regression of the mass on features."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV, GroupKFold
+from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import StandardScaler
 
+from iowbc.errors import StageFailed
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
 from iowbc.evaluation.trials.rollout import Acting, play_episodes
 from iowbc.learning.acting import StudentPolicy
@@ -20,13 +26,17 @@ Features = NDArray[np.float32]
 EXACT = 1e-6
 """Times nearer than this are the same [s]."""
 
+PENALTIES = tuple(10.0**power for power in range(6))
+"""Of the ridge, on standardised features; the best in cross-validation over the trials that are fitted."""
+FOLDS = 4
+
 LATENT, HISTORY, NEWEST, PRIVILEGED = "latent", "history H_t", "newest s_t", "s_priv"
-"""What the mass is read from."""
+"""Sources from which the mass is inferred."""
 
 
 @dataclass(frozen=True)
-class Readings:
-    """What was seen in the trials, one row a reading."""
+class ProbeReadings:
+    """Features observed in the trials, one row a reading."""
 
     features: dict[str, Features]
     """By what they are of, each of shape (readings, k)."""
@@ -37,7 +47,7 @@ class Readings:
     seconds: NDArray[np.float64]
     """Time since the trial began, with the object in the hands, (readings,) [s]."""
     settled: NDArray[np.bool_]
-    """Whether the history holds nothing but what was observed: it begins as copies of the first, (readings,)."""
+    """True once the history holds nothing but observations: it begins as copies of the first, (readings,)."""
 
 
 class Listener:
@@ -101,7 +111,7 @@ def read(
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
-) -> Readings:
+) -> ProbeReadings:
     """Play the trials of `eval.probe` and keep what is seen while they last. Raises Interrupted when interrupted."""
     recipe = world.recipe
     episodes, probe = probe_episodes(recipe), recipe.eval.probe
@@ -121,7 +131,7 @@ def gathered(
     times: NDArray[np.float64],
     masses: NDArray[np.float64],
     span: float,
-) -> Readings:
+) -> ProbeReadings:
     """Readings of all trials in one table, without those after a trial's end.
 
     kept: of each time, rows by trial; going: (times, trials); times: (times,) [s]; masses: (trials,) [kg]; span: of a
@@ -129,4 +139,40 @@ def gathered(
     """
     moment, trial = np.nonzero(going)
     features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
-    return Readings(features, trial, masses[trial], times[moment], times[moment] >= span - EXACT)
+    return ProbeReadings(features, trial, masses[trial], times[moment], times[moment] >= span - EXACT)
+
+
+def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
+    """The mass as it is read in the trials that were not fitted, one row a reading and source.
+
+    Columns: `source` and its `size`, `trial`, `seconds`, `settled` (whether the history was full), `mass` and
+    `inferred` [kg]. Trials of even number are fitted, as soon as they have settled, those of odd number tested: no
+    regression has seen another reading of the trial that it is tested on. Raises StageFailed where too few trials last.
+    """
+    tested = readings.trial % 2 == 1
+    fitted = ~tested & readings.settled
+    lasted = len(np.unique(readings.trial[fitted]))
+    if lasted < FOLDS or not (tested & readings.settled).any():
+        raise StageFailed(
+            f"probe: only {lasted} of the trials to be fitted last as long as a history, {FOLDS} must; train longer, "
+            "or give lighter masses (eval.probe.masses) or a longer sequence (eval.probe.sequence)"
+        )
+    common = {
+        "trial": readings.trial[tested],
+        "seconds": readings.seconds[tested],
+        "settled": readings.settled[tested],
+        "mass": readings.mass[tested],
+    }
+    tables = []
+    for source, given in readings.features.items():
+        features = given.astype(np.float64)  # a history's columns are nearly alike: single precision is not enough
+        search = GridSearchCV(
+            Pipeline([("scale", StandardScaler()), ("ridge", Ridge())]),
+            {"ridge__alpha": PENALTIES},
+            cv=GroupKFold(FOLDS),
+            scoring="neg_mean_squared_error",
+        )
+        search.fit(features[fitted], readings.mass[fitted], groups=readings.trial[fitted])
+        read = {"size": features.shape[1], "inferred": search.predict(features[tested])}
+        tables.append(pd.DataFrame({"source": source, **common, **read}))
+    return pd.concat(tables, ignore_index=True)

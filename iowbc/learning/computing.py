@@ -1,18 +1,21 @@
-"""Parts of a minibatch computed side by side: threads of our own, because torch's wait for one another in every layer.
+"""Numbers and threads of the networks while they learn.
 
-One that waits spins, and where something else runs on its core all of them spin most of the time: an update that takes
-a second took two minutes. Here threads meet once a minibatch. Results depend on the parts, not on the threads.
+Parts of a minibatch are computed side by side by threads of our own, because torch's wait for one another in every
+layer. One that waits spins, and where something else runs on its core all of them spin most of the time: an update that
+takes a second took two minutes. Here threads meet once a minibatch. Results depend on the parts, not on the threads.
 """
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import AbstractContextManager
+from typing import Literal, TypeVar
 
 import torch
 from torch import Tensor
 
 from iowbc.processes import keep_freed_memory
 
+Precision = Literal["auto", "float32", "bfloat16"]
 Result = TypeVar("Result")
 
 
@@ -37,3 +40,16 @@ class SideBySide:
         """The function of each part of a batch of rows, in their order."""
         parts: Sequence[Tensor] = torch.tensor_split(batch, self.parts)
         return list(map(function, parts) if self._pool is None else self._pool.map(function, parts))
+
+
+def has_bfloat16() -> bool:
+    """True where the processor multiplies in bfloat16 (avx512_bf16 or amx); without, it is emulated and slower."""
+    known = torch.cpu.get_capabilities()
+    return bool(known.get("avx512_bf16") or known.get("amx_bf16"))
+
+
+def reduced(precision: Precision) -> AbstractContextManager[None]:
+    """A context in which layers multiply in bfloat16, where the recipe and the processor say so."""
+    wanted = precision == "bfloat16" or (precision == "auto" and has_bfloat16())
+    context: AbstractContextManager[None] = torch.autocast("cpu", torch.bfloat16, enabled=wanted)
+    return context

@@ -1,0 +1,114 @@
+"""Columns of result tables, one entry each: head, cell of a row of the summary, score of a robot that stands still."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from iowbc.evaluation.trials.errors import ERRORS
+from iowbc.evaluation.trials.transport import SHORTEST_WAY
+from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, heads, measured
+
+STANDS_STILL = "stands still"
+"""The row of a robot that does nothing, computed from the script: who scores no better has done nothing."""
+RAW = "E_v_raw"
+"""E_v without the mean over a gait period."""
+ERROR_HEADS = {
+    "E_alpha": Column("E_α", "rad", r"$E_{\alpha}$"),
+    "E_h": Column("E_h", "m", "$E_{h}$"),
+    "E_v": Column("E_v", "m/s", "$E_{v}$"),
+    RAW: Column("E_v raw", "m/s", "$E_{v}$ raw", "detail"),
+    "E_psi": Column("E_ψ", "rad", r"$E_{\psi}$"),
+}
+HEADS = {name: ERROR_HEADS[name] for name in ERRORS}
+"""Heads of the paper's four errors."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One column of a table that has a row for each variant."""
+
+    column: Column
+    cell: Callable[[pd.Series], Cell]
+    """Cell of a row of the summary."""
+    still: Callable[[pd.DataFrame], Cell] = lambda rows: ABSENT
+    """Cell of a robot that stands still, from the rows of all variants."""
+
+
+def variant_rows(
+    entries: Sequence[Entry], groups: Iterable[tuple[str, pd.DataFrame]], still: bool = False
+) -> list[tuple[Cell, ...]]:
+    """Rows of a table: what a group is called, variant, entries; with `still` a last row of each group."""
+    found: list[tuple[Cell, ...]] = []
+    for name, group in groups:
+        found += [(name, str(row["variant"]), *(one.cell(row) for one in entries)) for _, row in group.iterrows()]
+        found += [still_row(entries, group, name)] if still else []
+    return found
+
+
+def variant_table(
+    name: str,
+    caption: str,
+    first: str,
+    entries: Sequence[Entry],
+    rows: Sequence[tuple[Cell, ...]],
+    numbers: pd.DataFrame,
+) -> Table:
+    """The table of such rows; `first`: head of what a group is called."""
+    return Table(name, caption, heads(first, "Algorithm", *(one.column for one in entries)), rows, numbers)
+
+
+def still_row(entries: Sequence[Entry], rows: pd.DataFrame, name: str = "any") -> tuple[Cell, ...]:
+    """The row of a robot that stands still."""
+    return (name, STANDS_STILL, *(one.still(rows) for one in entries))
+
+
+def by_case(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """The rows of each case and mass, and what they are called."""
+    groups = rows.groupby(["suite", "case", "mass"], sort=False)
+    return [(f"{case} ({mass:g} kg)", group) for (_, case, mass), group in groups]
+
+
+def still_error(rows: pd.DataFrame, name: str, part: str = "") -> Cell:
+    """Mean error of a robot that stands still; its velocity needs no averaging."""
+    return measured(float(rows[f"still_{'E_v' if name == RAW else name}{part}"].mean()))
+
+
+def error_entry(name: str, part: str = "") -> Entry:
+    """Mean of an error with its interval; `part`: suffix of a part of the trial."""
+
+    def cell(row: pd.Series) -> Cell:
+        half = row.get(f"{name}{part}_half", np.nan)
+        return measured(row[f"{name}{part}"], half) if row["survived"] else FAILS
+
+    return Entry(ERROR_HEADS[name], cell, lambda rows: still_error(rows, name, part))
+
+
+def asks_for_transport(rows: pd.DataFrame) -> bool:
+    """True where any of these trials commands a way that has to be covered."""
+    return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()
+
+
+def _transport(row: pd.Series) -> str:
+    ways = (float(row["transport_robot"]), float(row["transport_object"]))
+    return " / ".join(f"{way:.2f}" for way in ways if not np.isnan(way)) or ABSENT
+
+
+def _kept(row: pd.Series) -> str:
+    share = float(row["weight_in_hands"])
+    return f"{row['kept']}/{row['pushed']}" if row["pushed"] else ABSENT if np.isnan(share) else f"{100 * share:.0f} %"
+
+
+SURVIVED = Entry(Column("Survived"), lambda row: f"{row['survived']}/{row['trials']}")
+SUCCESS = Entry(
+    Column("Success"),
+    lambda row: f"{row['succeeded']}/{row['trials']}",
+    lambda rows: "none" if asks_for_transport(rows) else ABSENT,
+)
+OUTCOME = (
+    SURVIVED,
+    SUCCESS,
+    Entry(Column("Transport"), _transport, lambda rows: "0.00" if asks_for_transport(rows) else ABSENT),
+    Entry(Column("Kept"), _kept),
+)

@@ -1,0 +1,202 @@
+"""A stage as a task on a node: its execution there, and its reports to the driver while it runs."""
+
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from iowbc.files import previous
+from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, placed, write_files
+from iowbc.pipeline.cluster.spread import NodeSpread
+from iowbc.pipeline.machine import host
+from iowbc.pipeline.stage import Job
+from iowbc.recipe.recipe import Recipe
+
+Event = tuple[Any, ...]
+"""`("metrics", values, step)`, `("progress", done, total, note)`, `("say", text)`, `("files", files)` of scratch,
+or `("shown", name)` of one of them for tracking."""
+REPORT_INTERVAL = 0.5
+"""Seconds between two reports to the driver; the answer says whether to stop."""
+FILES_INTERVAL = 10.0
+"""Seconds between two looks for new checkpoints, which go to the driver where the node does not see its folder."""
+TOKEN = "driver"
+"""File in a stage's scratch by which a node sees that it shares the driver's folder."""
+SCRATCH, OUT = "scratch", "out"
+
+
+class Mailbox:
+    """An actor beside the driver: events that tasks have reported, and tasks that are to stop."""
+
+    def __init__(self) -> None:
+        self._events: dict[str, list[Event]] = {}
+        self._stopping: set[str] = set()
+
+    def report(self, task: str, events: list[Event]) -> bool:
+        """Keep a task's events; True where the task is to stop after a checkpoint."""
+        self._events.setdefault(task, []).extend(events)
+        return task in self._stopping
+
+    def collect(self, task: str) -> list[Event]:
+        """A task's events since the last call."""
+        return self._events.pop(task, [])
+
+    def stop(self, task: str) -> None:
+        """Let a task stop after a checkpoint."""
+        self._stopping.add(task)
+
+
+@dataclass(frozen=True)
+class Order:
+    """One execution of a stage on a node."""
+
+    task: str
+    """Identifier at the mailbox."""
+    run: Callable[[Job], None]
+    recipe: Recipe
+    key: str
+    robot: SharedFolder
+    inputs: Mapping[str, SharedFolder]
+    predecessor: SharedFolder | None
+    out: str
+    """Output folder on the driver."""
+    work: str
+    """Scratch folder on the driver."""
+    token: str
+    workers: int
+
+
+def execute(order: Order, scratch: tuple[Any, ...], mailbox: Any) -> Files | None:
+    """Run a stage; returns its output, or None where the driver sees it. Raises what the stage raises.
+
+    `scratch`: Ray's reference to the files that earlier attempts left; `mailbox`: Ray's handle.
+    """
+    import ray
+
+    shared = not order.robot.copy and _read(Path(order.work, TOKEN)) == order.token
+    with tempfile.TemporaryDirectory(prefix="iowbc-stage-") as folder:
+        out, work = (Path(order.out), Path(order.work)) if shared else (Path(folder, OUT), Path(folder, SCRATCH))
+        out.mkdir(exist_ok=True)
+        if not shared:
+            work.mkdir()
+            write_files(work, ray.get(scratch[0]))
+        report = NodeReport(mailbox, order.task, work, sends=not shared)
+        report.say(f"runs on {host()}")
+        report.flush()
+        try:
+            robot, inputs = placed(order.robot), {name: placed(read) for name, read in order.inputs.items()}
+            known = {robot: order.robot, **{inputs[name]: read for name, read in order.inputs.items()}}
+            job = Job(
+                recipe=order.recipe,
+                key=order.key,
+                robot=robot,
+                inputs=inputs,
+                out=out,
+                work=work,
+                workers=order.workers,
+                report=report,
+                interrupted=report.stopping,
+                predecessor=None if order.predecessor is None else placed(order.predecessor),
+                spread=NodeSpread(known, report.stopping, report.say),
+            )
+            order.run(job)
+        except BaseException:
+            report.end(files=True)
+            raise
+        report.end()
+        return None if shared else files_of(out)
+
+
+class NodeReport:
+    """A stage's report on a node: gathered, and sent to the driver a few times a second.
+
+    It never waits for an answer: a task that waits for Ray gives its cores to another one meanwhile.
+    """
+
+    def __init__(self, mailbox: Any, task: str, work: Path, *, sends: bool) -> None:
+        """work: the stage's scratch. sends: the driver does not see it, and is sent its files."""
+        self._mailbox, self._task, self._work, self._sends = mailbox, task, work, sends
+        self._events: list[Event] = []
+        self._known: dict[str, tuple[int, int]] = {}
+        """Time and size of the files that the driver has."""
+        self._reported = self._looked = time.monotonic()
+        self._answer: Any = None
+        self._stop = False
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        """Record named values at a step."""
+        self._add("metrics", dict(values), step)
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        """Report progress; of several reports that were not sent yet the last one counts."""
+        if self._events and self._events[-1][0] == "progress":
+            self._events.pop()
+        self._add("progress", done, total, note)
+
+    def say(self, text: str) -> None:
+        """Print one line."""
+        self._add("say", text)
+
+    def files(self, path: Path) -> None:
+        """Show a file or folder of the scratch in tracking; the driver has it before it hears of it."""
+        self._gather()
+        self._add("shown", path.relative_to(self._work).as_posix())
+
+    def stopping(self) -> bool:
+        """True once the driver wants the stage to stop after a checkpoint."""
+        self._flush_when_due()
+        return self._stop
+
+    def flush(self, *, files: bool = False) -> None:
+        """Send all that was gathered, and, where asked for, new files of the scratch."""
+        import ray
+
+        if files:
+            self._gather()
+        self._reported = time.monotonic()
+        if self._answer is not None and ray.wait([self._answer], timeout=0)[0]:
+            self._stop = bool(ray.get(self._answer))
+        events, self._events = self._events, []
+        self._answer = self._mailbox.report.remote(self._task, events)
+
+    def end(self, *, files: bool = False) -> None:
+        """Send the rest, and return once all has arrived, which it does in order."""
+        import ray
+
+        self.flush(files=files)
+        ray.get(self._answer)
+
+    def _add(self, *event: Any) -> None:
+        self._events.append(event)
+        self._flush_when_due()
+
+    def _flush_when_due(self) -> None:
+        now = time.monotonic()
+        if now - self._reported > REPORT_INTERVAL:
+            look = now - self._looked > FILES_INTERVAL
+            if look:
+                self._looked = now
+            self.flush(files=look)
+
+    def _gather(self) -> None:
+        """Gather the files of scratch that the driver neither sees nor has; of checkpoints the last one is enough."""
+        if not self._sends:
+            return
+        files = [path for path in self._work.rglob("*") if path.is_file() and not path.name.startswith(".")]
+        older = {previous(path) for path in files}
+        found = {}
+        for path in files:
+            name, state = path.relative_to(self._work).as_posix(), path.stat()
+            if path not in older and self._known.get(name) != (state.st_mtime_ns, state.st_size):
+                self._known[name] = state.st_mtime_ns, state.st_size
+                found[name] = path.read_bytes()
+        if found:
+            self._events.append(("files", found))
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return ""
