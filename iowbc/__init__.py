@@ -11,7 +11,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from iowbc.commands.named import open_artifact
+    from iowbc.commands.lookup import open_artifact
     from iowbc.control.sensors import Measured
     from iowbc.deploy.controller import Controller, Targets
     from iowbc.errors import IowbcError
@@ -44,7 +44,7 @@ _PLACES = {
     "Targets": "iowbc.deploy.controller",
     "VectorEnv": "iowbc.task.vector.vector_env",
     "load_recipe": "iowbc.recipe.reading.loading",
-    "open_artifact": "iowbc.commands.named",
+    "open_artifact": "iowbc.commands.lookup",
 }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Keys
-from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.randomization import Distribution
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 FIRST, SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)

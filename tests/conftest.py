@@ -10,8 +10,8 @@ import yaml
 from iowbc.robot.description import DESCRIPTION, Robot, load_robot, robot_folder
 
 TIERS = {
-    "unit": {"control", "deploy", "learning", "recipe", "report", "robot", "rollouts", "sim"},
-    "integration": {"evaluation", "export", "live", "reference", "stages", "task"},
+    "unit": {"control", "deploy", "learning", "onboard", "recipe", "report", "robot", "rollouts", "sim"},
+    "integration": {"evaluation", "export", "live", "reference", "skill", "stages", "task"},
     "system": {"chaos", "commands", "pipeline", "web"},
 }
 """Folders of each tier; a file may choose another by its `pytestmark`, and one beside the folders is a unit test."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from iowbc import counter_random as random
-from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.randomization import Distribution
 
 
 def keys(count: int, seed: int = 0) -> np.ndarray:

@@ -26,6 +26,7 @@ MAY_IMPORT = {
     "robot": GROUND - {"counter_random"},
     "control": DESCRIPTIONS,
     "deploy": SHARED,
+    "onboard": SHARED | {"deploy"},
     "pipeline": {"recipe", "errors", "files", "processes", "full_disk"},
     "sim": SHARED,
     "reference": WORLD | {"results"},
@@ -33,20 +34,21 @@ MAY_IMPORT = {
     "adapters": SHARED | {"task"},
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts"},
+    "twin": WORLD | {"onboard"},
     "task": WORLD | {"rollouts"},
-    "evaluation": WORLD
-    | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters"}
-    | {"results"},
+    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters", "results"},
+    "skill": WORLD | {"task", "rollouts", "learning", "evaluation", "results"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
-    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors"},
+    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors", "control", "onboard"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD
-    | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"},
+    | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"}
+    | {"skill", "results"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
-    | {"live", "web", "stages", "results", "adapters"},
+    | {"live", "web", "stages", "results", "onboard", "twin", "adapters"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
@@ -89,7 +91,7 @@ def test_a_room_imports_only_what_lies_below_it(name: str) -> None:
     assert upward == []
 
 
-@pytest.mark.parametrize("name", ["recipe", "control", "deploy"])
+@pytest.mark.parametrize("name", ["recipe", "control", "deploy", "onboard"])
 def test_what_runs_on_the_robot_never_names_what_only_training_needs(name: str) -> None:
     heavy = [
         f"{source.relative_to(PACKAGE.parent)} imports {module}"

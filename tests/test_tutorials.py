@@ -21,6 +21,7 @@ from iowbc.learning.curves import TABLE
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import load_robot
 from iowbc.stages import teacher
+from iowbc.stages.registry import STAGES
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
@@ -47,9 +48,9 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_there_are_five_and_the_site_lists_them() -> None:
+def test_there_are_six_and_the_site_lists_them() -> None:
     listed = (ROOT / "mkdocs.yml").read_text()
-    assert len(TUTORIALS) == 5
+    assert len(TUTORIALS) == 6
     assert all(page in listed for page in TUTORIALS)
     assert all(path.name in listed for path in DOCS.glob("*.md"))
 
@@ -122,6 +123,14 @@ def test_add_a_robot(place: Path) -> None:
     env = VectorEnv(Specification(recipe, robot.folder), num_envs=2, workers=0, seed=0)
     env.reset()
     env.close()
+
+
+def test_add_a_transport_task(place: Path) -> None:
+    write("tutorials/task.md", place)
+    recipe = load_recipe(place / "recipes" / "around_the_table.yaml").recipe
+    assert recipe.skill.tasks.own == ("around_the_table",)
+    assert recipe.skill.tasks.around_the_table.length == 4.0
+    assert not [text for stage in recipe.stages for _, text in STAGES[stage].problems(recipe)]
 
 
 def test_the_documentations_files_are_yaml_that_recipes_can_be(place: Path) -> None:

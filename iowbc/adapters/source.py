@@ -8,8 +8,8 @@ from iowbc.adapters import deploy, holosoma
 from iowbc.adapters.adapter import Adapter, require_fitting
 from iowbc.adapters.robot import robot_of
 from iowbc.errors import StageFailed
+from iowbc.recipe.beside import OwnFunction
 from iowbc.recipe.evaluation.public import PublicController
-from iowbc.recipe.task.own_function import OwnFunction
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import Robot
 from iowbc.task.own_function import load_function

@@ -9,15 +9,20 @@ from typing import Annotated
 
 import typer
 
-from iowbc.cli.comparing import compare, diff, report, ui
-from iowbc.cli.listing import gc, list_, show, status
-from iowbc.cli.measuring import bench_carry, bench_control, bench_reference, bench_simulation, bench_training
+from iowbc.cli.driving import robot, robot_sim
+from iowbc.cli.listing import compare, diff, gc, list_, report, show, status, ui
+from iowbc.cli.measuring import (
+    bench_carry,
+    bench_control,
+    bench_engines,
+    bench_reference,
+    bench_simulation,
+    bench_training,
+)
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
-from iowbc.commands.ending import leave
-from iowbc.commands.streams import let_go, prepare_streams
-from iowbc.commands.unexpected import described
+from iowbc.commands.process import described, leave, let_go, prepare_streams
 from iowbc.processes import name_glfw
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -35,6 +40,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "export": export,
     "gc": gc,
     "play": play,
+    "robot": robot,
+    "robot-sim": robot_sim,
     "ui": ui,
     "schema": schema,
     "doctor": doctor,
@@ -46,6 +53,7 @@ BENCHMARKS: dict[str, Callable[..., None]] = {
     "rg": bench_reference,
     "control": bench_control,
     "carry": bench_carry,
+    "engines": bench_engines,
 }
 
 app = typer.Typer(
@@ -56,7 +64,9 @@ app = typer.Typer(
     context_settings={"max_content_width": 120},
 )
 bench = typer.Typer(
-    help="Measure the speed of this machine, or a public controller.", no_args_is_help=True, rich_markup_mode=None
+    help="Measure the speed of this machine, physics engines, or a public controller.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
 )
 app.add_typer(bench, name="bench")
 
@@ -75,7 +85,7 @@ def _options(
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """What comes before a command."""
+    """Options that come before a command."""
 
 
 for name, command in COMMANDS.items():

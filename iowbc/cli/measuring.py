@@ -1,4 +1,4 @@
-"""The benchmarks: `bench sim`, `train`, `rg` and `control` of this machine, `carry` of a public controller."""
+"""The benchmarks: of this machine, `bench engines` of two engines, `bench carry` of a public controller."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -56,7 +56,7 @@ def bench_control(
     steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
 ) -> None:
     """Measure how long a control step of an exported controller takes on one thread, without torch or a simulator."""
-    from iowbc.commands.bench_control import control
+    from iowbc.commands.bench import control
 
     control(what, steps)
 
@@ -80,3 +80,12 @@ def bench_carry(
     from iowbc.commands.bench_carry import carry
 
     carry(policy, adapter, arms=arms, posture=posture, workers=workers, out=out)
+
+
+def bench_engines(
+    robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
+) -> None:
+    """Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`."""
+    from iowbc.commands.bench import engines
+
+    engines(robot)

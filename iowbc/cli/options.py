@@ -1,4 +1,4 @@
-"""What several commands take, and what they are given by it."""
+"""Arguments and options that several commands take, and what they stand for."""
 
 import os
 import sys

@@ -36,8 +36,7 @@ def play(
     runs: RunsFolder = None,
 ) -> None:
     """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
-    from iowbc.commands.play import PlayRequest, play_word
-    from iowbc.commands.play_web import PORT, play_on_web
+    from iowbc.commands.play import PORT, PlayRequest, play_on_web, play_word
     from iowbc.errors import UsageError
     from iowbc.stages.registry import STAGES
 

@@ -1,7 +1,7 @@
 """`run`, `sweep`, `plan` and `publish`: what makes a recipe's artifacts, or says what would."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,7 +23,7 @@ from iowbc.cli.options import (
     runs_folder,
 )
 from iowbc.commands import completion
-from iowbc.commands.streams import outlasting_readers
+from iowbc.commands.process import outlasting_readers
 
 if TYPE_CHECKING:
     from iowbc.commands.request import Request
@@ -48,14 +48,15 @@ def run(
     from iowbc.commands.run import run as run_recipe
     from iowbc.stages.registry import STAGES
 
-    request = request_of(recipe, overrides, until, force, workers, on_code_change, runs, engine, address)
+    options: dict[str, Any] = {"until": until, "workers": workers, "engine": engine, "address": address}
+    request = request_of(recipe, overrides, runs, force, on_code_change=on_code_change, **options)
     if dry_run:
         print_plan(request, STAGES, console())
-    else:
-        with outlasting_readers():
-            raise typer.Exit(
-                run_recipe(request, STAGES, console(), "quiet" if quiet else "verbose" if verbose else "usual")
-            )
+        return
+    with outlasting_readers():
+        raise typer.Exit(
+            run_recipe(request, STAGES, console(), "quiet" if quiet else "verbose" if verbose else "usual")
+        )
 
 
 def sweep(
@@ -90,7 +91,8 @@ def sweep(
     from iowbc.commands.sweep import sweep as run_sweep
     from iowbc.stages.registry import STAGES
 
-    request = request_of(recipe, overrides, until, None, workers, on_code_change, runs, engine, address)
+    options: dict[str, Any] = {"until": until, "workers": workers, "engine": engine, "address": address}
+    request = request_of(recipe, overrides, runs, on_code_change=on_code_change, **options)
     asked = SweepRequest(request, file, jobs, points)
     if dry_run:
         plan_sweep(asked, STAGES, console(), as_json)
@@ -115,7 +117,7 @@ def plan(
     from iowbc.commands.sweep import SweepRequest, plan_sweep
     from iowbc.stages.registry import STAGES
 
-    request = request_of(recipe, overrides, until, force, None, on_code_change, runs)
+    request = request_of(recipe, overrides, runs, force, until=until, on_code_change=on_code_change)
     if as_sweep or file is not None:
         plan_sweep(SweepRequest(request, file, None), STAGES, console(), as_json)
     else:
@@ -139,22 +141,14 @@ def publish(
     from iowbc.commands.publish import publish_recipe
     from iowbc.stages.registry import STAGES
 
-    publish_recipe(request_of(recipe, overrides, until, None, None, "report", runs), STAGES, console(), without or ())
+    publish_recipe(request_of(recipe, overrides, runs, until=until), STAGES, console(), without or ())
 
 
 def request_of(
-    recipe: str,
-    overrides: list[str] | None,
-    until: str | None,
-    force: list[str] | None,
-    workers: int | None,
-    on_code_change: Literal["report", "rerun"],
-    runs: Path | None,
-    engine: Literal["local", "ray"] | None = None,
-    address: str | None = None,
+    recipe: str, overrides: list[str] | None, runs: Path | None, force: list[str] | None = None, **options: Any
 ) -> "Request":
     from iowbc.commands.request import Request
     from iowbc.pipeline.stage_plan import Options
 
-    options = Options(until, frozenset(force or ()), on_code_change, workers, engine, address)
-    return Request(recipe, tuple(overrides or ()), runs_folder(runs), options)
+    asked = Options(force=frozenset(force or ()), **options)
+    return Request(recipe, tuple(overrides or ()), runs_folder(runs), asked)

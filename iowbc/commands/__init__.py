@@ -1,1 +1,1 @@
-"""What the user types: one file for each command."""
+"""The commands of the command line, and what several of them share."""

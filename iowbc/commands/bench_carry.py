@@ -5,7 +5,7 @@ import os
 from importlib.metadata import version
 from pathlib import Path
 
-from iowbc.commands.training import require_training
+from iowbc.commands.needs import require_training
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.digests import data_digest, file_digest
 from iowbc.recipe.reading.finding import recipe_file

@@ -1,37 +1,36 @@
-"""`iowbc compare`: the tables and figures of the evaluation over several runs, and their metrics side by side."""
+"""`iowbc compare` and `iowbc report`: tables, figures, learning curves and films over several runs."""
 
 import math
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from iowbc.commands.filming import Filming
-from iowbc.commands.members import FILM, film_of, members_of, points_of, record_comparison
-from iowbc.commands.named import Named, named
-from iowbc.commands.origins import PROBE, TRIALS, evaluated_actor, tables_of
-from iowbc.commands.printed import print_json, shown_path, tell
-from iowbc.commands.training import require_training
-from iowbc.commands.trainings import trainings_table
+from iowbc.commands.diff import difference_lines
+from iowbc.commands.lookup import FILM, Named, film_of, members_of, named, points_of, record_comparison
+from iowbc.commands.needs import require_training
+from iowbc.commands.printed import filming, print_json, shown_path, tell
+from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
+from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
-from iowbc.results.table import Table, drawn, markdown, read_tables, write_table
+from iowbc.results.table import ABSENT, Table, drawn, heads, markdown, read_tables, write_table
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from iowbc.report.curves import CurvePanel
-    from iowbc.report.runs import Group
+    from iowbc.report.runs import Group, Run
 
 CURVE_WIDTH = 40
 """Characters of a learning curve."""
+NOT_TRAINED = "not evaluated yet"
 
 
 def compare(
@@ -44,7 +43,7 @@ def compare(
 ) -> None:
     """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables.
 
-    words: runs, two or more, or a recipe of recipes, of which those are compared that have finished. output: empty for
+    words: runs, two or more, or a study, of which those are compared that have finished. output: empty for
     a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
     `UsageError`.
     """
@@ -63,14 +62,13 @@ def compare(
     (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
     tried = _having(found, TRIALS)
     missing = [name for name in members if name not in {run.word for run in tried}]
-    _report_probes(_having(found, PROBE), output)
+    _report_probes(found, output)
     if len(tried) > 1 or (tried and members):
-        trials = report_together(tried, output, missing)
-    if film and len(tried) > 1:
-        with Filming(console, None if as_json else output / FILM) as filming:
-            _film(store, *_of_each_recipe(tried, trials), output / FILM, filming)
-    elif film:
-        raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
+        report_together(tried, output, missing)
+    if film:
+        if len(tried) < 2:
+            raise UsageError("--film shows evaluated runs side by side: two or more must have finished the stage eval")
+        _film(store, console, tried, output / FILM, quiet=as_json)
     curves = _learning_curves(found, output)
     if as_json:
         print_json(console, _data(found, output))
@@ -82,20 +80,56 @@ def compare(
     if missing:
         text = f"not compared, for their eval has not run: {', '.join(missing)}; `iowbc plan {words[0]}` says how long "
         tell(console, f"{text}that takes")
-    for text in _written(output):
-        tell(console, text)
+    for path in sorted(output.iterdir(), key=lambda path: (path.is_dir(), path)):
+        count = sum(1 for _ in path.rglob("*.*"))
+        tell(console, shown_path(path) + (f"/ ({count} file{'s' if count != 1 else ''})" if path.is_dir() else ""))
 
 
-def _written(output: Path) -> list[str]:
-    """A line for each file of a comparison, and one for each folder in it."""
-    folders = {path: sum(1 for _ in path.rglob("*.*")) for path in sorted(output.iterdir()) if path.is_dir()}
-    files = [shown_path(path) for path in sorted(output.glob("*.*"))]
-    counts = {path: f"{count} file{'s' if count != 1 else ''}" for path, count in folders.items()}
-    return [*files, *(f"{shown_path(path)}/ ({count})" for path, count in counts.items())]
+def report(store: Store, console: Console, words: Sequence[str], output: Path) -> None:
+    """Write one HTML file about what the words name, which opens anywhere without a network. Raises `UsageError`."""
+    found = [named(store, word) for word in points_of(store, words)]
+    single = [run.word for run in found if run.recipe is None]
+    if single:
+        raise UsageError(
+            f"{single[0]} is one artifact; report takes recipes that have run, as `iowbc status` lists them"
+        )
+    if output.suffix != ".html":
+        raise UsageError(f"--output {output}: a report is an HTML file; give a name that ends in .html")
+    require_training("report")
+    require_writable(output.parent, "--output")
+    require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
+
+    from iowbc.report.page import write_page
+
+    differences = [
+        line
+        for other in found[1:]
+        for line in (f"{found[0].word} → {other.word}", *(f"  {text}" for text in difference_lines(found[0], other)))
+    ]
+    tables, media = _joined(store, found)
+    main, others = split_tables(tables)
+    write_page(output, _runs(found), _groups(found), main, others, differences, media)
+    tell(console, f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed")
+
+
+def _joined(store: Store, found: Sequence[Named]) -> tuple[list[Table], dict[str, bytes]]:
+    """The result tables of one run; of several those over all their trials, and by file name their pictures and their
+    film side by side, where there is one."""
+    evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
+    if len(evaluated) < 2:
+        return [table for one in evaluated for table in tables_of(one)], {}
+    with tempfile.TemporaryDirectory() as folder:
+        output, tried = Path(folder), _having(found, TRIALS)
+        _report_probes(found, output)
+        if len(tried) > 1:
+            report_together(tried, output)
+        film = film_of(store.runs, [run.word for run in found])
+        media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
+        return read_tables(output / "tables"), {path.name: path.read_bytes() for path in media}
 
 
 def _data(found: Sequence[Named], output: Path) -> dict[str, Any]:
-    """The same for other programs: every metric of every run, and the files that were written."""
+    """The comparison for other programs: every metric of every run, and the files that were written."""
     metrics = [
         {"stage": stage, "run": run.word, **artifact.metrics}
         for run in found
@@ -104,10 +138,16 @@ def _data(found: Sequence[Named], output: Path) -> dict[str, Any]:
     return {"metrics": metrics, "files": [shown_path(path) for path in sorted(output.rglob("*.*"))]}
 
 
-def _groups(found: Sequence[Named]) -> "list[Group]":
-    from iowbc.report.runs import Run, grouped
+def _runs(found: Sequence[Named]) -> "list[Run]":
+    from iowbc.report.runs import Run
 
-    return grouped([Run(run.word, run.artifacts, run.recipe or {}) for run in found])
+    return [Run(run.word, run.artifacts, run.recipe or {}) for run in found]
+
+
+def _groups(found: Sequence[Named]) -> "list[Group]":
+    from iowbc.report.runs import grouped
+
+    return grouped(_runs(found))
 
 
 def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[CurvePanel]]":
@@ -131,56 +171,6 @@ def _print_curves(curves: "Mapping[str, Sequence[CurvePanel]]", console: Console
                 if values := [value for value in curve.mean.tolist() if math.isfinite(value)]:
                     text = f"  {sparkline(values, CURVE_WIDTH)} {values[-1]:.4g}  {curve.label}"
                     console.print(text, markup=False, highlight=False, no_wrap=True, overflow="ellipsis")
-
-
-@dataclass(frozen=True)
-class Joined:
-    """What an evaluation, or several together, show."""
-
-    tables: list[Table]
-    media: dict[str, bytes]
-    """Pictures of several together, and a film of them side by side where there is one, by file name."""
-
-
-def joined(store: Store, found: Sequence[Named]) -> Joined:
-    """The result tables of one run; of several those over all their trials, with their pictures and film."""
-    evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
-    if len(evaluated) < 2:
-        return Joined([table for one in evaluated for table in tables_of(one)], {})
-    with tempfile.TemporaryDirectory() as folder:
-        output, tried = Path(folder), _having(found, TRIALS)
-        _report_probes(_having(found, PROBE), output)
-        if len(tried) > 1:
-            report_together(tried, output)
-        film = film_of(store.runs, [run.word for run in found])
-        media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
-        return Joined(read_tables(output / "tables"), {path.name: path.read_bytes() for path in media})
-
-
-def film_together(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
-    """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
-
-    None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
-    can be drawn.
-    """
-    tried = _having([named(store, word) for word in words], TRIALS)
-    film = output / FILM
-    if len(tried) < 2:
-        return None
-    newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)
-    if not (film.is_file() and film.stat().st_mtime > newest):
-        with Filming(console, film) as filming:
-            _film(store, *_of_each_recipe(tried, _told_apart(tried, TRIALS)[0]), film, filming)
-    return film
-
-
-def _of_each_recipe(
-    runs: Sequence[Named], trials: "Sequence[pd.DataFrame]"
-) -> "tuple[list[Named], list[pd.DataFrame]]":
-    """The first training of each recipe with its trials; all of them where there is one recipe."""
-    first = [group.runs[0].label for group in _groups(runs)]
-    chosen = [place for place, run in enumerate(runs) if len(first) == 1 or run.word in first]
-    return [runs[place] for place in chosen], [trials[place] for place in chosen]
 
 
 def _having(runs: Sequence[Named], name: str) -> list[Named]:
@@ -210,18 +200,18 @@ def _told_apart(runs: Sequence[Named], name: str, together: bool = True) -> "tup
     return [tables[run.word] for run in runs], labels
 
 
-def _report_probes(runs: Sequence[Named], output: Path) -> None:
-    """What the histories of all runs that were probed know of the load."""
+def _report_probes(found: Sequence[Named], output: Path) -> None:
+    """Knowledge of the load in the histories of all runs that were probed."""
     import pandas as pd
 
     from iowbc.evaluation.report.probe import write_probe
 
-    if runs:
+    if runs := _having(found, PROBE):
         write_probe(pd.concat(_told_apart(runs, PROBE, together=False)[0], ignore_index=True), output)
 
 
-def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] = ()) -> "list[pd.DataFrame]":
-    """Write tables and figures over all trials under `output`; the trials of each run.
+def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] = ()) -> None:
+    """Write tables and figures over all trials of the runs under `output`.
 
     missing: recipes that belong to them and have not run. Raises `UsageError` where the runs count masses differently.
     """
@@ -237,15 +227,71 @@ def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] 
         )
     write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)
     write_table(trainings_table(_groups(runs), missing), output / "tables")
-    return trials
 
 
-def _film(store: Store, runs: Sequence[Named], trials: "Sequence[pd.DataFrame]", path: Path, filming: Filming) -> None:
-    """Play one trial that all runs share again, with the policies that were evaluated, and film it."""
+def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> Table:
+    """Length and seed of each training behind a comparison, a row for each run; `missing`: recipes that belong to the
+    comparison and have not run."""
+    import pandas as pd
+
+    used = {stage for group in groups for run in group.runs for stage in run.recipe.get("stages", ())}
+    named = [STAGES[name] for name in STAGES if name in used | {"teacher", "distill"}]
+    methods = {stage.name: stage.presentation.trained_by for stage in named if stage.presentation.trained_by}
+    rows: list[tuple[str, ...]] = []
+    numbers: list[dict[str, object]] = []
+    for group in groups:
+        for run, seed in zip(group.runs, group.seeds, strict=True):
+            steps = {stage: _steps_of(run, stage) for stage in methods}
+            label = str(run.recipe["eval"]["label"])
+            rows.append((run.label, label, seed, *(ABSENT if n is None else f"{n:,}" for n in steps.values())))
+            numbers.append({"recipe": run.label, "algorithm": label, "seed": seed, **steps})
+    rows += [(name, NOT_TRAINED, *[ABSENT] * (1 + len(methods))) for name in missing]
+    columns = heads("Recipe", "Algorithm", "Seed", *(f"Steps of {method}" for method in methods.values()))
+    budget = "" if len({row["teacher"] for row in numbers}) == 1 else "not "
+    lacking = f" Missing: {', '.join(missing)}." if missing else ""
+    caption = f"What was trained, {budget}all with the same budget of PPO.{lacking}"
+    return Table("trainings", caption, columns, rows, pd.DataFrame(numbers))
+
+
+def _steps_of(run: "Run", stage: str) -> int | None:
+    """Environment steps of a stage that trains; None where the run has no such stage."""
+    if stage not in run.recipe.get("stages", ()):
+        return None
+    made: Any = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
+    for part in STAGES[stage].counts[0].split("."):
+        made = made[part]
+    return int(made)
+
+
+def film_together(store: Store, console: Console, words: Sequence[str], output: Path) -> Path | None:
+    """Film a trial that all evaluated runs share, unless there is such a film that is newer than they are.
+
+    None where fewer than two were evaluated. Raises `UsageError` where they share no trial, NoRenderer where nothing
+    can be drawn.
+    """
+    tried, film = _having([named(store, word) for word in words], TRIALS), output / FILM
+    if len(tried) < 2:
+        return None
+    newest = max((run.artifacts["eval"].folder / TRIALS).stat().st_mtime for run in tried)
+    if not (film.is_file() and film.stat().st_mtime > newest):
+        _film(store, console, tried, film)
+    return film
+
+
+def _film(store: Store, console: Console, tried: Sequence[Named], path: Path, quiet: bool = False) -> None:
+    """Play one trial that all share again, with the policies that were evaluated, and film it side by side: the first
+    training of each recipe, or all of them where there is one recipe."""
     from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
 
-    actors = [evaluated_actor(store, run.artifacts["eval"], table) for run, table in zip(runs, trials, strict=True)]
-    rows = common_trial(actors)
-    if not rows:
-        raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
-    film_side_by_side(actors, rows, path, progress=filming)
+    first = [group.runs[0].label for group in _groups(tried)]
+    chosen = [
+        (run.artifacts["eval"], table)
+        for run, table in zip(tried, _told_apart(tried, TRIALS)[0], strict=True)
+        if len(first) == 1 or run.word in first
+    ]
+    with filming(console, None if quiet else path) as progress:
+        actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]
+        rows = common_trial(actors)
+        if not rows:
+            raise UsageError("the runs share no trial to film: their evaluations have no suite and mass in common")
+        film_side_by_side(actors, rows, path, progress=progress)

@@ -1,4 +1,4 @@
-"""What a shell offers on Tab: recipes, stages, artifacts by name or key, and dotted paths of a recipe."""
+"""Completions that a shell offers on Tab: recipes, stages, artifacts by name or key, and dotted paths of a recipe."""
 
 import os
 from collections.abc import Iterable
@@ -18,14 +18,14 @@ def recipes(incomplete: str) -> list[str]:
 
 def ran(incomplete: str) -> list[str]:
     """Recipes that have run, or are published."""
-    from iowbc.commands.named import nameable
+    from iowbc.commands.lookup import nameable
 
     return _beginning(incomplete, nameable(_store()))
 
 
 def artifacts(incomplete: str) -> list[str]:
     """Recipes that have run or are published, `RECIPE/STAGE`, and, once something is typed, keys."""
-    from iowbc.commands.named import nameable
+    from iowbc.commands.lookup import nameable
 
     store = _store()
     known = nameable(store)

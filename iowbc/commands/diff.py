@@ -1,18 +1,15 @@
-"""`iowbc diff A B`: how two recipes or two artifacts differ in recipe, keys, versions and metrics."""
+"""`iowbc diff A B`: differences of two recipes or two artifacts in recipe, keys, versions and metrics."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 from rich.console import Console
-from rich.padding import Padding
-from rich.table import Table
-from rich.text import Text
 
-from iowbc.commands.named import Named, named
+from iowbc.commands.lookup import Named, named
 from iowbc.commands.printed import hanging, print_json, tell
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
@@ -23,91 +20,35 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.results.table import NARROWEST, folded
 
 ABSENT = "(absent)"
 """In place of a value that one of the two has not."""
-INDENT = 2
-"""Characters by which differences stand to the right of their stage."""
-GAP = 2
-"""Characters between two columns."""
-WHOLE = 14
-"""A value of at most so many characters, such as a number or the beginning of a key, is never folded."""
 
 
 def diff(store: Store, console: Console, first: str, second: str, as_json: bool = False) -> None:
     """Print the differences. Each of the two is whatever `show` takes, or a recipe file that has not run."""
-    a, b = _either(store, first), _either(store, second)
+    lines = difference_lines(_either(store, first), _either(store, second))
     if as_json:
-        print_json(console, {"first": first, "second": second, "differences": difference_lines(a, b)})
+        print_json(console, {"first": first, "second": second, "differences": lines})
         return
-    found = list(differences_of(a, b))
-    if not found:
-        console.print("no difference")
-    elif console.is_terminal:
-        tell(console, f"{first} -> {second}")
-        for place in dict.fromkeys(difference.place for difference in found):
-            _draw(console, place, [difference for difference in found if difference.place == place])
-    else:
-        for difference in found:
-            tell(console, difference.line)
-
-
-@dataclass(frozen=True)
-class Difference:
-    """One value that differs."""
-
-    place: str
-    """The stage; empty for the recipe."""
-    name: str
-    old: str = ""
-    new: str = ""
-    step: str = ""
-    """Of a number: by how much."""
-    mark: str = ": "
-    """Between name and values, where they are written in a line."""
-
-    @property
-    def has_values(self) -> bool:
-        return bool(self.old or self.new)
-
-    @property
-    def line(self) -> str:
-        values = f"{self.mark}{self.old} -> {self.new}" if self.has_values else ""
-        return f"{f'{self.place}: ' if self.place else ''}{self.name}{values}{f' ({self.step})' if self.step else ''}"
-
-
-def _draw(console: Console, place: str, found: Sequence[Difference]) -> None:
-    """The differences of one place, old and new values below one another, and what has none below them.
-
-    Long values are folded before names, and names before numbers and keys, which stay whole.
-    """
-    whole = max((len(text) for one in found for text in (one.old, one.new) if len(text) <= WHOLE), default=0)
-    steps = max(len(one.step) for one in found)
-    names = max(console.width - INDENT - 3 * GAP - 2 * whole - steps, NARROWEST)
-    table = Table.grid(padding=(0, GAP, 0, 0))
-    table.add_column(no_wrap=True)
-    for _ in range(3):
-        table.add_column(overflow="fold")
-    for one in found:
-        if one.has_values:
-            table.add_row(*map(Text, (folded(one.name, names), one.old, one.new, one.step)))
-    console.print(Text(place or "recipe", style="bold"))
-    console.print(Padding(table, (0, 0, 0, INDENT)))
-    for one in found:
-        if not one.has_values:
-            console.print(hanging(one.name, console.width, INDENT), markup=False, highlight=False)
+    for line in lines or ["no difference"]:
+        tell(console, hanging(line, console.width, 0) if console.is_terminal else line)
 
 
 def difference_lines(a: Named, b: Named) -> list[str]:
-    """How two recipes or artifacts differ, a line each; empty where they do not."""
-    return [difference.line for difference in differences_of(a, b)]
+    """Differences of two recipes or artifacts, a line each, those of a stage together; empty where there are none."""
+    return list(_differences(a, b))
 
 
-def differences_of(a: Named, b: Named) -> Iterator[Difference]:
-    """How two recipes or artifacts differ."""
-    yield from _changes("", "", _today(a.recipe), _today(b.recipe))
-    yield from _stages(a, b)
+def _differences(a: Named, b: Named) -> Iterator[str]:
+    yield from _changes("", _today(a.recipe), _today(b.recipe))
+    for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
+        old, new = a.artifacts.get(stage), b.artifacts.get(stage)
+        if old is None or new is None:
+            yield f"{stage}: only in {b.word if old is None else a.word}"
+        else:
+            for text in _of_artifacts(old, new, with_recipe=a.recipe is None or b.recipe is None):
+                yield f"{stage}: {text}"
 
 
 def _either(store: Store, word: str) -> Named:
@@ -132,53 +73,29 @@ def _today(recipe: Mapping[str, Any] | None) -> Mapping[str, Any]:
         return recipe or {}
 
 
-def _stages(a: Named, b: Named) -> Iterator[Difference]:
-    for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
-        old, new = a.artifacts.get(stage), b.artifacts.get(stage)
-        if old is None or new is None:
-            yield Difference(stage, f"only in {b.word if old is None else a.word}")
-        else:
-            yield from _artifacts(stage, old, new, with_recipe=a.recipe is None or b.recipe is None)
-
-
-def _artifacts(stage: str, old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[Difference]:
+def _of_artifacts(old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[str]:
     before, after = old.manifest, new.manifest
     if before.key != after.key:
-        yield Difference(stage, "key", before.key[:KEY_LENGTH], after.key[:KEY_LENGTH], mark=" ")
+        yield f"key {before.key[:KEY_LENGTH]} -> {after.key[:KEY_LENGTH]}"
     elif before.digest == after.digest:
         return
     if with_recipe:
-        yield from _changes(stage, "", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
-    for name, first, second in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
-        yield Difference(stage, f"input {name}", _digest(first), _digest(second))
+        yield from _changes("", old.ingredients.get("recipe", {}), new.ingredients.get("recipe", {}))
+    for name, *digests in differences(old.ingredients.get("inputs", {}), new.ingredients.get("inputs", {})):
+        yield f"input {name}: {' -> '.join(ABSENT if one is MISSING else str(one)[:KEY_LENGTH] for one in digests)}"
     if before.version != after.version:
-        yield Difference(stage, "stage version", str(before.version), str(after.version))
-    yield from _changes(stage, "version of ", before.versions, after.versions)
-    changed = changed_code(before.code, after.code)
-    if changed:
-        yield Difference(stage, f"code of {', '.join(changed)}")
+        yield f"stage version: {before.version} -> {after.version}"
+    yield from _changes("version of ", before.versions, after.versions)
+    if changed := changed_code(before.code, after.code):
+        yield f"code of {', '.join(changed)}"
     for name in dict.fromkeys([*old.metrics, *new.metrics]):
         first, second = old.metrics.get(name), new.metrics.get(name)
         if first != second:
-            yield Difference(stage, f"metric {name}", _number(first), _number(second), _step(first, second))
+            values = " -> ".join(ABSENT if value is None else figure(value, 6) for value in (first, second))
+            step = f" ({figure(second - first, 3, '+')})" if first is not None and second is not None else ""
+            yield f"metric {name}: {values}{step}"
 
 
-def _changes(place: str, prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Difference]:
-    for path, old, new in differences(nested(before), nested(after)):
-        yield Difference(place, f"{prefix}{path}", _value(old), _value(new))
-
-
-def _digest(value: Any) -> str:
-    return ABSENT if value is MISSING else str(value)[:KEY_LENGTH]
-
-
-def _value(value: Any) -> str:
-    return ABSENT if value is MISSING else shown(value)
-
-
-def _number(value: float | None) -> str:
-    return ABSENT if value is None else figure(value, 6)
-
-
-def _step(old: float | None, new: float | None) -> str:
-    return figure(new - old, 3, "+") if old is not None and new is not None else ""
+def _changes(prefix: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str]:
+    for path, *values in differences(nested(before), nested(after)):
+        yield f"{prefix}{path}: {' -> '.join(ABSENT if value is MISSING else shown(value) for value in values)}"

@@ -1,4 +1,4 @@
-"""`iowbc doctor`: whether this machine can run a recipe, and what to do where it cannot."""
+"""`iowbc doctor`: fitness of this machine to run a recipe, and the remedy where it is not fit."""
 
 import importlib.metadata
 import os
@@ -6,7 +6,7 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -79,26 +79,31 @@ def examine(runs: Runs, console: Console) -> int:
     table.add_column(no_wrap=True)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
-    verdicts = []
-    for finding in findings(runs):
-        verdicts.append(finding.verdict)
-        table.add_row(finding.name, Text(finding.verdict, style=STYLES[finding.verdict]), Text(finding.text))
+    found = list(findings(runs))
+    for one in found:
+        table.add_row(one.name, Text(one.verdict, style=STYLES[one.verdict]), Text(one.text))
     console.print(table)
-    if "bad" in verdicts:
-        console.print("not fit to run recipes: see the lines marked bad", highlight=False)
-        return 1
-    console.print("fit to run recipes", highlight=False)
-    return 0
+    fit = all(one.verdict != "bad" for one in found)
+    console.print("fit to run recipes" if fit else "not fit to run recipes: see the lines marked bad", highlight=False)
+    return 0 if fit else 1
 
 
 def findings(runs: Runs) -> Iterator[Finding]:
-    """Everything that is looked at, essential things first."""
+    """All findings, essential ones first."""
     yield _python()
     yield from _packages()
     yield from _robots()
-    yield _process("crocoddyl and pin", CONTACT_MODEL, _contact_verdict)
-    yield _process("pictures", PICTURE, _picture_verdict)
-    yield _cores()
+    yield _process(
+        "crocoddyl and pin",
+        CONTACT_MODEL,
+        "a contact model computes",
+        "bad",
+        "a contact model does not compute: {}; the binaries must match: "
+        "`pip install crocoddyl==3.2.1 pin==4.0.0 libpinocchio==4.0.0`",
+    )
+    yield _process("pictures", PICTURE, "drawn without a screen by ", "doubtful", "none, and no films: {}")
+    cores = available_cores()
+    yield Finding("cores", "good" if cores > 1 else "doubtful", f"{cores} of {os.cpu_count()}")
     yield _memory()
     yield _disk(runs)
     yield _tracking(runs)
@@ -147,37 +152,18 @@ def _robots() -> Iterator[Finding]:
             yield Finding(f"robot {robot.name}", "good", f"{len(robot.joints)} joints, {folder}")
 
 
-def _process(name: str, script: str, verdict: Callable[[int, str, str], tuple[Verdict, str]]) -> Finding:
-    """Run a check where a crash does no harm."""
+def _process(name: str, script: str, good: str, worst: Verdict, trouble: str) -> Finding:
+    """Run a check where a crash does no harm; `good` comes before its output, and its reason is put into `trouble`."""
     command = [sys.executable, "-c", script]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
         return Finding(name, "bad", f"no answer within {duration(PATIENCE)}")
-    last = done.stderr.strip().splitlines()[-1:] or [""]
-    return Finding(name, *verdict(done.returncode, done.stdout.strip(), last[0]))
-
-
-def _contact_verdict(code: int, output: str, error: str) -> tuple[Verdict, str]:
-    if code == 0:
-        return "good", "a contact model computes"
-    reason = f"it crashes (signal {-code})" if code < 0 else error
-    return "bad", (
-        f"a contact model does not compute: {reason}; the binaries must match: "
-        "`pip install crocoddyl==3.2.1 pin==4.0.0 libpinocchio==4.0.0`"
-    )
-
-
-def _picture_verdict(code: int, output: str, error: str) -> tuple[Verdict, str]:
-    if code == 0:
-        return "good", f"drawn without a screen by {output}"
-    reason = f"it crashes (signal {-code})" if code < 0 else error.partition("NoRenderer: ")[2] or error
-    return "doubtful", f"none, and no films: {reason}"
-
-
-def _cores() -> Finding:
-    cores = available_cores()
-    return Finding("cores", "good" if cores > 1 else "doubtful", f"{cores} of {os.cpu_count()}")
+    if done.returncode == 0:
+        return Finding(name, "good", good + done.stdout.strip())
+    last = (done.stderr.strip().splitlines()[-1:] or [""])[0]
+    crash = f"it crashes (signal {-done.returncode})" if done.returncode < 0 else ""
+    return Finding(name, worst, trouble.format(crash or last.partition("NoRenderer: ")[2] or last))
 
 
 def _memory() -> Finding:
@@ -185,9 +171,8 @@ def _memory() -> Finding:
 
     memory = psutil.virtual_memory()
     text = f"{memory.available / 1e9:.1f} GB free of {memory.total / 1e9:.1f} GB"
-    if memory.available < LEAST_MEMORY:
-        return Finding("memory", "doubtful", f"{text}; fewer --workers need less")
-    return Finding("memory", "good", text)
+    scarce = memory.available < LEAST_MEMORY
+    return Finding("memory", "doubtful" if scarce else "good", text + "; fewer --workers need less" * scarce)
 
 
 def _disk(runs: Runs) -> Finding:

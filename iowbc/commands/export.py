@@ -1,13 +1,14 @@
 """`iowbc export WHAT --web DIR`: an exported controller as a static web page."""
 
 import os
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.named import named
+from iowbc.commands.lookup import named
+from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, tell
-from iowbc.commands.training import require_training
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
@@ -17,10 +18,6 @@ from iowbc.pipeline.writability import require_writable
 
 def export_page(store: Store, console: Console, word: str, folder: Path) -> None:
     """Write the page of what a word names into a folder, and say how to look at it. Raises `UsageError`."""
-
-    def say(text: str) -> None:
-        tell(console, text)
-
     require_training("export")
     exported = exported_folder(store, word)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():
@@ -30,6 +27,7 @@ def export_page(store: Store, console: Console, word: str, folder: Path) -> None
 
     from iowbc.web.page import write_page
 
+    say = partial(tell, console)
     write_page(exported, folder, store.runs.npm, say)
     whole = sum(path.stat().st_size for path in folder.iterdir())
     say(f"{shown_path(folder)} ({size(whole)}): copy it to any web server; to look at it here:")

@@ -1,4 +1,4 @@
-"""`iowbc gc`: removes what was asked for by name, and nothing that a process works on."""
+"""`iowbc gc`: removal of what was asked for by name, and of nothing that a process works on."""
 
 import shutil
 import time
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.named import known_recipes, last_used
+from iowbc.commands.lookup import known_recipes, last_used
 from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError, nearest
 from iowbc.files import OLD
@@ -23,7 +23,7 @@ from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
 from iowbc.pipeline.writability import require_writable_runs
 
 REMOVING = ".removing-"
-"""What the name of a folder that is being removed begins with."""
+"""Beginning of the name of a folder that is being removed."""
 DAY = 86_400.0
 """Seconds."""
 PRECIOUS = 3600.0
@@ -32,10 +32,10 @@ PRECIOUS = 3600.0
 
 @dataclass(frozen=True)
 class Scope:
-    """What may be removed."""
+    """Scope of a removal."""
 
     unused: bool = False
-    """Artifacts that no recipe ever used, and what processes left that died; with `older_than` also those that none
+    """Artifacts that no recipe ever used, and remains of processes that died; with `older_than` also those that none
     used lately."""
     recipes: tuple[str, ...] = ()
     """These recipes' records, and artifacts that they used and no other recipe did."""
@@ -72,14 +72,12 @@ def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None
 
 
 def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
-    runs = store.runs
-    recipes = known_recipes(store)
+    runs, recipes = store.runs, known_recipes(store)
     for recipe in scope.recipes:
         if recipe not in recipes:
             listing = ", ".join(recipes) or "none"
-            raise UsageError(
-                f"--recipe {recipe}: no such recipe has run; those that have: {listing}{nearest(recipe, recipes)}"
-            )
+            text = f"no such recipe has run; those that have: {listing}{nearest(recipe, recipes)}"
+            raise UsageError(f"--recipe {recipe}: {text}")
     own = [artifact for artifact in store.artifacts() if not artifact.published]
     free = [artifact for artifact in own if not holder(runs, artifact.manifest.key)]
     if scope.unused:

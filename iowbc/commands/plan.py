@@ -1,19 +1,22 @@
-"""`iowbc plan`: what would run, why, and how long that takes."""
+"""`iowbc plan`: stages that would run, the reasons, and the time, for a recipe, a study or a sweep."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.printed import hanging, print_json, tell
+from iowbc.commands.printed import hanging, plain_table, print_json, tell
 from iowbc.commands.request import Request, in_order, prepared, recipes
-from iowbc.commands.sweep_plan import Planned, in_all, plan_table, planned, time_of
-from iowbc.pipeline.console.wording import KEY_LENGTH, short
+from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
+from iowbc.pipeline.ingredients import key_values
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import StagePlan
+from iowbc.pipeline.store.digests import data_digest
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
@@ -21,8 +24,21 @@ REASON_INDENT = 4
 """Characters by which reasons stand to the right of their stage."""
 
 
+@dataclass(frozen=True)
+class PlannedStage:
+    """A stage of one recipe among several."""
+
+    step: StagePlan
+    shared_with: str
+    """The earlier recipe that makes it; empty where this one does, or where it is cached."""
+
+
+Planned = Mapping[str, Sequence[PlannedStage]]
+"""The stages of each recipe, by its name."""
+
+
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
-    """Print what would run, and why; of a recipe of recipes a table of what would run of each."""
+    """Print what would run, and why; of a study a table of what would run of each recipe."""
     asked = [prepared(one, request, registry)[0] for one in recipes(request)]
     each = [one for planner in asked for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
@@ -33,15 +49,42 @@ def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_j
     planners = list(longest.values())
     if as_json:
         names = [planner.loaded.recipe.name for planner in planners]
-        steps = [[_data(step) for step in planner.plan()] for planner in planners]
+        steps = [[step_data(step) for step in planner.plan()] for planner in planners]
         print_json(console, [{"recipe": name, "stages": own} for name, own in zip(names, steps, strict=True)])
     elif len(planners) == 1:
         _print(planners[0].plan(), console)
     else:
-        _print_several(planned(planners), request, console)
+        _print_several(planned(planners), console)
 
 
-def _print_several(found: Planned, request: Request, console: Console) -> None:
+def planned(planners: Sequence[Planner]) -> Planned:
+    """The stages of each recipe, as things stand: each stage is made once, however many recipes share it."""
+    makers: dict[str, str] = {}
+    found: dict[str, list[PlannedStage]] = {}
+    for planner in planners:
+        name = planner.loaded.recipe.name
+        identities: dict[str, str] = {}
+        own = found.setdefault(name, [])
+        for step in planner.plan():
+            identity = identities[step.stage.name] = step.key or _identity(planner, step.stage, identities)
+            maker = name if step.cached else makers.setdefault(identity, name)
+            own.append(PlannedStage(step, "" if maker == name else maker))
+    return found
+
+
+def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
+    """Stands for a stage's key while those of the stages that it reads are not known."""
+    ingredients = {
+        "stage": stage.name,
+        "recipe": key_values(planner.loaded.recipe, planner.deciding, stage),
+        "robot": planner.robot_digest,
+        "inputs": {name: before[name] for name in planner.reads(stage)},
+        "borrowed": {name: one.named for name, one in stage.borrows(planner.loaded.recipe).items()},
+    }
+    return data_digest(ingredients)
+
+
+def _print_several(found: Planned, console: Console) -> None:
     """A row for each recipe, what the signs mean, and all together."""
     console.print(plan_table(found, "recipe"))
     steps = [stage.step for own in found.values() for stage in own if not stage.shared_with]
@@ -51,54 +94,93 @@ def _print_several(found: Planned, request: Request, console: Console) -> None:
     console.print(in_all(found, "recipes"), highlight=False, soft_wrap=True)
     changing = [name for name, own in found.items() if not all(stage.step.cached for stage in own)]
     if changing:
-        text = f"`iowbc plan {changing[-1]}` says why; so for {', '.join(changing[:-1])}" if changing[:-1] else ""
-        text = text or f"`iowbc plan {changing[0]}` says why"
-        tell(console, text)
+        others = f"; so for {', '.join(changing[:-1])}" if changing[:-1] else ""
+        tell(console, f"`iowbc plan {changing[-1]}` says why{others}")
+
+
+def in_all(found: Planned, what: str = "points") -> str:
+    """Amount of work in a sentence; `what`: the recipes' part in it."""
+    stages = [stage for own in found.values() for stage in own]
+    made = [stage.step for stage in stages if not stage.step.cached and not stage.shared_with]
+    shared = sum(bool(stage.shared_with) for stage in stages)
+    cached = sum(stage.step.cached for stage in stages)
+    if not made:
+        return f"{len(found)} {what}: all stages are cached"
+    head = f"{len(found)} {what}: {len(made)} stages would run, {shared} are shared, {cached} cached"
+    rest = sum(step.guess is None for step in made)
+    if rest == len(made):
+        return f"{head}; how long that takes is not known"
+    return f"{head}; {time_of(made)} one after another{f', and {rest} of unknown length' if rest else ''}"
+
+
+def time_of(steps: Sequence[StagePlan]) -> str:
+    """The time that stages take together, as far as it is known: a range, or a guess where one of them has no more."""
+    known = [step for step in steps if step.guess is not None]
+    if any(step.expected is None for step in known):
+        return f"a guess: {duration(sum(step.guess or 0.0 for step in known))}"
+    low, high = (duration(sum((step.expected or 0.0) * step.spread[end] for step in known)) for end in (0, 1))
+    return f"{low} to {high}" if low != high else f"about {low}"
+
+
+def plan_table(found: Planned, what: str) -> Table:
+    """A row for each recipe, a column for each stage; `what` stands above the recipes' names.
+
+    A stage that would run has the time that it takes, without a word, so that six stages fit on 80 characters.
+    """
+    names = list(dict.fromkeys(stage.step.stage.name for own in found.values() for stage in own))
+    table = plain_table(what, *names)
+    for recipe, own in found.items():
+        cells = {stage.step.stage.name: _cell(stage) for stage in own}
+        table.add_row(recipe, *(cells.get(name, "") for name in names))
+    return table
+
+
+def _cell(stage: PlannedStage) -> Text:
+    if stage.step.cached:
+        return Text("published" if stage.step.published else "cached", style="cyan")
+    if stage.shared_with:
+        return Text("shared", style="dim")
+    sign = "~" if stage.step.expected is None and stage.step.roughly is not None else ""
+    return Text(f"{sign}{duration(stage.step.guess)}" or "run", style="bold yellow")
 
 
 def _print(steps: Sequence[StagePlan], console: Console) -> None:
-    """What is planned for each stage, the reasons below it, and the time in all."""
+    """The plan of each stage, the reasons below it, and the time in all."""
     widest = max((len(step.stage.name) for step in steps), default=0)
     for step in steps:
-        console.print(Text.assemble((step.stage.name.ljust(widest + 2), "bold"), _planned(step)))
-        for line in _why(step):
+        console.print(Text.assemble((step.stage.name.ljust(widest + 2), "bold"), _described(step)))
+        for line in (*short(step.reasons, REASONS_SHOWN).splitlines(), *step.notes):
             console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
     rest = sum(step.guess is None for step in missing)
     if not missing:
-        console.print("all stages are cached", highlight=False)
+        text = "all stages are cached"
     elif rest == len(missing):
-        console.print(f"{count}; how long that takes is not known", highlight=False)
+        text = f"{count}; how long that takes is not known"
     else:
-        parts = [time_of(missing)]
-        parts += [f"{rest} stage{'s' if rest != 1 else ''} of unknown length"] if rest else []
-        console.print(f"{count}: {', and '.join(parts)}", highlight=False)
+        unknown = f", and {rest} stage{'s' if rest != 1 else ''} of unknown length" if rest else ""
+        text = f"{count}: {time_of(missing)}{unknown}"
+    console.print(text, highlight=False)
 
 
-def _planned(step: StagePlan) -> Text:
-    """Whether it is cached, and by which key, or would run, and for how long."""
+def _described(step: StagePlan) -> Text:
+    """Its key where it is cached, else the time that it takes."""
     if step.cached:
-        published = step.artifact is not None and step.artifact.published
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
-        return Text.assemble(("cached (published)" if published else "cached", "cyan"), (key, "dim"))
+        return Text.assemble(("cached (published)" if step.published else "cached", "cyan"), (key, "dim"))
     takes = "" if step.guess is None else f", {time_of([step])}"
     if step.expected is None and step.roughly is not None:
         takes += f" at the rate of {step.rate_of}"
     return Text.assemble(("run", "bold yellow"), takes)
 
 
-def _why(step: StagePlan) -> Sequence[str]:
-    """A line for each reason and note."""
-    return step.notes if step.cached else (*short(step.reasons, REASONS_SHOWN).splitlines(), *step.notes)
-
-
-def _data(step: StagePlan) -> dict[str, Any]:
-    """The same for other programs."""
+def step_data(step: StagePlan) -> dict[str, Any]:
+    """The step for other programs."""
     return {
         "stage": step.stage.name,
         "cached": step.cached,
-        "published": step.cached and step.artifact is not None and step.artifact.published,
+        "published": step.published,
         "key": step.key,
         "reasons": step.reasons,
         "notes": step.notes,

@@ -1,22 +1,29 @@
-"""What `iowbc play` plays: a recipe's policy, one artifact, or an exported folder."""
+"""`iowbc play`: a policy to watch, to film, or to drive by hand in the browser beside the trials of its evaluation."""
 
+import contextlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from iowbc.commands.ending import close_on_termination
-from iowbc.commands.filming import Filming
-from iowbc.commands.in_training import InTraining, in_training
-from iowbc.commands.named import named
-from iowbc.commands.origins import generator_of, made_from, world_of
-from iowbc.commands.printed import tell
+from iowbc.commands.lookup import (
+    InTraining,
+    in_training,
+    input_of,
+    made_from,
+    named,
+    policy_of,
+    policy_stages,
+    world_of,
+)
+from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
+from iowbc.commands.printed import filming, tell
+from iowbc.commands.process import close_on_termination
 from iowbc.commands.request import Request, prepared
-from iowbc.commands.results import policy_stages
-from iowbc.commands.training import require_training
+from iowbc.commands.results import evaluated_actor
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
@@ -32,6 +39,8 @@ from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
 
+PORT = 8080
+"""Port of the page where no other is asked for."""
 Registry = Mapping[str, Stage]
 """The stages that there are, by name."""
 NO_STAGES: Registry = MappingProxyType({})
@@ -49,14 +58,60 @@ def play_word(
     from iowbc.evaluation.play import play
 
     try:
-        with Filming(console, request.video) as filming:
-            shown = play(source, request, progress=filming)
+        with filming(console, request.video) as progress:
+            shown = play(source, request, progress=progress)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return 0
     made = f"; {request.video} has {shown.frames} pictures" if request.video else ""
     tell(console, f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}")
     return 0
+
+
+def play_on_web(
+    store: Store,
+    console: Console,
+    word: str,
+    stage: str | None,
+    request: PlayRequest,
+    port: int,
+    registry: Registry = NO_STAGES,
+) -> None:
+    """Serve the viewer in the browser until interrupted. Raises `UsageError` where it cannot begin."""
+    if request.video is not None:
+        raise UsageError("--web and --video exclude each other: open the page, or make a film")
+    require_training("play")
+    require_viewer()
+    require_free(port)
+    close_on_termination()
+    evaluation = None
+    if not Path(word).is_dir():
+        with contextlib.suppress(UsageError):  # of a first training, of which nothing is finished yet
+            evaluation = named(store, word).artifacts.get("eval")
+    if evaluation is not None and [*named(store, word).artifacts] == ["eval"]:
+        played = policy_of(store, evaluation)
+        require_whole(store.runs, [played])
+        source = _whole_source(store, played)
+    else:
+        source = named_source(store, console, word, stage, registry=registry)
+
+    from iowbc.live.page import play_on_page
+    from iowbc.live.server import serving
+    from iowbc.live.session import Session
+
+    def ready() -> None:
+        console.print("Drive it in the browser; Ctrl-C ends it:", highlight=False)
+        tell(console, f"http://{HOST}:{port}")
+        there = f"ssh -L {port}:{HOST}:{port} THIS_MACHINE"
+        console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
+
+    actor = None
+    try:
+        actor = None if evaluation is None else evaluated_actor(store, evaluation)
+    except UsageError as error:
+        tell(console, f"no trials to look through: {error}")
+    with Session(source, request) as session, serving(port) as server:
+        play_on_page(server, session, actor, ready)
 
 
 def named_source(
@@ -67,8 +122,8 @@ def named_source(
     scene: str | None = None,
     registry: Registry = NO_STAGES,
 ) -> "Source":
-    """What a word and `--stage` name, told on the console while it is trained. Raises `UsageError`, also for a `scene`
-    that its recipe has not.
+    """The source that a word and `--stage` name, with a line on the console while it is trained. Raises `UsageError`,
+    also for a `scene` that its recipe has not.
 
     A recipe's file names the artifacts that `iowbc plan` calls cached; it, or the recipe of a name, says by its own
     `eval` what is played of them.
@@ -80,10 +135,10 @@ def named_source(
     training = in_training(store, word, stage)
     if training is not None and training.recipe is not None:
         tell(console, training.text)
-        return _training_source(store, training, training.recipe)
+        return _training_source(store, training)
     loaded = load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
     try:
-        artifact = playable(store, word, stage, {} if loaded is None else planned(store, loaded, registry))
+        artifact = playable(store, word, stage, NOTHING if loaded is None else _planned(store, loaded, registry))
     except UsageError:
         if training is None:
             raise
@@ -108,23 +163,20 @@ def _evaluation(store: Store, word: str) -> Evaluation | None:
     return Evaluation.model_validate(recipe["eval"]) if "eval" in recipe else None
 
 
-def artifact_source(store: Store, artifact: Artifact) -> "Source":
-    """A stored policy with its world. Raises `UsageError` where its files are damaged."""
-    require_whole(store.runs, [artifact])
-    return _whole_source(store, artifact)
-
-
 def _whole_source(store: Store, artifact: Artifact) -> "Source":
-    """The same of a policy that is known to be whole."""
+    """A stored policy, known to be whole, with its world; an export holds its own reference generator. Raises
+    `UsageError` where that of another is gone or damaged."""
     from iowbc.evaluation.play import exported_source
 
-    generator = generator_of(store, artifact)
+    if artifact.manifest.stage == "export":
+        return exported_source(artifact.folder)
+    generator = input_of(store, artifact, "rg-fit")
     if generator is not None:
         require_whole(store.runs, [generator])
-    return exported_source(artifact.folder) if artifact.manifest.stage == "export" else _source(artifact, generator)
+    return _source(artifact, generator)
 
 
-def planned(store: Store, loaded: LoadedRecipe, registry: Registry) -> dict[str, Artifact]:
+def _planned(store: Store, loaded: LoadedRecipe, registry: Registry) -> dict[str, Artifact]:
     """By stage: the stored artifacts that a recipe's file plans to use, of those that leave a policy."""
     request = Request(str(loaded.file), (), store.runs, Options())
     steps = prepared(loaded, request, registry)[0].plan() if registry else []
@@ -152,9 +204,9 @@ def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     return Source(world.deployed if student else world, artifact.folder)
 
 
-def _training_source(store: Store, training: InTraining, recipe: Mapping[str, Any]) -> "Source":
+def _training_source(store: Store, training: InTraining) -> "Source":
     """The newest checkpoint of a training, with the world of its recipe."""
     from iowbc.evaluation.play import Source
 
     generator = made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
-    return Source(world_of(recipe, generator), training.checkpoint, training.key)
+    return Source(world_of(training.recipe or {}, generator), training.checkpoint, training.key)

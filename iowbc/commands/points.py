@@ -5,20 +5,18 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor
-from concurrent.futures import wait as futures_wait
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkProcess
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.pipeline.console.board import Board, last_line
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.processes import die_with_parent
@@ -39,113 +37,129 @@ class PointRun:
 
     name: str
     log: Path
-    """What it prints."""
+    """File of its output."""
     run: Callable[[Console], RunEnding]
     """Runs it and prints to a console."""
 
 
-def run_threads(
-    tasks: Sequence[PointRun], jobs: int, stop: StopRequest, board: Board, abort: Callable[[], None]
+def run_points(
+    tasks: Sequence[PointRun],
+    jobs: int,
+    stop: StopRequest,
+    board: Board,
+    start: "Callable[[PointRun], PointThread | PointProcess]",
 ) -> Endings:
-    """Run all as `run_processes` does, in threads of this process: for runs whose stages are carried out elsewhere.
-
-    abort: lets all that run end at once.
-    """
-    endings: Endings = {task.name: None for task in tasks}
-    with ThreadPoolExecutor(jobs) as threads:
-        futures = {threads.submit(_begin, task, stop, board): task for task in tasks}
-        try:
-            while futures:
-                over, _ = futures_wait(futures, POLL, FIRST_COMPLETED)
-                for future in over:
-                    task = futures.pop(future)
-                    ending = endings[task.name] = future.result()
-                    if ending is not None:
-                        board.ended(task.name, *_outcome(task, ending))
-                board.refresh()
-        except KeyboardInterrupt:
-            abort()
-            raise
-    return endings
-
-
-def _begin(task: PointRun, stop: StopRequest, board: Board) -> RunEnding | None:
-    """Run a task in this thread, unless a stop was asked for before."""
-    if stop():
-        return None
-    board.began(task.name)
-    task.log.parent.mkdir(parents=True, exist_ok=True)
-    with task.log.open("a", encoding="utf-8") as log:
-        try:
-            return task.run(Console(file=log, width=LOG_WIDTH))
-        except Exception as error:
-            log.write(traceback.format_exc())
-            return RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
-
-
-def run_processes(tasks: Sequence[PointRun], jobs: int, stop: StopRequest, board: Board) -> Endings:
-    """Run all, each in a process, at most `jobs` at a time.
+    """Run all, at most `jobs` at a time.
 
     One that fails does not stop the others. Once `stop` is asked for, all that run are asked to stop after a
     checkpoint, and none begins. Raises `KeyboardInterrupt` when asked twice, after all have ended.
     """
     endings: Endings = {task.name: None for task in tasks}
-    waiting, running = deque(tasks), dict[PointRun, PointProcess]()
-    told = False
+    waiting, running = deque(tasks), dict[PointRun, PointThread | PointProcess]()
+    asked = False
     try:
         while (waiting and not stop()) or running:
-            if stop() and not told:
-                told = True
-                _signal(running.values())
+            if stop() and not asked:
+                asked = True
+                for one in running.values():
+                    one.stop()
             while waiting and len(running) < jobs and not stop():
                 task = waiting.popleft()
-                running[task] = _started(task)
+                task.log.parent.mkdir(parents=True, exist_ok=True)
+                running[task] = start(task)
                 board.began(task.name)
-            wait([one.process.sentinel for one in running.values()], POLL)
-            for task in [task for task, one in running.items() if one.process.exitcode is not None]:
-                ending = endings[task.name] = running.pop(task).ending(task)
-                board.ended(task.name, *_outcome(task, ending))
+            time.sleep(POLL)
+            for task, one in [*running.items()]:
+                if (ending := one.ending()) is not None:
+                    del running[task]
+                    endings[task.name] = ending
+                    failed = ending.code not in (DONE, INTERRUPTED)
+                    state = "failed" if failed else "done" if ending.code == DONE else "stopped"
+                    board.ended(task.name, state, f"{ending.failure}; log {task.log}" if failed else "")
             board.refresh()
     except KeyboardInterrupt:
-        _signal(running.values())
+        for one in running.values():
+            one.abort()
         raise
     finally:
-        _end(running.values())
+        for one in running.values():
+            one.join()
     return endings
 
 
-@dataclass(frozen=True)
+class PointThread:
+    """A run in a thread of this process, which sees the stop request itself: for stages that are carried out
+    elsewhere."""
+
+    def __init__(self, task: PointRun, abort: Callable[[], None]) -> None:
+        """`abort`: lets all that run end at once."""
+        self._task, self._abort = task, abort
+        self._ending: RunEnding | None = None
+        self._thread = threading.Thread(target=self._run, name=task.name)
+        self._thread.start()
+
+    def _run(self) -> None:
+        with self._task.log.open("a", encoding="utf-8") as log:
+            try:
+                self._ending = self._task.run(Console(file=log, width=LOG_WIDTH))
+            except BaseException as error:
+                log.write(traceback.format_exc())
+                self._ending = RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
+
+    def ending(self) -> RunEnding | None:
+        """Its ending; None while it runs."""
+        return None if self._thread.is_alive() else self._ending
+
+    def stop(self) -> None:
+        """Nothing: the run asks for itself."""
+
+    def abort(self) -> None:
+        self._abort()
+
+    def join(self) -> None:
+        self._thread.join()
+
+
 class PointProcess:
-    """The process of a run, and where it says how it ended."""
-
-    process: ForkProcess
-    said: Connection
-
-    def ending(self, task: PointRun) -> RunEnding:
-        """Ending of the run, also if its process died without reporting one."""
-        if self.said.poll():
-            with contextlib.suppress(EOFError):
-                ending: RunEnding = self.said.recv()
-                return ending
-        code = self.process.exitcode or STAGE_FAILED
-        return RunEnding(code, f"killed by {signal.Signals(-code).name}" if code < 0 else last_line(task.log))
-
-
-def _started(task: PointRun) -> PointProcess:
     """A run in a process of its own. It is a copy of this one, which has no other threads: it starts at once, knows the
     same stages, and hears a signal from its first moment."""
-    context = multiprocessing.get_context("fork")
-    said, saying = context.Pipe(duplex=False)
-    process = context.Process(target=_run, args=(task, os.getpid(), saying), name=task.name)
-    process.start()
-    saying.close()
-    return PointProcess(process, said)
+
+    def __init__(self, task: PointRun) -> None:
+        context = multiprocessing.get_context("fork")
+        self._log = task.log
+        self._said, saying = context.Pipe(duplex=False)
+        self._process = context.Process(target=_run, args=(task, os.getpid(), saying), name=task.name)
+        self._process.start()
+        saying.close()
+
+    def ending(self) -> RunEnding | None:
+        """Its ending, also if the process died without reporting one."""
+        if (code := self._process.exitcode) is None:
+            return None
+        if self._said.poll():
+            with contextlib.suppress(EOFError):
+                ending: RunEnding = self._said.recv()
+                return ending
+        code = code or STAGE_FAILED
+        return RunEnding(code, f"killed by {signal.Signals(-code).name}" if code < 0 else last_line(self._log))
+
+    def stop(self) -> None:
+        self._process.terminate()
+
+    abort = stop
+    """The second signal aborts."""
+
+    def join(self) -> None:
+        """Return once it has ended; it is killed where it does not end."""
+        self._process.join(PATIENCE)
+        if self._process.exitcode is None:
+            self._process.kill()
+            self._process.join()
 
 
 def _run(task: PointRun, parent: int, saying: Connection) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the sweep alone, which passes it on once
     die_with_parent(parent)
-    task.log.parent.mkdir(parents=True, exist_ok=True)
     log = os.open(task.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     for descriptor in (1, 2):
         os.dup2(log, descriptor)
@@ -153,27 +167,3 @@ def _run(task: PointRun, parent: int, saying: Connection) -> None:
     ending = task.run(Console(file=sys.stdout, width=LOG_WIDTH))
     saying.send(ending)
     sys.exit(ending.code)
-
-
-def _outcome(task: PointRun, ending: RunEnding) -> tuple[str, str]:
-    """The state that is shown of a run which has ended, and what to say about it."""
-    if ending.code in (DONE, INTERRUPTED):
-        return ("done" if ending.code == DONE else "stopped"), ""
-    return "failed", f"{ending.failure}; log {task.log}"
-
-
-def _signal(points: Iterable[PointProcess]) -> None:
-    """Ask runs to stop; asked again, they abort."""
-    for process in (one.process for one in points):
-        if process.exitcode is None and process.pid is not None:
-            os.kill(process.pid, signal.SIGTERM)
-
-
-def _end(points: Iterable[PointProcess]) -> None:
-    """Wait for runs that were aborted, and kill those that do not end."""
-    limit = time.monotonic() + PATIENCE
-    for process in (one.process for one in points):
-        process.join(max(0.0, limit - time.monotonic()))
-        if process.exitcode is None:
-            process.kill()
-            process.join()

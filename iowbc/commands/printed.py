@@ -1,14 +1,17 @@
-"""Output of commands: plain lines, tables, paths, and JSON for other programs."""
+"""Output of commands: plain lines, tables, paths, the progress of a film, and JSON for other programs."""
 
 import json
 import math
 import os
 import textwrap
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.progress import Progress
 from rich.table import Table
 
 from iowbc.pipeline.store.artifact import Artifact
@@ -17,6 +20,8 @@ FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why")
 """Columns whose text may go on in the next line."""
 NARROW = 100
 """Terminals of fewer characters than this leave out what `show` tells."""
+INTERVAL = 10.0
+"""Seconds between two lines about a film, where the output is not a terminal."""
 
 
 def plain_table(*columns: str) -> Table:
@@ -49,8 +54,32 @@ def print_json(console: Console, data: Any) -> None:
     tell(console, json.dumps(_finite(data), indent=2, ensure_ascii=False))
 
 
+@contextmanager
+def filming(console: Console, film: Path | None) -> Iterator[Callable[[float, float], None]]:
+    """Progress of a film, called with the time that is drawn and the whole [s]: a bar on a terminal, a line once in a
+    while elsewhere; nothing where there is no film."""
+    if film is None:
+        yield lambda seconds, duration: None
+        return
+    tell(console, f"{film}: sets up the simulation")
+    said = time.monotonic()
+
+    def say(seconds: float, duration: float) -> None:
+        nonlocal said
+        if time.monotonic() - said >= INTERVAL:
+            said = time.monotonic()
+            tell(console, f"{film}: {seconds:.0f} of {duration:.0f} s")
+
+    if not console.is_terminal:
+        yield say
+        return
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task(str(film), total=None)
+        yield lambda seconds, duration: bar.update(task, completed=seconds, total=duration)
+
+
 def artifact_data(artifact: Artifact) -> dict[str, Any]:
-    """What an artifact is."""
+    """An artifact for other programs."""
     manifest = artifact.manifest
     return {
         "stage": manifest.stage,

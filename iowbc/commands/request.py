@@ -1,4 +1,4 @@
-"""What `iowbc run` and `iowbc plan` were asked for, checked before anything heavy is imported."""
+"""A request of `iowbc run` and `iowbc plan`, checked before anything heavy is imported."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Request:
-    """What `iowbc run` was asked for."""
+    """A call of `iowbc run`."""
 
     word: str
     """The recipe as it was named."""
@@ -37,37 +37,29 @@ class Request:
 
     def command(self, forced: Sequence[str]) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
+        asked = self.options
+        options = [
+            *(("--set", override) for override in self.overrides),
+            ("--until", asked.until),
+            *(("--force", stage) for stage in sorted(forced)),
+            ("--workers", asked.workers),
+            ("--engine", asked.engine),
+            ("--address", asked.address),
+            ("--on-code-change", asked.on_code_change if asked.on_code_change != "report" else None),
+            ("--runs", self.runs.root if self.runs.root != Path("runs") else None),
+        ]
         words = ["iowbc", self.verb, self.word, *self.further]
-        for override in self.overrides:
-            words += ["--set", override]
-        if self.options.until:
-            words += ["--until", self.options.until]
-        for stage in sorted(forced):
-            words += ["--force", stage]
-        if self.options.workers:
-            words += ["--workers", str(self.options.workers)]
-        if self.options.engine:
-            words += ["--engine", self.options.engine]
-        if self.options.address:
-            words += ["--address", self.options.address]
-        if self.options.on_code_change != "report":
-            words += ["--on-code-change", self.options.on_code_change]
-        if self.runs.root != Path("runs"):
-            words += ["--runs", str(self.runs.root)]
-        return shlex.join(words)
+        return shlex.join([*words, *(str(part) for pair in options if pair[1] for part in pair)])
 
 
 def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
-    """The recipe of a request, or, of a recipe of recipes, all that it names. Raises `RecipeError`."""
-    study = load_study(request.word, request.overrides)
-    if study is None:
-        return (load_recipe(request.word, request.overrides),)
-    if request.options.force:
-        text = "names a stage of each variant, which they may share; force it in one of them: " + ", ".join(
-            str(variant.file) for variant in study.variants
-        )
+    """The recipe of a request, or all variants of the study that it names. Raises `RecipeError`."""
+    variants = load_study(request.word, request.overrides)
+    if variants and request.options.force:
+        files = ", ".join(str(variant.file) for variant in variants)
+        text = f"names a stage of each variant, which they may share; force it in one of them: {files}"
         raise RecipeError([Problem(f"--force {min(request.options.force)}", text)])
-    return study.variants
+    return variants or (load_recipe(request.word, request.overrides),)
 
 
 def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
@@ -83,7 +75,8 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
 
 
 def in_order(planner: Planner) -> list[Planner]:
-    """What runs for a recipe: first those from whose artifacts it begins, where they are not stored, then itself."""
+    """Planners of all that runs for a recipe: first those from whose artifacts it begins, where they are not stored,
+    then itself."""
     missing = [origin for origin in planner.origins.values() if not origin.plan()[-1].cached]
     return [*(each for origin in missing for each in in_order(origin)), planner]
 

@@ -1,24 +1,31 @@
-"""The end of a run: films, chosen metrics, tables, where the rest lies, and what to type next."""
+"""Results of a run: films, chosen metrics, tables, the next commands; and an evaluation with its policy."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
 
-from iowbc.commands.named import last_used
-from iowbc.commands.origins import tables_of
+from iowbc.commands.lookup import input_of, last_used, policy_of, policy_stages, world_of
 from iowbc.commands.printed import shown_path, tell
+from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.results.table import Table, drawn
+from iowbc.results.table import Table, drawn, read_tables
+from iowbc.stages.eval import acting_stage
 from iowbc.stages.registry import STAGES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from iowbc.evaluation.side_by_side import Actor
 
 METRICS_SHOWN = 3
 """Metrics of a stage that are shown at most."""
@@ -30,11 +37,7 @@ TABLES = (
 DRAWN = ("lifting", "pushing", "heavy", "trainings", "probe")
 """Those that are drawn at the end of a run; the others are named."""
 EXPORTED = "step.onnx"
-
-
-def policy_stages() -> list[str]:
-    """Stages that leave a policy, the one to prefer first."""
-    return [name for name, stage in reversed(STAGES.items()) if stage.presentation.leaves_policy]
+TRIALS, PROBE = "trials.parquet", "probe.parquet"
 
 
 def print_results(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact], console: Console) -> None:
@@ -70,15 +73,15 @@ def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]
     return [(name, metrics[name]) for name in (chosen or list(metrics))[:METRICS_SHOWN]]
 
 
-def described(artifacts: Mapping[str, Artifact]) -> str:
-    """The main tables of a run in Markdown."""
-    found = [path for artifact in artifacts.values() for path in (artifact.folder / "tables").glob("*.md")]
+def main_tables(folders: Iterable[Path]) -> str:
+    """The main tables in the folders of artifacts or of a comparison, in Markdown."""
+    found = [path for folder in folders for path in (folder / "tables").glob("*.md")]
     chosen = sorted((path for path in found if path.stem in TABLES), key=_rank)
     return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in chosen)
 
 
 def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) -> list[str]:
-    """What a user would type next: to see the robot, where there is a policy, and to read about the run.
+    """The next commands: to see the robot, where there is a policy, and to read about the run.
 
     What a run with overrides made goes by its key, if they gave it no name of its own: the recipe's name stands for
     what it has without any.
@@ -125,3 +128,34 @@ def metrics_text(artifact: Artifact, limit: int | None = None) -> str:
     items = list(artifact.metrics.items())
     text = ", ".join(f"{name} {figure(value)}" for name, value in items[:limit])
     return text + (", ..." if limit is not None and len(items) > limit else "")
+
+
+def tables_of(artifact: Artifact) -> list[Table]:
+    """The tables that an artifact holds; an evaluation that has them as text alone is read again."""
+    found, file = read_tables(artifact.folder / "tables"), artifact.folder / TRIALS
+    if found or not file.is_file():
+        return found
+    import pandas as pd
+
+    from iowbc.evaluation.report.aggregate import aggregate
+    from iowbc.evaluation.report.report import report_tables
+
+    trials = pd.read_parquet(file)
+    rate = float(artifact.recipe["eval"]["success"]["capacity_rate"])
+    return sorted(report_tables(trials, aggregate(trials), rate), key=lambda table: table.name)
+
+
+def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | None" = None) -> "Actor":
+    """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
+    import pandas as pd
+
+    from iowbc.evaluation.acting import evaluated_policy
+    from iowbc.evaluation.side_by_side import Actor
+    from iowbc.evaluation.trials.protocol import evaluated_world
+
+    if trials is None and not (artifact.folder / TRIALS).is_file():
+        raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
+    table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
+    world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
+    policy = policy_of(store, artifact).folder if acting_stage(world.recipe) else None
+    return Actor(world, evaluated_policy(world, policy), table)

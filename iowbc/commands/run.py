@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 
 from iowbc.commands.compare import compare, film_together
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
+from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, tell
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.request import Request, in_order, prepared, recipes
-from iowbc.commands.results import TABLES, described, print_results
-from iowbc.commands.training import require_training
+from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from iowbc.pipeline.cluster.cluster import Cluster
 
 Manner = Literal["usual", "quiet", "verbose"]
-"""How much a run prints."""
+"""Amount of a run's output."""
 
 
 def run(request: Request, registry: Mapping[str, Stage], console: Console, manner: Manner = "usual") -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
 
-    Of a recipe of recipes each is run, in order, up to the first that does not end; then they are compared.
+    The variants of a study run in order, up to the first that does not end; then they are compared.
     """
     loaded = recipes(request)
     ready = [prepared(one, request, registry) for one in loaded]
@@ -66,10 +66,10 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
 
 
 def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: Console) -> None:
-    """Compare the recipes of a recipe of recipes, film them side by side, and tell MLflow where that is new."""
+    """Compare the variants of a study, film them side by side, and tell MLflow where that is new."""
     store, name = Store(request.runs), Path(request.word).stem
     words, output = [one.recipe.name for one in loaded], request.runs.compared / name
-    before = joined_text(output)
+    before = _report_of(output)
     compare(store, console, words, output)
     try:
         film = film_together(store, console, words, output)
@@ -78,18 +78,17 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
         tell(console, f"no film: {reason}")
     if film is not None:
         tell(console, shown_path(film))
-    told = joined_text(output)
+    told = _report_of(output)
     if told != before and loaded[0].recipe.execution.track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
         record_figures(request.runs, f"compare-{name}", {}, told, files)
     tell(console, f"next:\n  iowbc report {name}")
 
 
-def joined_text(folder: Path) -> str:
-    """The main tables of a comparison in Markdown, and the metrics that differ."""
-    paths = [folder / "tables" / f"{name}.md" for name in (*TABLES, "differences")]
-    found = [path.read_text(encoding="utf-8") for path in (*paths, folder / "metrics.md") if path.is_file()]
-    return "\n".join(found)
+def _report_of(folder: Path) -> str:
+    """The main tables of a comparison in Markdown, the paired differences, and the metrics that differ."""
+    others = [path for path in (folder / "tables" / "differences.md", folder / "metrics.md") if path.is_file()]
+    return "\n".join([main_tables([folder]), *(path.read_text(encoding="utf-8") for path in others)])
 
 
 @contextmanager
@@ -143,7 +142,7 @@ def run_recipe(
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE)
             if tracker is not None:
-                tracker.describe(described(runner.artifacts))
+                tracker.describe(main_tables(artifact.folder for artifact in runner.artifacts.values()))
         except PipelineFailed as error:
             status, ending = "FAILED", RunEnding(STAGE_FAILED, str(error).splitlines()[0])
             closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"

@@ -3,19 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from iowbc.commands.ending import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
-from iowbc.commands.members import record_sweep
-from iowbc.commands.named import Named, named
-from iowbc.commands.points import Endings, PointRun, run_processes, run_threads
-from iowbc.commands.printed import shown_path, tell
+from iowbc.commands.lookup import named, record_sweep
+from iowbc.commands.needs import require_training
+from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
+from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
+from iowbc.commands.printed import print_json, shown_path, tell
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.run import engine, run_recipe
-from iowbc.commands.sweep_plan import Planned, in_all, planned, print_plan
-from iowbc.commands.training import require_training
 from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.console.board import Board, RunView
 from iowbc.pipeline.planner import Planner
@@ -26,8 +25,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import SweepRecord
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
-from iowbc.recipe.reading.sweep import Point, Sweep, load_sweep
-from iowbc.recipe.sweep import MOST_POINTS
+from iowbc.recipe.sweep import MOST_POINTS, Point, Sweep, load_sweep
 from iowbc.results.table import drawn, markdown
 
 if TYPE_CHECKING:
@@ -42,7 +40,7 @@ STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What `iowbc sweep` was asked for."""
+    """A call of `iowbc sweep`."""
 
     recipe: Request
     """Recipe and what holds for all points; `--set` of several values varies one."""
@@ -103,9 +101,21 @@ def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:
 
 
 def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
-    """Print what a sweep would run. Raises `RecipeError`."""
-    found, points = ready(asked, registry)
-    print_plan(found, planned([one.planner for one in points]), console, as_json)
+    """Print a row for each point of a sweep with what would run, and all together. Raises `RecipeError`."""
+    sweep, points = ready(asked, registry)
+    found = planned([one.planner for one in points])
+    if as_json:
+        data = [_data(one.point, found[one.point.name]) for one in points]
+        print_json(console, {"sweep": sweep.name, "points": data})
+    else:
+        console.print(plan_table(found, "point"))
+        console.print(in_all(found), highlight=False)
+
+
+def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
+    """A planned point for other programs."""
+    stages = [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
+    return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 
 def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, quiet: bool = False) -> int:
@@ -115,7 +125,7 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     """
     found, points = ready(asked, registry)
     _require_origins(asked.recipe, points)
-    runs = asked.recipe.runs
+    runs, execution = asked.recipe.runs, points[0].planner.loaded.recipe.execution
     require_training("sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
@@ -123,10 +133,8 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     before = planned([one.planner for one in points])
     if not quiet:
         console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
-    execution = found.points[0].loaded.recipe.execution
-    endings: Endings = {}
+    endings: Endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
     record: SweepRecord | None = None
-    status = "KILLED"
     try:
         with (
             engine(asked.recipe.options, execution) as cluster,
@@ -135,27 +143,25 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
             if cluster is not None and not quiet:
                 console.print(cluster.text, highlight=False)
             jobs, workers = _shared_out(points, asked, cluster)
-            if execution.track and not _all_cached(before):
+            if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
                 settings = {point.name: point.settings for point in found.points}
                 record = SweepRecord(runs, found.name, execution.experiment, settings, execution.tracking_patience)
                 record.send()
             origin = None if record is None else record.origin
             tasks = [_task(one, stop, folder, origin, cluster, workers) for one in points]
             views = {task.name: RunView(task.name, log=task.log) for task in tasks}
+            start = PointProcess if cluster is None else lambda task: PointThread(task, cluster.abort)
             with Board(console, execution.line_interval, quiet, lambda: stop.text, views) as board:
-                if cluster is None:
-                    endings = run_processes(tasks, jobs, stop, board)
-                else:
-                    endings = run_threads(tasks, jobs, stop, board, cluster.abort)
+                endings = run_points(tasks, jobs, stop, board, start)
     except KeyboardInterrupt:
-        endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
+        pass  # the endings say so
     code = _code(endings)
-    status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
     try:
         if code != INTERRUPTED:
             _conclude(found, endings, runs, folder, console, record, quiet)
     finally:
         if record is not None:
+            status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
             record.close(status, wait=status != "KILLED")
     _tell_rest(asked, endings, folder, code)
     return code
@@ -191,10 +197,6 @@ def _task(
     return PointRun(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
 
 
-def _all_cached(before: Planned) -> bool:
-    return all(stage.step.cached for own in before.values() for stage in own)
-
-
 def _code(endings: Endings) -> int:
     codes = {None if ending is None else ending.code for ending in endings.values()}
     if codes & {INTERRUPTED, None}:
@@ -211,12 +213,11 @@ def _conclude(
     record: SweepRecord | None,
     quiet: bool,
 ) -> None:
-    """Write and print what the finished points came to."""
+    """Write and print the results of the finished points."""
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
 
-    store = Store(runs)
     codes = {name: None if ending is None else ending.code for name, ending in endings.items()}
-    finished: dict[str, Named] = {name: named(store, name) for name, code in codes.items() if code == DONE}
+    finished = {name: named(Store(runs), name) for name, code in codes.items() if code == DONE}
     if not finished:
         return
     states = {name: STATES.get(code, "failed") for name, code in codes.items()}

@@ -1,4 +1,4 @@
-"""What a sweep came to: a table and a figure over its settings, seeds together, and every point's metrics."""
+"""Results of a sweep: a table and a figure over its settings, seeds together, and every point's metrics."""
 
 import csv
 import math
@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from iowbc.commands.named import Named
+from iowbc.commands.lookup import Named
 from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
-from iowbc.recipe.reading.sweep import Point, Sweep, written
 from iowbc.recipe.recipe import PIPELINE, SEEDS
+from iowbc.recipe.sweep import Point, Sweep, written
 from iowbc.report.parallel import Line, parallel_coordinates
 from iowbc.results.picture import write_figure
-from iowbc.results.table import Cell, Table, heads, markdown, measured
+from iowbc.results.table import Table, heads, markdown, measured
 
 OUTCOMES_SHOWN = 6
 """Metrics in the table and in the figure at most: those of the last stages."""
@@ -35,7 +34,7 @@ class Outcomes:
 
 
 def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
-    """What came out; `found`: the finished points by name."""
+    """The outcomes of the points; `found`: the finished ones by name."""
     settings = tuple(path for path in sweep.axes if path not in SEEDS)
     points = [point for point in sweep.points if point.name in found]
     metrics = _chosen([found[point.name] for point in points])
@@ -44,59 +43,43 @@ def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
         groups.setdefault(tuple(written(point.settings[path]) for path in settings), []).append(point)
     lines = []
     for group in groups.values():
-        own = {path: group[0].settings[path] for path in settings}
-        runs = [_values(found[point.name], metrics) for point in group]
+        own, runs = {path: group[0].settings[path] for path in settings}, [found[point.name] for point in group]
         means, halves = {}, {}
         for name in metrics:
-            measured = {
-                _made_by(found[point.name], name): run[name]
-                for point, run in zip(group, runs, strict=True)
-                if name in run
-            }
-            values = np.array([value for value in measured.values() if math.isfinite(value)], np.float64)
+            # Points that share an artifact measured once.
+            stage = name.partition(" ")[0]
+            once = {run.artifacts[stage].manifest.key: _metric(run, name) for run in runs if stage in run.artifacts}
+            values = np.array([value for value in once.values() if math.isfinite(value)], np.float64)
             if len(values):
-                means[name], halves[name] = float(values.mean()), _half(values)
+                alike = len(values) > 1 and not np.ptp(values)
+                means[name], halves[name] = float(values.mean()), 0.0 if alike else mean_half_width(values)
         label = ", ".join(f"{path.rpartition('.')[2]} {written(value)}" for path, value in own.items()) or sweep.name
-        lines.append(Line(label, own, means, halves, runs))
+        singles = [{name: value for name in metrics if not math.isnan(value := _metric(run, name))} for run in runs]
+        lines.append(Line(label, own, means, halves, singles))
     return Outcomes(settings, metrics, tuple(lines))
 
 
-def _made_by(run: Named, metric: str) -> str:
-    """The key of the artifact that a shown metric is of: points that share it measured once."""
-    return run.artifacts[metric.partition(" ")[0]].manifest.key
-
-
-def _half(values: NDArray[np.float64]) -> float:
-    """Half the 95 % interval of a mean; NaN of one value, none of equal ones."""
-    return 0.0 if len(values) > 1 and not np.ptp(values) else mean_half_width(values)
-
-
-def _values(run: Named, metrics: Sequence[str]) -> dict[str, float]:
-    own = {
-        f"{stage} {name}": value
-        for stage, artifact in run.artifacts.items()
-        for name, value in artifact.metrics.items()
-    }
-    return {name: own[name] for name in metrics if name in own}
+def _metric(run: Named, name: str) -> float:
+    """The `stage metric` of a run; NaN where it has none."""
+    stage, _, metric = name.partition(" ")
+    return run.artifacts[stage].metrics.get(metric, math.nan) if stage in run.artifacts else math.nan
 
 
 def _chosen(runs: Sequence[Named]) -> tuple[str, ...]:
     """The telling metrics in which points differ, of the last stages first; of one that is the same for all, those of
     the last stage."""
     by_stage = {
-        stage: list(
-            dict.fromkeys(
-                f"{stage} {name}"
-                for run in runs
-                if stage in run.artifacts
-                for name, _ in headline(stage, run.artifacts[stage].metrics)
-            )
-        )
+        stage: [
+            f"{stage} {name}"
+            for run in runs
+            if stage in run.artifacts
+            for name, _ in headline(stage, run.artifacts[stage].metrics)
+        ]
         for stage in reversed(PIPELINE)
     }
-    known = [name for names in by_stage.values() for name in names]
-    differing = [name for name in known if len({_values(run, [name]).get(name) for run in runs}) > 1]
-    last = next((names for names in by_stage.values() if names), [])
+    known = list(dict.fromkeys(name for names in by_stage.values() for name in names))
+    differing = [name for name in known if len({_metric(run, name) for run in runs}) > 1]
+    last = list(dict.fromkeys(next((names for names in by_stage.values() if names), [])))
     chosen = (differing or last)[:OUTCOMES_SHOWN]
     return tuple(sorted(chosen, key=known.index, reverse=True))
 
@@ -121,16 +104,15 @@ def table(sweep: Sweep, made: Outcomes) -> Table:
         (
             *map(written, line.settings.values()),
             str(len(line.runs)),
-            *(_cell(line, name) for name in made.metrics),
+            *(
+                measured(line.means.get(name, math.nan), line.halves.get(name, math.nan), ".4g", ".2g", none="")
+                for name in made.metrics
+            ),
         )
         for line in made.lines
     ]
     caption = f"Sweep {sweep.name}: means over seeds with their 95 % interval."
     return Table(sweep.name, caption, heads(*settings, "seeds", *made.metrics), rows, grouped=False)
-
-
-def _cell(line: Line, name: str) -> Cell:
-    return measured(line.means[name], line.halves[name], ".4g", ".2g") if name in line.means else ""
 
 
 def _write_points(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], path: Path) -> None:

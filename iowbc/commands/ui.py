@@ -8,9 +8,8 @@ import sys
 
 from rich.console import Console
 
-from iowbc.commands.ports import HOST, require_free
+from iowbc.commands.needs import HOST, require_free, require_training
 from iowbc.commands.printed import tell
-from iowbc.commands.training import require_training
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, set_up
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
@@ -51,7 +50,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
 
 
 def view() -> dict[str, object]:
-    """How MLflow shows the runs: newest first, stages within their run, with the columns that tell most."""
+    """MLflow's view of the runs: newest first, stages within their run, with the columns that tell most."""
     metrics = [f"metrics.`{stage.name}/{name}`" for stage in STAGES.values() for name in stage.presentation.columns]
     return {
         "searchFilter": "",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.recipe.task.action import Action
+from iowbc.recipe.task.task import Action
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import MirrorMap, support_mirror
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.recipe.task.commands import CommandRates
+from iowbc.recipe.task.commands import CommandRates, Commands
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import VECTOR_SIGN, MirrorMap
 
@@ -21,6 +21,13 @@ YAW_RATE = 2
 HEIGHT = 3
 PITCH = 4
 OFFSET = slice(5, 11)
+
+
+def nominal_command(commands: Commands) -> Array:
+    """Standing still in the nominal posture, (11,)."""
+    command = np.zeros(len(COMMAND))
+    command[HEIGHT], command[PITCH] = commands.nominal_height, commands.nominal_pitch
+    return command
 
 
 def command_mirror(robot: Robot) -> MirrorMap:

@@ -17,7 +17,7 @@ from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
-from iowbc.recipe.simulation.sensing import Sensing
+from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import DESCRIPTION
@@ -129,7 +129,7 @@ class Contract(Section):
     """Base grasps, arm kinematics and gait clock."""
     torque: str = TORQUE
     """How a motor's torque follows from the targets."""
-    sensing: Sensing
+    sensing: SensorNoise
     """Noise of the sensors in training, standard deviations."""
     latency: Latency
     """Delays in training."""

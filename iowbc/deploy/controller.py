@@ -166,6 +166,14 @@ class Controller:
         self.inputs, self.outputs = inputs, outputs
         return Targets(passed, self._kp, self._kd, outputs["action"], outputs["support_reference"], held, reasons)
 
+    def settled_posture(self, command: Array) -> Array:
+        """Joint positions in which the references begin for a command C, (n, 11) or (11,); (n, joints) [rad]."""
+        state = self._settled(self._good | {"command": np.tile(command, (self.robots, 1))[: self.robots]})
+        joints = np.zeros((self.robots, len(self.contract.joints)))
+        joints[:, self.contract.support] = state[:, self._places["posture"]]
+        joints[:, self.contract.interaction] = state[:, self._places["arms"]]
+        return joints
+
     @property
     def state(self) -> Values:
         """What the control loop remembers, by the names of the contract's `state`, (n, size) each, to look at."""

@@ -15,7 +15,7 @@ from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import replayed
-from iowbc.recipe.evaluation.video import Video
+from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv

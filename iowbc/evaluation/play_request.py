@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import UsageError
+from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.simulation.holding import FREE
 
 HEAVIEST = 1000.0

@@ -8,7 +8,7 @@ from iowbc.errors import NoRenderer
 from iowbc.evaluation.films import EpisodeFilm, written_film
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.recipe.evaluation.video import Video
+from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 

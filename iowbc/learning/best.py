@@ -9,7 +9,7 @@ from torch import nn
 
 from iowbc.errors import StageFailed
 from iowbc.learning.checkpoint import Arrays, module_arrays, prefixed, under
-from iowbc.recipe.check import Check
+from iowbc.recipe.teacher import Check
 
 ACTS = ("actor.", "log_stds")
 """Beginnings of the names of an `ActorCritic`'s arrays that decide its actions."""

@@ -43,6 +43,8 @@ TITLES = {
 }
 """By the name under which a figure is recorded."""
 FAMILIES = {
+    "scripted/": "{}, scripted humans",
+    "learnt/": "{}, learnt human",
     "level/": "level of {}",
     "falls/": "falls, {} [share of episodes]",
     "reward/": "reward of {} [1/s]",

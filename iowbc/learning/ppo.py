@@ -28,6 +28,7 @@ from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
+from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
@@ -281,19 +282,19 @@ def deviation_bounds(teacher: Teacher, steps: int) -> tuple[float, float]:
     return teacher.std_floor, max(ceiling, teacher.std_end)
 
 
-def adapted(rate: float, kl: float, teacher: Teacher, caution: float = 1.0) -> float:
+def adapted(rate: float, kl: float, settings: Teacher | SkillLearning, caution: float = 1.0) -> float:
     """The next update's step size: a fifth less or more where the KL divergence was far from the desired one.
 
     `caution`: what the desired divergence is multiplied by.
     """
-    if teacher.desired_kl is None:
+    if settings.desired_kl is None:
         return rate
-    desired = caution * teacher.desired_kl
+    desired = caution * settings.desired_kl
     if kl > 1.5 * desired:
         rate *= 0.8
     elif kl < desired / 1.5:
         rate *= 1.2
-    low, high = teacher.learning_rate_range
+    low, high = settings.learning_rate_range
     return min(max(rate, low), high)
 
 

@@ -32,9 +32,14 @@ def load_network(folder: Path) -> tuple[Network, dict[str, Any]]:
         found = sorted(p.name for p in folder.glob("*.json"))
         wanted = " or ".join(f"{name}.json" for name in NAMES)
         raise FileNotFoundError(f"{folder}: no {wanted} there; the folder holds {found}")
-    about = json.loads(path.read_text())
+    return read_network(folder, path.stem)
+
+
+def read_network(folder: Path, name: str) -> tuple[Network, dict[str, Any]]:
+    """Read what `save_network` wrote under a name; returns the network in evaluation mode and the JSON."""
+    about = json.loads((folder / f"{name}.json").read_text())
     network = KINDS[about["kind"]](**about["architecture"])
-    network.load_state_dict(load_file(path.with_suffix(".safetensors")))
+    network.load_state_dict(load_file(folder / f"{name}.safetensors"))
     network.requires_grad_(False)
     return network.eval(), about
 
@@ -44,3 +49,10 @@ def load_teacher(folder: Path) -> tuple[TeacherNetwork, dict[str, Any]]:
     network, about = load_network(folder)
     assert isinstance(network, TeacherNetwork)
     return network, about
+
+
+def read_teacher(folder: Path, name: str) -> TeacherNetwork:
+    """The network of one observation that `save_network` wrote under a name."""
+    network, _ = read_network(folder, name)
+    assert isinstance(network, TeacherNetwork)
+    return network

@@ -1,4 +1,4 @@
-"""What is to be seen in the browser: the bodies of a model, forces, the support polygon, the reference posture."""
+"""The scene in the browser: the bodies of a model, forces, the support polygon, the reference posture."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import viser
 from iowbc.arrays import Array
 from iowbc.live.moment import Moment
 from iowbc.live.session import Pushed
-from iowbc.live.shapes import Shape, collision_shapes, looks
+from iowbc.live.shapes import BodyMesh, collision_shapes, looks
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
 
@@ -18,7 +18,7 @@ GHOST = (0.15, 0.45, 0.95)
 GHOST_OPACITY = 0.35
 SUPPORT, BALANCE = (60, 170, 90), (210, 40, 40)
 ABOVE_GROUND = 0.003
-"""What is drawn on the ground lies so far above it [m]."""
+"""Height above the ground of what is drawn on it [m]."""
 DOT = 0.025
 """Radius of the mark under the centre of mass [m]."""
 FOLLOWING = 0.1
@@ -34,8 +34,8 @@ Pull = Callable[[Pushed, Array], None]
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What is drawn beside the robot and its object."""
+class ShownParts:
+    """Parts that are drawn beside the robot and its object."""
 
     forces: bool = True
     support: bool = True
@@ -96,7 +96,7 @@ class Drawing:
             if shape.body in links:
                 self._mesh(f"reference/{shape.body}/shape{n}", shape, ghost=True)
 
-    def _mesh(self, name: str, shape: Shape, ghost: bool = False) -> viser.MeshHandle:
+    def _mesh(self, name: str, shape: BodyMesh, ghost: bool = False) -> viser.MeshHandle:
         handle = self._scene.add_mesh_simple(
             f"/world/{name}",
             shape.vertices,
@@ -122,7 +122,7 @@ class Drawing:
 
         return pull
 
-    def show(self, model: Any, moment: Moment, shown: Shown) -> None:
+    def show(self, model: Any, moment: Moment, shown: ShownParts) -> None:
         """Everything as it is at a moment of a model, which is built if it is another one than before."""
         if model is not self._model:
             self.build(model)

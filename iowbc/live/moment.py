@@ -1,4 +1,4 @@
-"""What an environment looks like at one time: everything that is shown of it, and nothing that simulates."""
+"""The look of an environment at one time: everything that is shown of it, and nothing that simulates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

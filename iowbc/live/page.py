@@ -10,11 +10,9 @@ import viser
 from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.live.drawing import Drawing
-from iowbc.live.figures import figures
-from iowbc.live.panel import LIVE, PAST, Panel
+from iowbc.live.panel import LIVE, PAST, ControlPanel, figures
 from iowbc.live.session import Pushed, Session
-from iowbc.live.track import Track
-from iowbc.live.trials import played_again, trial_titles
+from iowbc.live.track import Track, played_again, trial_titles
 
 PICTURES = 1.0 / 25.0
 """Time between two pictures [s]."""
@@ -29,25 +27,25 @@ CHECKPOINTS = 2.0
 BEHIND = 0.2
 """A simulation that is further behind its pace lets the time go [s]."""
 VIEW = (1.7, -1.4, 1.2)
-"""Where a camera begins [m]."""
+"""First position of a camera [m]."""
 AIM = (0.1, 0.0, 0.6)
 """At what it looks [m]."""
 
 
 class Page:
-    """What a server shows of a session, and of the trials of an evaluation where there is one."""
+    """The page of a session, and of the trials of an evaluation where there is one."""
 
     def __init__(self, server: viser.ViserServer, session: Session, evaluated: Actor | None = None) -> None:
         self.server, self.session, self._evaluated = server, session, evaluated
         recipe, robot = session.source.world.recipe, session.environment.batch.robot
-        self.panel = Panel(server.gui, recipe, session.request, self._trials)
+        self.panel = ControlPanel(server.gui, recipe, session.request, self._trials)
         self.drawing = Drawing(server.scene, robot, session.pull)
         server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
         self.paused = False
         self.track: Track = session.track
-        """What is shown: the session's own, or a trial."""
+        """The track that is shown: the session's own, or a trial."""
         self.place = 0
-        """Which of its moments."""
+        """Index of its moment that is shown."""
         self._showing = LIVE
         self._cursor = self._slid = 0.0
         self._wish, self._wished = session.request, 0.0
@@ -88,10 +86,8 @@ class Page:
             elif button == "reset":
                 self._reset()
             elif self._showing == LIVE:
-                self._push("robot" if button == "push robot" else "object")
-
-    def _push(self, what: Pushed) -> None:
-        self.session.push(what, self.panel.direction.value, self.panel.impulse.value)
+                what: Pushed = "robot" if button == "push robot" else "object"
+                self.session.push(what, self.panel.direction.value, self.panel.impulse.value)
 
     def _pause(self, paused: bool) -> None:
         self.paused = paused
@@ -120,16 +116,15 @@ class Page:
         else:
             row = self._evaluated.trials.iloc[self._trials.index(title)]
             try:
-                self.track = played_again(self._evaluated, row, lambda: self._left(title), self._tell)
+                self.track = played_again(
+                    self._evaluated, row, lambda: bool(self.panel.showing.value != title), self._tell
+                )
             except Interrupted:
                 return
             time_slider.min, time_slider.max = 0.0, max(self.track.end, self.track.period)
         self._showing, self._cursor = title, 0.0
         self._slide(0.0)
         self._pause(False)
-
-    def _left(self, title: str) -> bool:
-        return bool(self.panel.showing.value != title)
 
     def _tell(self, seconds: float) -> None:
         self.panel.status.content = f"Plays the trial again: {seconds:.0f} s"
@@ -147,7 +142,7 @@ class Page:
                 self.paused = True
                 panel.label_pause(True)
         if not self.paused and now >= self._due:
-            session.helm.wanted[:] = panel.command
+            session.wanted[:] = panel.command
             session.step()
             self._due = max(self._due + session.environment.period / panel.speed.value, now - BEHIND)
         elif self.paused:

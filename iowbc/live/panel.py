@@ -1,7 +1,9 @@
-"""The controls beside the scene. What they say is read, turn by turn, by who runs the simulation."""
+"""Controls and figures beside the scene; the page that runs the simulation reads the controls turn by turn."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from html import escape
+from math import isnan
 from queue import SimpleQueue
 from typing import Literal
 
@@ -9,19 +11,20 @@ import numpy as np
 import viser
 
 from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, VELOCITY
+from iowbc.control.command import COMMAND, VELOCITY, nominal_command
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
-from iowbc.live.drawing import Shown
+from iowbc.live.drawing import ShownParts
+from iowbc.live.moment import Moment
+from iowbc.live.track import WINDOW, TrackFigures
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.drawing import nominal_command
 
 Button = Literal["pause", "reset", "push robot", "push object"]
 
 LIVE = "live"
 PAST = 60.0
-"""How far back a live episode can be looked at [s]."""
+"""Length of the past of a live episode that can be looked at [s]."""
 HEAVIEST = 2.0
 """Largest mass on the slider, in nominal masses of the scene's object."""
 LIGHTEST = 1.0
@@ -39,7 +42,7 @@ LABELS = {
 }
 
 
-class Panel:
+class ControlPanel:
     """Controls of the page; all tabs of the browser share them."""
 
     def __init__(self, gui: viser.GuiApi, recipe: Recipe, request: PlayRequest, trials: Sequence[str]) -> None:
@@ -68,7 +71,7 @@ class Panel:
             gui.add_markdown("Every change begins a new episode.")
             self._conditions()
         with tabs.add_tab("View"):
-            usual = Shown()
+            usual = ShownParts()
             self._shown = {
                 "forces": gui.add_checkbox("Forces", usual.forces),
                 "support": gui.add_checkbox("Support polygon, centre of mass", usual.support),
@@ -124,12 +127,8 @@ class Panel:
 
     @property
     def command(self) -> Array:
-        """What the sliders ask for, (11,)."""
+        """The command that the sliders ask for, (11,)."""
         return np.array([slider.value for slider in self._command])
-
-    def set_command(self, name: str, value: float) -> None:
-        """Moves the slider of an entry of the command, one of `COMMAND`."""
-        self._command[COMMAND.index(name)].value = value
 
     @property
     def conditions(self) -> PlayRequest:
@@ -144,9 +143,9 @@ class Panel:
         )
 
     @property
-    def shown(self) -> Shown:
-        """What is to be drawn."""
-        return Shown(**{name: box.value for name, box in self._shown.items()})
+    def shown(self) -> ShownParts:
+        """Parts that are to be drawn."""
+        return ShownParts(**{name: box.value for name, box in self._shown.items()})
 
     def pressed(self) -> list[Button]:
         """The buttons that were pressed since this was asked last."""
@@ -155,3 +154,36 @@ class Panel:
     def label_pause(self, paused: bool) -> None:
         """Says what the button would do."""
         self._pause.label = "Go on" if paused else "Pause"
+
+
+UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
+SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
+CELL = "padding:0 0.6em 0 0;text-align:right"
+NAME = "padding:0 0.6em 0 0;text-align:left"
+
+
+def figures(moment: Moment, readings: TrackFigures) -> str:
+    """The command and the state at a moment, and the errors of the seconds before."""
+    signals = moment.signals
+    going, wanted = signals["system_velocity"], signals["commanded_velocity"]
+    rows = [
+        ("forward", wanted[0], going[0], "m/s"),
+        ("left", wanted[1], going[1], "m/s"),
+        ("height", signals["height_command"][0], signals["pelvis_height"][0], "m"),
+        ("lean", signals["torso_pitch_command"][0], signals["torso_pitch"][0], "rad"),
+    ]
+    asked = [_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
+    errors = [_row(SYMBOLS[name], f"{readings.errors[name]:.3f} {unit}") for name, unit in UNITS.items()]
+    hands = "–" if isnan(readings.weight_in_hands) else f"{100 * readings.weight_in_hands:.0f} %"
+    worst = sorted(readings.saturated.items(), key=lambda pair: -pair[1])
+    limits = ", ".join(f"{escape(name.removesuffix('_joint'))} {100 * share:.0f} %" for name, share in worst)
+    return (
+        f"<div style='padding:0 1em;font-size:0.8em'><table>{_row('', 'command', 'is')}{''.join(asked)}</table>"
+        f"<p style='margin:0.4em 0'>Means of the last {WINDOW:g} s:</p><table>{''.join(errors)}"
+        f"{_row('weight in the hands', hands)}</table>"
+        f"<p style='margin:0.4em 0'>Joints at their torque limit: {limits or 'none'}</p></div>"
+    )
+
+
+def _row(name: str, *values: str) -> str:
+    return f"<tr><td style='{NAME}'>{name}</td>" + "".join(f"<td style='{CELL}'>{v}</td>" for v in values) + "</tr>"

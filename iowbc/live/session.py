@@ -6,13 +6,13 @@ from typing import Literal
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.control.command import nominal_command
 from iowbc.errors import Damaged
 from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
-from iowbc.live.helm import Helm
 from iowbc.live.moment import Witness
-from iowbc.live.track import Track
+from iowbc.live.track import track_of
 from iowbc.recipe.evaluation.segment import Segment
 
 Pushed = Literal["robot", "object"]
@@ -20,9 +20,9 @@ Pushed = Literal["robot", "object"]
 AN_HOUR = (Segment(duration=600.0),) * 6
 """The longest that an episode lasts."""
 REMEMBERED = 60.0
-"""How much of the past is kept [s]."""
+"""Length of the past that is kept [s]."""
 BLOW = 0.1
-"""How long a push lasts [s]; as long as those of `eval.robustness.pushes`."""
+"""Length of a push [s]; as long as those of `eval.robustness.pushes`."""
 
 
 class Session:
@@ -31,13 +31,15 @@ class Session:
     def __init__(self, source: Source, request: PlayRequest) -> None:
         """Begins an episode. Raises ContractBroken for a damaged export, Damaged for a damaged checkpoint."""
         self.source = source
+        self.wanted = nominal_command(source.world.recipe.task.commands)
+        """The command to approach, (11,); it may be changed in place."""
         self._pull = {"robot": np.zeros(3), "object": np.zeros(3)}
         self._open(request)
 
     def _open(self, request: PlayRequest) -> None:
         self.request = replace(request, sequence=AN_HOUR)
         self.environment = self.source.environment(requested_episode(self.source.world.recipe, self.request))
-        self.helm = Helm(self.source.world, self.environment)
+        self.environment.batch.guidance.commander.steer(self.wanted)
         self._load()
         self._witness: Witness | None = None
         self.reset()
@@ -49,28 +51,19 @@ class Session:
 
     def begin(self, request: PlayRequest) -> None:
         """A new episode under other conditions; the command stays."""
-        wanted = self.helm.wanted
         self.environment.close()
         self._open(request)
-        self.helm.wanted[:] = wanted
 
     def reset(self) -> None:
         """The episode from its start."""
-        environment, recipe = self.environment, self.source.world.recipe
+        environment = self.environment
         self._observation = environment.reset()
         self._policy.reset(np.ones(1, np.bool_))
         self._steps = 0
         self._blow = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
         self._witness = witness = self._witness or Witness(environment)
-        self.track = Track(
-            title=f"{self.request.scene}, {self.request.object_mass:g} kg",
-            model=witness.model,
-            period=environment.period,
-            gait_period=1.0 / recipe.task.references.gait.frequency,
-            held_weight=witness.held_weight,
-            joints=environment.batch.robot.joints,
-            kept=round(REMEMBERED / environment.period),
-        )
+        title = f"{self.request.scene}, {self.request.object_mass:g} kg"
+        self.track = track_of(witness, self.source.world, title, round(REMEMBERED / environment.period))
         self._look = witness.look
         self.track.moments.append(self._look(0.0))
 

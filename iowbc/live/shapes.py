@@ -18,7 +18,7 @@ ROUND = 24
 
 
 @dataclass(frozen=True)
-class Shape:
+class BodyMesh:
     """Triangles of one colour on a body."""
 
     body: str
@@ -30,12 +30,12 @@ class Shape:
     """Red, green, blue, opacity, 0 to 1."""
 
 
-def looks(model: Any) -> Iterator[Shape]:
-    """What MuJoCo's viewer shows, without the ground."""
+def looks(model: Any) -> Iterator[BodyMesh]:
+    """Meshes that MuJoCo's viewer shows, without the ground."""
     return _merged(model, lambda geom: model.geom_group[geom] < HIDDEN_GROUP)
 
 
-def collision_shapes(model: Any, bodies: set[str]) -> Iterator[Shape]:
+def collision_shapes(model: Any, bodies: set[str]) -> Iterator[BodyMesh]:
     """The primitive shapes of some bodies, by which they touch, whether or not they are for the eye."""
     mesh = GEOM.mjGEOM_MESH.value
     return _merged(
@@ -43,7 +43,7 @@ def collision_shapes(model: Any, bodies: set[str]) -> Iterator[Shape]:
     )
 
 
-def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[Shape]:
+def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[BodyMesh]:
     chosen: dict[tuple[int, tuple[float, ...]], list[tuple[Array, Array]]] = {}
     for geom in range(model.ngeom):
         if model.geom_type[geom] != GEOM.mjGEOM_PLANE.value and wanted(geom):
@@ -53,7 +53,7 @@ def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[Shape]:
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
         vertices = np.concatenate([vertices for vertices, _ in parts])
         faces = np.concatenate([start + faces for start, (_, faces) in zip(starts, parts, strict=True)])
-        yield Shape(model.body(body).name, vertices, faces, colour)  # type: ignore[arg-type]
+        yield BodyMesh(model.body(body).name, vertices, faces, colour)  # type: ignore[arg-type]
 
 
 def _colour(model: Any, geom: int) -> list[float]:

@@ -1,23 +1,30 @@
-"""A stretch of an episode that was taken down, and what it says of how well the command was followed."""
+"""A stretch of an episode that was taken down, its figures, and trials of an evaluation that are played again."""
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from iowbc.evaluation.side_by_side import Actor
+from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
-from iowbc.evaluation.trials.rollout import RECORDED, trace_of
-from iowbc.live.moment import Moment
-from iowbc.recipe.evaluation.success import Success
+from iowbc.evaluation.trials.rollout import RECORDED, play_in, trace_of
+from iowbc.evaluation.trials.table import replayed
+from iowbc.live.moment import Moment, Witness
+from iowbc.recipe.evaluation.evaluation import Success
+from iowbc.task.specification import Specification
+from iowbc.task.vector.vector_env import VectorEnv
 
 WINDOW = 3.0
 """Figures are means over so long a time [s]; the weight in the hands leaves out its first second."""
 
 
 @dataclass(frozen=True)
-class Readings:
+class TrackFigures:
     """Figures of the seconds before a moment; NaN where there is nothing to measure."""
 
     errors: dict[str, float]
@@ -30,7 +37,7 @@ class Readings:
 
 @dataclass
 class Track:
-    """The moments of one episode, one a control step."""
+    """The moments of one episode, one a control step; see `track_of`."""
 
     title: str
     model: Any
@@ -45,7 +52,7 @@ class Track:
     kept: int | None = None
     """So many of the last moments are kept; None keeps all."""
     ending: str = ""
-    """How the episode ended, once it has."""
+    """Ending of the episode, once it has ended."""
     moments: deque[Moment] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -65,7 +72,7 @@ class Track:
         """Index of the moment at a time [s], or of the nearest one."""
         return int(np.clip(round((seconds - self.start) / self.period), 0, len(self.moments) - 1))
 
-    def readings(self, place: int) -> Readings:
+    def readings(self, place: int) -> TrackFigures:
         """The figures at the moment of an index."""
         first = max(0, place + 1 - round(WINDOW / self.period))
         seen = [self.moments[index] for index in range(first, place + 1)]
@@ -74,8 +81,62 @@ class Track:
         deviations = deviations_from_clamped(trace, max(1, round(self.gait_period / self.period)))
         shares = trace.joint_saturation.mean(axis=0)
         means = deviations.means()
-        return Readings(
+        return TrackFigures(
             errors={name: means[name] for name in ERRORS},
             weight_in_hands=load_metrics(trace, self.held_weight, Success().least_weight)["weight_in_hands"],
             saturated={name: float(share) for name, share in zip(self.joints, shares, strict=True) if share > 0},
         )
+
+
+def track_of(witness: Witness, world: Specification, title: str, kept: int | None = None) -> Track:
+    """An empty track of a witness's present episode in a world."""
+    environment = witness.environment
+    return Track(
+        title=title,
+        model=witness.model,
+        period=environment.period,
+        gait_period=1.0 / world.recipe.task.references.gait.frequency,
+        held_weight=witness.held_weight,
+        joints=environment.batch.robot.joints,
+        kept=kept,
+    )
+
+
+def trial_titles(trials: pd.DataFrame) -> list[str]:
+    """A name for each row of `trials.parquet`: what was tried, and how it ended."""
+    return [_title(row) for _, row in trials.iterrows()]
+
+
+def _title(row: "pd.Series[Any]") -> str:
+    push = f", push {row['impulse']:g} N·s" if row["impulse"] else ""
+    case = row["suite"] if row["suite"] == row["case"] else f"{row['suite']}: {row['case']}"
+    return f"{case}, {row['mass']:g} kg{push}, trial {row['trial']}: {row['end']} after {row['seconds']:.1f} s"
+
+
+def played_again(
+    actor: Actor,
+    row: "pd.Series[Any]",
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> Track:
+    """The trial of a row of the actor's table, taken down step by step.
+
+    progress: told the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
+    """
+    environment = VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
+    seen: list[Moment] = []
+    witness: list[Witness] = []
+
+    def look(seconds: float) -> None:
+        if not witness:
+            witness.append(Witness(environment))
+        seen.append(witness[0].look(seconds))
+
+    try:
+        outcome = play_in(environment, in_batch(actor.policy, row), interrupted, progress, look)[0]
+        track = track_of(witness[0], actor.world, _title(row))
+        track.ending = outcome.ending
+        track.moments.extend(seen)
+        return track
+    finally:
+        environment.close()

@@ -12,7 +12,7 @@ import pinocchio
 
 from iowbc.arrays import Array
 from iowbc.recipe.evaluation.model_based import ModelBased
-from iowbc.recipe.generator import Problem
+from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
 from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.soles import sole_limits
@@ -40,7 +40,7 @@ class Balance:
     """Solves the program of one robot; holds the model and its buffers, and nothing from one call to the next."""
 
     def __init__(self, robot: Robot, settings: ModelBased) -> None:
-        problem = Problem(**{name: getattr(settings, name) for name in LIMITS})
+        problem = PostureProblem(**{name: getattr(settings, name) for name in LIMITS})
         self.settings, self.support = settings, SupportModel(robot, problem)
         self.model, self.data = self.support.model, self.support.data
         self.joints, self.velocities = len(robot.support), self.model.nv

@@ -21,7 +21,7 @@ from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
-from iowbc.recipe.reading.writing import as_yaml
+from iowbc.recipe.reading.document import as_yaml
 
 Execute = Callable[[Stage, Job], None]
 """Carries a stage out."""

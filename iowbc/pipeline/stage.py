@@ -119,7 +119,7 @@ class Presentation:
     curves: tuple[str, ...] = ()
     """Learning curves that a report always shows; all others can be unfolded."""
     trained_by: str = ""
-    """Name of the method whose steps `<stage>.steps` counts; empty for a stage that does not train."""
+    """Name of the method whose steps the first path of `counts` counts; empty for a stage that does not train."""
     leaves_policy: bool = False
     """True where its artifact holds a policy that can be played."""
 

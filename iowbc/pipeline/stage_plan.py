@@ -55,6 +55,11 @@ class StagePlan:
         return not self.reasons
 
     @property
+    def published(self) -> bool:
+        """True where that came with the repository."""
+        return self.cached and self.artifact is not None and self.artifact.published
+
+    @property
     def guess(self) -> float | None:
         """The expected time, or what comes nearest to one [s]."""
         return self.roughly if self.expected is None else self.expected

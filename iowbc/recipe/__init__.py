@@ -1,1 +1,1 @@
-"""What a recipe may say, and how it is loaded. Light: imports nothing else of the package."""
+"""The contents of a recipe, and its loading. Light: imports nothing else of the package."""

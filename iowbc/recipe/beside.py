@@ -25,7 +25,7 @@ class FileBeside(Section):
     """Bytes of the largest that is taken in."""
 
     path: str = Field(json_schema_extra=COSMETIC)
-    """Where it lay, as the recipe says it."""
+    """Its place, as the recipe says it."""
     sha256: str
     """Digest of its bytes."""
     content: str = Field(json_schema_extra=COSMETIC)
@@ -82,3 +82,12 @@ class MeshFile(FileBeside):
 
     suffixes: ClassVar[tuple[str, ...]] = (".obj", ".stl")
     largest: ClassVar[int] = 400_000
+
+
+class OwnFunction(Section):
+    """A function in a file of one's own."""
+
+    module: ModuleFile
+    """Python file beside the recipe, which may import what is installed, and no file beside it."""
+    function: str = Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$", max_length=100)
+    """Its function."""

@@ -4,10 +4,10 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Width
 
 
-class Distillation(Section):
+class Distillation(Encoder):
     """On-policy distillation of the teacher into the student."""
 
     steps: int = Field(default=4_000_000, ge=1, le=10**12)
@@ -18,18 +18,11 @@ class Distillation(Section):
     """Control steps between two rounds of gradient steps."""
     history: int = Field(default=25, ge=1, le=1000)
     """Length of the observation history H_t (paper Table I)."""
-    encoder: Literal["mlp"] = "mlp"
-    """Layers over all of the history at once turn it into a latent. Where the teacher is symmetric by construction, so
-    is the student: the encoder has half the latent's size and reads the history and its mirror image."""
-    frame_features: int = Field(default=32, ge=1, le=16_384)
-    """Features to which one observation of the history is projected, with the same weights for all."""
-    latent: int = Field(default=64, ge=1, le=16_384)
-    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
     experts: dict[str, ArtifactName] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """By scene: the recipe whose teacher the student follows there, or a key as in `teacher.start`. Empty follows this
     recipe's own teacher everywhere. What the experts are is part of the key, not what they are called."""
     start: Literal["teacher", "anew"] = "teacher"
-    """What the body behind the encoder begins as. `teacher`: the teacher's own body; where that sees s_priv, it sees
+    """Beginning of the body behind the encoder. `teacher`: the teacher's own body; where that sees s_priv, it sees
     what a linear map reads from the latent, at first the mean of training. Nothing of the teacher has to be learnt
     again, and all that is learnt is what the history tells. `anew`: from nothing, on the latent itself."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
@@ -53,7 +46,7 @@ class Distillation(Section):
     training. What no history shows, such as a motor's strength, the student cannot answer to as the teacher does; and a
     teacher that walks loses nothing without it."""
     observe_object: bool = Field(default=True, json_schema_extra=LATER)
-    """Whether the student sees the object where its teacher does (`task.observation.observe_object`). Without, it has
+    """Lets the student see the object where its teacher does (`task.observation.observe_object`). Without, it has
     proprioception alone (paper III-C.2), and infers the object's pose from its history as it infers s_priv."""
     std: Literal["learnt", "shared"] = "learnt"
     """Standard deviation of the student's Gaussian. `learnt`: its own, which grows where its action is uncertain

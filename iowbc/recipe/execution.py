@@ -1,4 +1,4 @@
-"""How a machine runs a recipe; not part of any key."""
+"""Execution of a recipe on a machine; not part of any key."""
 
 from typing import Literal
 
@@ -8,12 +8,12 @@ from iowbc.recipe.section import Section
 
 
 class Execution(Section):
-    """How a machine runs a recipe; not part of any key."""
+    """Execution of a recipe on a machine; not part of any key."""
 
     workers: int | None = Field(default=None, ge=1, le=1024)
     """Worker processes of the parallel stages; all available cores when empty. `--workers` goes before it."""
     engine: Literal["local", "ray"] = "local"
-    """Where stages run: in processes here, or on the nodes of a Ray cluster, with the same results. `--engine` goes
+    """Engine of the stages: processes here, or on the nodes of a Ray cluster, with the same results. `--engine` goes
     before it."""
     address: str = Field(default="local", min_length=1, max_length=200)
     """The Ray cluster: `local` (one of this machine alone, which ends with the run), `auto` (the one that `ray start`
@@ -23,10 +23,10 @@ class Execution(Section):
     cluster has cores. When empty a training stays on one node with its worker processes, which is better where many
     trainings run."""
     copy_files: bool = False
-    """Whether nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
+    """Lets nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
     that are slow. Where they do not see it they copy in any case."""
     track: bool = True
-    """Whether runs are recorded in MLflow."""
+    """Records runs in MLflow."""
     experiment: str = Field(default="iowbc", min_length=1, max_length=200)
     """MLflow experiment in which runs are recorded."""
     line_interval: float = Field(default=10.0, gt=0)

@@ -27,7 +27,7 @@ class Interval(Section):
 
 
 class WristRegion(Section):
-    """Where the wrists are put: a box for the left wrist; the right one is mirrored and moved by the asymmetry."""
+    """Places of the wrists: a box for the left wrist; the right one is mirrored and moved by the asymmetry."""
 
     x: Interval = Interval(low=0.14, high=0.46)
     """Forward of the frame's origin [m]."""
@@ -42,7 +42,7 @@ class WristRegion(Section):
 
 
 class Sampling(Section):
-    """Which arm postures and base commands are labelled: a scrambled Sobol sequence with edges and nominal points."""
+    """Arm postures and base commands that are labelled: a scrambled Sobol sequence with edges and nominal points."""
 
     samples: int = Field(default=60000, ge=16, le=2_000_000)
     """Points tried; about six in ten get a label (three have arms in collision, one is out of the robot's reach)."""
@@ -55,7 +55,7 @@ class Sampling(Section):
     torso_share: Share = 0.35
     """Share put at wrist positions in the torso frame, as when a load leans with the trunk; the rest is uniform."""
     wrists: WristRegion = WristRegion()
-    """Where those wrists are."""
+    """Places of those wrists."""
     joint_ranges: dict[str, Interval] = Field(default={})
     """Narrower ranges [rad] of arm joints in the uniform share, e.g. `left_elbow_joint: {low: 0, high: 1}`."""
     boundary_share: Share = 0.06
@@ -72,7 +72,7 @@ class Sampling(Section):
         return self
 
 
-class Problem(Section):
+class PostureProblem(Section):
     """The cost (paper eq. 4) and the physical limits, the same for both methods. Costs are ½·weight·residual²."""
 
     com_weight: Positive = 1e3
@@ -143,7 +143,7 @@ class OptimalControl(Section):
 
 
 class LabelGates(Section):
-    """What a label must satisfy, whatever its method; a sample that misses one is rejected with that reason."""
+    """Gates of a label, whatever its method; a sample that misses one is rejected with that reason."""
 
     foot_position: Positive = 0.002
     """Distance of each sole centre from its place [m]."""
@@ -191,13 +191,13 @@ class FeasibleRegion(Section):
     kept_share: Share = 0.5
     """A command needs this share of the samples around it, with any arms, to have a label."""
     window: tuple[Positive, Positive] = (0.02, 0.1)
-    """Which samples are around a command: within this height [m] and pitch [rad]."""
+    """Samples around a command: those within this height [m] and pitch [rad]."""
     enough: int = Field(default=20, ge=1, le=100_000)
     """Samples that there must be for their share to count; fewer leave it to the two arm postures of the grid."""
 
 
 class FitGates(Section):
-    """What the network must satisfy on held-out samples. `null` leaves a gate out."""
+    """Gates of the network on held-out samples. `null` leaves a gate out."""
 
     joint_rmse: Positive | None = 0.016
     """Root mean square error of the joints [rad]."""
@@ -213,8 +213,8 @@ class FitGates(Section):
     """Largest move of a joint for one small step of the command [rad]."""
 
 
-class Smoothness(Section):
-    """How the network's smoothness is measured: random lines through the feasible map, walked in small steps."""
+class SmoothnessCheck(Section):
+    """Measurement of the network's smoothness: random lines through the feasible map, walked in small steps."""
 
     lines: int = Field(default=1000, ge=1, le=1_000_000)
     """Random lines."""
@@ -249,25 +249,26 @@ class Fit(Section):
     """Length [m] that weighs as much as one radian in that loss."""
     gates: FitGates = FitGates()
     """Limits on held-out data."""
-    smoothness: Smoothness = Smoothness()
-    """How smoothness is measured."""
+    smoothness: SmoothnessCheck = SmoothnessCheck()
+    """Measurement of smoothness."""
 
 
 class ReferenceGenerator(Section):
     """The reference generator: its dataset and its network."""
 
     method: Literal["static", "ocp"] = "static"
-    """How labels are made: `ocp` is the optimal control problem, `static` its steady state (15 times faster)."""
+    """Method of labelling: `ocp` is the optimal control problem, `static` its steady state (15 times faster)."""
     height: Literal["pelvis", "com"] = "pelvis"
-    """What the commanded height is: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass as the paper writes."""
+    """Meaning of the commanded height: the pelvis (0.5 to 0.8 m on the G1), or the centre of mass as the paper
+    writes."""
     sampling: Sampling = Sampling()
-    """Which arms and commands are labelled."""
-    problem: Problem = Problem()
+    """Arms and commands that are labelled."""
+    problem: PostureProblem = PostureProblem()
     """Costs and physical limits."""
     ocp: OptimalControl = OptimalControl()
     """The optimal control problem over a horizon."""
     gates: LabelGates = LabelGates()
-    """What each label must satisfy."""
+    """Gates of each label."""
     crosscheck: CrossCheck = CrossCheck()
     """Static labels against optimal control."""
     feasible: FeasibleRegion = FeasibleRegion()

@@ -11,19 +11,21 @@ from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import misnamed
 from iowbc.recipe.section import Section, Unfitting
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.simulation import SimulationSettings
+from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
-StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
+StageName = Literal["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export", "skill", "skill-eval"]
 PIPELINE: tuple[StageName, ...] = get_args(StageName)
 """All stages, in the order in which they run."""
+CONTROLLER: tuple[StageName, ...] = PIPELINE[:6]
+"""Stages of the controller, without those of the skill layer above it."""
 
-
-SEEDS = ("seed", "teacher.seed", "distill.seed")
+SEEDS = ("seed", "teacher.seed", "distill.seed", "skill.learning.seed")
 """Dotted paths that tell repetitions of one experiment apart."""
 NAME = "[a-z0-9][a-z0-9_-]*"
-"""What the name of an experiment looks like; it names files."""
+"""Pattern of the name of an experiment; it names files."""
 
 
 class Recipe(Section):
@@ -32,16 +34,17 @@ class Recipe(Section):
     name: str = Field(pattern=f"^{NAME}$", max_length=64)
     """Name of the experiment: up to 64 lower-case letters, digits, `-` and `_`."""
     description: str = ""
-    """What the experiment is for, in a sentence."""
+    """Purpose of the experiment, in a sentence."""
     seed: int = Field(default=0, ge=0, lt=2**32)
     """Seed of everything that is drawn at random."""
     robot: str = "g1"
     """Folder under `robots/` that describes the robot."""
-    stages: tuple[StageName, ...] = Field(default=PIPELINE, min_length=1)
-    """Stages of this experiment; they run in the order of the pipeline."""
+    stages: tuple[StageName, ...] = Field(default=CONTROLLER, min_length=1)
+    """Stages of this experiment; they run in the order of the pipeline. `skill` and `skill-eval` are only run where
+    they are named."""
     rg: ReferenceGenerator = ReferenceGenerator()
     """The reference generator: its dataset and its network."""
-    simulation: Simulation = Simulation()
+    simulation: SimulationSettings = SimulationSettings()
     """The world: physics, scenes, partner, randomisation, sensing."""
     task: Task = Task()
     """The Markov decision process: commands, observation, action, reward, terminations, curriculum."""
@@ -53,8 +56,10 @@ class Recipe(Section):
     """Trials of the trained policy."""
     export: Export = Export()
     """The ONNX graph and its checks."""
+    skill: Skill = Skill()
+    """The skill layer: the Markov game of a robot and a human, its training and evaluation."""
     execution: Execution = Execution()
-    """How this machine runs it; never changes a result, and is not part of any key."""
+    """Execution on this machine; never changes a result, and is not part of any key."""
 
     @property
     def deployed(self) -> Self:

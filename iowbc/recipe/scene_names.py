@@ -1,22 +1,22 @@
-"""Whether all that goes by scene names one that there is, and whether a recipe's own scenes have all they need."""
+"""Names of scenes in a recipe: each exists, and a recipe's own scenes have all that they need."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from iowbc.errors import nearest
-from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.trial_scenes import TrialScene
+from iowbc.recipe.evaluation.evaluation import Evaluation, TrialScene
 from iowbc.recipe.export import Export
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.holding import WITH_OBJECT
 from iowbc.recipe.simulation.scene import Scenes
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.task.task import Task
 from iowbc.recipe.teacher import Teacher
 
 
 def misnamed(
-    simulation: Simulation, task: Task, teacher: Teacher, evaluation: Evaluation, export: Export
+    simulation: SimulationSettings, task: Task, teacher: Teacher, evaluation: Evaluation, export: Export
 ) -> Iterator[tuple[str, str]]:
-    """Dotted paths, and what is wrong there."""
+    """Dotted paths, and the problem there."""
     worlds = {"simulation.scenes": simulation.scenes}
     if evaluation.simulation is not None:
         worlds["eval.simulation.scenes"] = evaluation.simulation.scenes
@@ -28,12 +28,13 @@ def misnamed(
     for path, scenes in worlds.items():
         for name in scenes.own:
             yield from _incomplete(f"{path}.{name}", name, scenes, task)
-    for place, name in _trained(teacher, export):
+    others = ((f"teacher.check.others.{name}", name) for name in teacher.check.others)
+    for place, name in (*others, *_object_scenes(export, "export")):
         yield from _without_object(place, name, "simulation.scenes", simulation.scenes)
     path, scenes = list(worlds.items())[-1]
     if evaluation.scenes:
         path, scenes = f"{path} and eval.scenes", with_scenes(scenes, evaluation.scenes)
-    for place, name in _evaluated(evaluation):
+    for place, name in _object_scenes(evaluation, "eval"):
         yield from _without_object(place, name, path, scenes)
 
 
@@ -50,7 +51,7 @@ def _unknown(path: str, names: tuple[str, ...], known: tuple[str, ...]) -> Itera
 
 
 def _incomplete(path: str, name: str, scenes: Scenes, task: Task) -> Iterator[tuple[str, str]]:
-    """What a scene of a recipe's own lacks."""
+    """Entries that a scene of a recipe's own lacks."""
     scene, references = getattr(scenes, name), task.references
     if name not in references.grasps.names:
         near = references.grasps.push if scene.kind == "push" else references.grasps.lift
@@ -69,29 +70,15 @@ def _without_object(path: str, name: str, where: str, scenes: Scenes) -> Iterato
         yield path, f"{text}; see {where}{nearest(name, loaded)}"
 
 
-def _trained(teacher: Teacher, export: Export) -> Iterator[tuple[str, str]]:
-    """Places that name a scene of the training's world."""
-    for name in teacher.check.others:
-        yield f"teacher.check.others.{name}", name
-    for number, acceptance in enumerate(export.acceptance):
-        yield f"export.acceptance.{number}.scene", acceptance.scene
-
-
-def _evaluated(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
-    """Places that name a scene of the world of trials."""
-    for path, sweep in evaluation.sweeps.items():
-        yield f"eval.{path}.scene", sweep.scene
-    suites = {
-        "heavy": evaluation.heavy,
-        "stagnation.cases": () if evaluation.stagnation is None else evaluation.stagnation.cases,
-        "robustness.cases": () if evaluation.robustness is None else evaluation.robustness.cases,
-    }
-    for path, cases in suites.items():
-        for number, case in enumerate(cases):
-            yield f"eval.{path}.{number}.scene", case.scene
-    parts: dict[str, Any] = {"compliance": evaluation.compliance, "map": evaluation.map, "probe": evaluation.probe}
-    if (robustness := evaluation.robustness) is not None:
-        parts |= {"robustness.pushes": robustness.pushes, "robustness.walking_pushes": robustness.walking_pushes}
-    if (compliance := evaluation.compliance) is not None:
-        parts |= {"compliance.blocked": compliance.blocked, "compliance.impedance": compliance.impedance}
-    yield from ((f"eval.{path}.scene", part.scene) for path, part in parts.items() if part is not None)
+def _object_scenes(section: Section, path: str) -> Iterator[tuple[str, str]]:
+    """Dotted path and value of every field below a section that names a scene with an object."""
+    for name, field in type(section).model_fields.items():
+        value, here = getattr(section, name), f"{path}.{name}"
+        if WITH_OBJECT in field.metadata:
+            yield here, value
+        elif isinstance(value, Section):
+            yield from _object_scenes(value, here)
+        elif isinstance(value, tuple):
+            for number, item in enumerate(value):
+                if isinstance(item, Section):
+                    yield from _object_scenes(item, f"{here}.{number}")

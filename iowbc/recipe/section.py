@@ -1,10 +1,11 @@
 """The base of every recipe section, and which of its values decide results."""
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 from pydantic.fields import FieldInfo
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
@@ -13,6 +14,26 @@ LATER: dict[str, Any] = {"later": True}
 """Extra of a field that came after artifacts were published. At its default, which is what the program did before, it
 decides nothing, so that their keys hold."""
 
+
+def in_order(ends: tuple[float, float]) -> tuple[float, float]:
+    """The lower and upper end of a range. Raises ValueError where they are the other way round."""
+    if ends[0] > ends[1]:
+        raise ValueError(f"the lower end {ends[0]:g} is above the upper end {ends[1]:g}")
+    return ends
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if any(low >= high for low, high in itertools.pairwise(values)):
+        raise ValueError(f"must ascend without repetition, got {list(values)}")
+    return values
+
+
+Range = Annotated[tuple[float, float], AfterValidator(in_order)]
+"""Lower and upper end."""
+Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Field(min_length=1)]
+"""Positive values that ascend without repetition."""
+Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
+"""Masses [kg] that ascend without repetition."""
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
@@ -20,7 +41,7 @@ ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max
 DEEPEST = 16
 """Hidden layers of the deepest network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
-"""What a name looks like that a recipe gives to a scene or a term of its own."""
+"""Pattern of a name that a recipe gives to a scene or a term of its own."""
 
 
 class Section(BaseModel):
@@ -30,11 +51,11 @@ class Section(BaseModel):
 
     @property
     def idle(self) -> bool:
-        """Whether an entry of a mapping does nothing, so that it might as well not be there."""
+        """True where an entry of a mapping does nothing, so that it might as well not be there."""
         return False
 
 
-class Named(Section):
+class NamedEntries(Section):
     """Entries by name: fields for those that every recipe has, and a recipe's own beside them, all of one type.
 
     The type of one's own is the annotation of `__pydantic_extra__`.
@@ -67,6 +88,18 @@ class Named(Section):
         return self
 
 
+class Encoder(Section):
+    """A network that turns the observation history H_t into a latent."""
+
+    encoder: Literal["mlp"] = "mlp"
+    """Layers over all of the history at once turn it into a latent. Where the teacher is symmetric by construction, so
+    is the student: the encoder has half the latent's size and reads the history and its mirror image."""
+    frame_features: int = Field(default=32, ge=1, le=16_384)
+    """Features to which one observation of the history is projected, with the same weights for all."""
+    latent: int = Field(default=64, ge=1, le=16_384)
+    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
+
+
 class Unfitting(ValueError):
     """Sections of a recipe that do not fit each other: pairs of the dotted path of a value, from the section that
     raises it, and what is wrong there."""
@@ -77,7 +110,7 @@ class Unfitting(ValueError):
 
 
 def deciding(section: Section) -> dict[str, Any]:
-    """What decides results: a section's values as JSON data, however deep, without its cosmetic fields and without
+    """The values of a section that decide results, as JSON data, however deep, without its cosmetic fields and without
     later ones at their default."""
     kept: dict[str, Any] = _deciding(section, section.model_dump(mode="json"))
     return kept

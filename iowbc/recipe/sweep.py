@@ -1,12 +1,23 @@
-"""What a sweep varies: values in a grid, and values drawn at random."""
+"""A sweep: a recipe or a study with every combination of a grid of values and of values drawn at random."""
 
+import hashlib
+import itertools
+import json
 import math
 import random
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, JsonValue, ValidationError, model_validator
 
+from iowbc.errors import Problem, RecipeError, shown
+from iowbc.recipe.reading.document import Located, plain, read_document, read_value
+from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
+from iowbc.recipe.reading.study import load_study
+from iowbc.recipe.reading.validation import descend
 from iowbc.recipe.recipe import NAME
 from iowbc.recipe.section import Section
 
@@ -16,40 +27,6 @@ MOST_VALUES = 10_000
 """Values of one axis at most."""
 MOST_POINTS = 1_000
 """Points of a sweep at most, unless more are asked for: planning one takes some 10 ms and 200 kB."""
-
-
-class Range(Section):
-    """Evenly spaced numbers, both ends among them."""
-
-    start: int | float
-    """The first value."""
-    stop: int | float
-    """No value is greater."""
-    step: PositiveInt | PositiveFloat = 1
-    """Distance of two neighbours."""
-
-    @model_validator(mode="after")
-    def _few(self) -> Self:
-        if self.stop < self.start:
-            raise ValueError(f"stop {self.stop} comes before start {self.start}")
-        try:
-            few = self._count <= MOST_VALUES
-        except (OverflowError, ValueError):  # of infinitely many, and of numbers whose distance is none
-            few = False
-        if not few:
-            raise ValueError(
-                f"step {self.step} makes more than {MOST_VALUES:,} values from {self.start} to {self.stop}"
-            )
-        return self
-
-    @property
-    def _count(self) -> int:
-        return math.floor((self.stop - self.start) / self.step + 1e-9) + 1
-
-    def values(self) -> list[JsonValue]:
-        """The numbers, in order; integers where all three are."""
-        found = [self.start + place * self.step for place in range(self._count)]
-        return [value if isinstance(value, int) else float(f"{value:.12g}") for value in found]
 
 
 class Drawn(Section):
@@ -62,7 +39,7 @@ class Drawn(Section):
     scale: Literal["linear", "log"] = "linear"
     """`log` draws each order of magnitude alike often: for rates and weights whose size is not known."""
     whole: bool = False
-    """Whether it is rounded to an integer."""
+    """Rounds it to an integer."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -83,7 +60,7 @@ class Drawn(Section):
         return round(found) if self.whole else float(f"{found:.{DIGITS}g}")
 
 
-class Draws(Section):
+class RandomDraws(Section):
     """Points drawn at random, each with all of these values."""
 
     count: int = Field(ge=1, le=MOST_VALUES)
@@ -91,7 +68,7 @@ class Draws(Section):
     seed: int = Field(default=0, ge=0, lt=2**32)
     """Seed of the draws: more of them leave the first ones as they were, and so do more paths."""
     values: Mapping[str, Drawn] = Field(min_length=1)
-    """What is drawn, by dotted path of the recipe."""
+    """Values that are drawn, by dotted path of the recipe."""
 
     def points(self) -> list[dict[str, JsonValue]]:
         """The drawn values of each draw, by dotted path."""
@@ -108,9 +85,184 @@ class SweepFile(Section):
     name: str | None = Field(default=None, pattern=f"^{NAME}$", max_length=64)
     """Name of the sweep; the file's name when empty."""
     description: str = ""
-    """What the sweep is for, in a sentence."""
-    grid: Mapping[str, Sequence[JsonValue] | Range] = {}
-    """Values by dotted path of the recipe: a list, or a range with `start`, `stop` and `step`; an item `0..4` of a list
-    stands for the integers 0 to 4."""
-    draws: Draws | None = None
+    """Purpose of the sweep, in a sentence."""
+    grid: Mapping[str, list[JsonValue]] = {}
+    """Values by dotted path of the recipe; `0..4` stands for the integers 0 to 4."""
+    draws: RandomDraws | None = None
     """Values that are drawn at random."""
+
+
+INTEGERS = re.compile(r"(-?[0-9]{1,10})\.\.(-?[0-9]{1,10})")
+"""`0..4`: the integers 0 to 4."""
+LONGEST_NAME = 64
+"""Characters of a recipe's name."""
+DIGEST_LENGTH = 6
+"""Characters of the digest in the name of a point."""
+RECIPE_AXIS = "recipe"
+"""Further axis of the sweep of a study."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run of a sweep: an ordinary recipe under a name of its own."""
+
+    loaded: LoadedRecipe
+    word: str
+    """The recipe's file."""
+    settings: Mapping[str, JsonValue]
+    """Values that the sweep varies, by dotted path."""
+
+    @property
+    def name(self) -> str:
+        """Name of its recipe."""
+        return self.loaded.recipe.name
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Recipes that differ in what a sweep varies."""
+
+    name: str
+    axes: tuple[str, ...]
+    """Dotted paths that are varied."""
+    points: tuple[Point, ...]
+
+
+def load_sweep(
+    word: str,
+    settings: Sequence[str],
+    file: Path | None = None,
+    most: int = MOST_POINTS,
+    counted: Callable[[int], None] = lambda count: None,
+) -> Sweep:
+    """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
+
+    settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and go before what the file says.
+    most: points at most. counted: is told their number before any is read.
+    """
+    described = SweepFile() if file is None else _read_file(file)
+    grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
+    if far := [value for value in grid.get("robot", ()) if Path(str(value)).name != value]:
+        text = f"key 'grid.robot' = {shown(far[0])}: a sweep names a folder under robots/; a path is for --set"
+        raise RecipeError([Problem(f"{file}:1:1", text)])
+    fixed: list[str] = []
+    for setting in settings:
+        path, equals, text = setting.partition("=")
+        values = _expanded(_items(text, f"--set {setting}"), f"--set {setting}") if equals else []
+        if len(values) > 1:
+            grid[path.strip()] = values
+        else:
+            fixed.append(setting)
+    drawn = described.draws.points() if described.draws is not None else [{}]
+    drawn = [{path: value for path, value in point.items() if path not in grid} for point in drawn]
+    axes = tuple(dict.fromkeys((*grid, *drawn[0])))
+    if axes or not load_study(word):
+        _require_axes(axes, file)
+    count = len(drawn)
+    for values in grid.values():
+        count *= len(values)
+    if count > most:
+        text = f"{count:,} points, more than {most:,}; vary less, or allow them: `iowbc sweep --points {count}`"
+        raise RecipeError([Problem(str(file or "--set"), text)])
+    counted(count)
+    points = []
+    for draw in drawn:
+        for combination in itertools.product(*grid.values()):
+            varied = {**draw, **dict(zip(grid, combination, strict=True))}
+            points += _points(word, fixed, {path: varied[path] for path in axes})
+    several = any(RECIPE_AXIS in point.settings for point in points)
+    name = described.name or _slug([file.stem] if file is not None else [Path(word).stem, *map(_leaf, axes)])
+    return Sweep(name[:LONGEST_NAME], ((RECIPE_AXIS,) if several else ()) + axes, tuple(points))
+
+
+def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) -> list[Point]:
+    """The point of a recipe, or those of the variants that a study names."""
+    overrides = (*fixed, *(f"{path}={written(value)}" for path, value in settings.items()))
+    variants = load_study(word, overrides)
+    if not variants:
+        return [_named(load_recipe(word, overrides), word, settings)]
+    return [_named(variant, str(variant.file), {RECIPE_AXIS: variant.recipe.name, **settings}) for variant in variants]
+
+
+def _named(loaded: LoadedRecipe, word: str, settings: Mapping[str, JsonValue]) -> Point:
+    """The point under a name that tells its settings, the same in every sweep that has it."""
+    own = {path: value for path, value in settings.items() if path != RECIPE_AXIS}
+    digest = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+    readable = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in own.items())])
+    if not own:
+        return Point(loaded, word, settings)
+    name = readable if own.keys() <= {"seed"} else f"{readable[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{digest}"
+    recipe = loaded.recipe.model_copy(update={"name": name})
+    overrides = (*loaded.overrides, f"name={name}")
+    return Point(replace(loaded, recipe=recipe, overrides=overrides), word, settings)
+
+
+def _leaf(path: str) -> str:
+    return path.rpartition(".")[2]
+
+
+def _slug(words: Sequence[str]) -> str:
+    return re.sub(r"[^a-z0-9_-]+", "_", "-".join(words).lower())
+
+
+def written(value: JsonValue) -> str:
+    """A value as `--set` takes it."""
+    if isinstance(value, str):
+        try:
+            return value if plain(read_value(value, "")) == value else json.dumps(value)
+        except RecipeError:
+            return json.dumps(value)
+    return json.dumps(value)
+
+
+def _items(text: str, place: str) -> list[JsonValue]:
+    """The values of `a,b`; commas inside brackets, braces and quotes separate nothing."""
+    found = plain(read_value(f"[{text}]", place))
+    return list(found) if isinstance(found, list) else []
+
+
+def _expanded(values: Sequence[JsonValue], place: str) -> list[JsonValue]:
+    """The values of an axis, `0..4` written out, without repetitions. Raises `RecipeError`."""
+    found: list[JsonValue] = []
+    for value in values:
+        ends = INTEGERS.fullmatch(value) if isinstance(value, str) else None
+        if ends is None:
+            found.append(value)
+            continue
+        first, last = int(ends[1]), int(ends[2])
+        if not 0 <= last - first < MOST_VALUES:
+            text = f"{value}: should read SMALLER..LARGER, of {MOST_VALUES:,} integers at most"
+            raise RecipeError([Problem(place, text)])
+        found += range(first, last + 1)
+    return [value for place_, value in enumerate(found) if value not in found[:place_]]
+
+
+def _require_axes(axes: Sequence[str], file: Path | None) -> None:
+    place = "--set" if file is None else str(file)
+    if not axes:
+        text = "a sweep varies something: `--set seed=0..4`, `--set task.references.use_rg=true,false`, or --from FILE"
+        raise RecipeError([Problem(place, text)])
+    for path in axes:
+        if path in ("name", "description") or path.split(".")[0] in ("execution", "extends"):
+            raise RecipeError([Problem(f"{place} {path}", "is not varied: it decides no result")])
+
+
+def _read_file(file: Path) -> SweepFile:
+    """Contents of the file of a sweep. Raises `RecipeError` with every problem and its line."""
+    tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))
+    if not isinstance(tree.value, dict):
+        raise RecipeError([Problem(tree.place, "a sweep is a mapping with `grid`, `draws` or both")])
+    try:
+        return SweepFile.model_validate(plain(tree))
+    except ValidationError as error:
+        problems = [_problem(tree, found["loc"], found["msg"]) for found in error.errors(include_url=False)]
+        raise RecipeError(problems) from None
+
+
+def _problem(tree: Located, location: Sequence[int | str], message: str) -> Problem:
+    path, found = descend(tree, location)
+    text = message.removeprefix("Value error, ").replace("Input should", "should").replace("Extra inputs", "other keys")
+    head = f"key '{'.'.join(path)}'" if path else "the sweep"
+    value = "" if isinstance(found.value, dict) else f" = {shown(plain(found))}"
+    missing = f" lacks '{location[-1]}'" if message == "Field required" else f"{value}: {text}"
+    return Problem(found.place, f"{head}{missing}")

@@ -1,27 +1,80 @@
 """PPO with privileged information (paper section III-C, Table I)."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from iowbc.recipe.check import Check
-from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Section, Width
+from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Section, Width, in_order
+from iowbc.recipe.simulation.holding import ObjectScene
+
+STAND_WALK_TURN = (
+    Segment(duration=1.0, ramp=0.0),
+    Segment(duration=3.0, velocity=(0.4, 0.0, 0.0)),
+    Segment(duration=2.0, velocity=(0.3, 0.0, 0.3)),
+    Segment(duration=2.0, height=0.66, pitch=0.2, ramp=0.8),
+    Segment(duration=2.0, ramp=0.5),
+)
+"""Stand, walk, turn, crouch and lean, stand: 10 s."""
+
+
+Errors = tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
+IO_WBC_UNLOADED = (0.125, 0.015, 0.046, 0.134)
+
+
+class Check(Section):
+    """A few trials, always the same, played with the policy's mean action every so often."""
+
+    every: int | None = Field(default=50, ge=1)
+    """Updates between two checks; a check takes about as long as one update. Empty never checks: the last policy is
+    kept, whatever became of it."""
+    lifting: tuple[NonNegativeFloat, ...] = (0.0, 4.0, 8.0)
+    """Masses in the scene `lift` [kg], where the task plays it; 0 is the scene without an object."""
+    pushing: tuple[NonNegativeFloat, ...] = (30.0,)
+    """Masses in the scene `push` [kg], where the task plays it."""
+    others: dict[ObjectScene, tuple[NonNegativeFloat, ...]] = Field(default_factory=dict, json_schema_extra=LATER)
+    """Masses in other scenes [kg], a recipe's own too, where the task plays them."""
+    trials: int = Field(default=2, ge=1, le=1000)
+    """Trials at each mass."""
+    seed: int = Field(default=5000, ge=0, lt=2**32)
+    """Seed of the first trial: apart from those of training and export; those of the tables are of another split
+    (`eval.split`)."""
+    films: int = Field(default=0, ge=0, le=100, json_schema_extra=COSMETIC)
+    """Films of a trial of a middling load, one each time a further such part of the training is done; each takes some
+    15 s without a graphics card. 0 makes none."""
+    sequence: tuple[Segment, ...] = STAND_WALK_TURN
+    """Commands of a trial, in order; empty takes `scripts`, or without any the fixed sequences of lifting and of
+    pushing."""
+    scripts: DrawnScripts | None = Field(default=None, json_schema_extra=LATER)
+    """Scripts drawn trial by trial, where `sequence` is empty: a policy is then not chosen by one script."""
+    scales: Errors = Field(default=IO_WBC_UNLOADED, json_schema_extra=LATER)
+    """Errors E_α [rad], E_h [m], E_v [m/s] and E_ψ [rad] that halve their part of the score; by default the paper's
+    IO-WBC without a load (Table II). An error that is far below its scale counts little."""
+    fall: float = Field(default=1.0, ge=0, le=1, json_schema_extra=LATER)
+    """Factor on the score of a trial that is not survived. At 1 who falls in the last second of twenty
+    loses a twentieth, less than what walking a little nearer to the velocity brings."""
+    collapse: float = Field(default=1 / 3, gt=0, lt=1)
+    """Part of the best score whose loss counts as a collapse: the training goes back to its best policy."""
+    notable: float = Field(default=0.4, ge=0, lt=1)
+    """Best score from which a fall of it can be a collapse. Below, scores are mostly chance, and fall while a policy
+    that stood learns to walk."""
+    patience: int = Field(default=3, ge=1)
+    """Checks in a row that must say so: one of eight trials more or less moves the score by a tenth."""
+    caution: float = Field(default=0.5, gt=0, lt=1)
+    """Factor on the desired KL divergence and the learning rate after each collapse."""
+    rollbacks: int = Field(default=6, ge=0, le=1000)
+    """Collapses without a better policy between them after which the stage gives up."""
+
 
 LARGEST_UPDATE = 10_000_000
 """Samples that are kept in memory for one update."""
 
 
-class HistoryNetwork(Section):
+class HistoryNetwork(Encoder):
     """The student's network as PPO trains it, without a teacher (the paper's "w/o distillation")."""
 
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
-    encoder: Literal["mlp"] = "mlp"
-    """See `distill.encoder`."""
-    frame_features: int = Field(default=32, ge=1, le=16_384)
-    """Features to which one observation of the history is projected, with the same weights for all."""
-    latent: int = Field(default=64, ge=1, le=16_384)
-    """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
 
 
 class Restart(Section):
@@ -60,7 +113,7 @@ class Teacher(Section):
     """KL divergence of the old policy from the new one that an update should have, in closed form: the step size falls
     by a fifth beyond one and a half times as much, and rises by a fifth below two thirds. At 0.016 a sixth of the
     samples is clipped; at 0.04 a third was, and training was slower. Empty keeps the step size constant."""
-    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (2e-5, 1e-3)
+    learning_rate_range: Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)] = (2e-5, 1e-3)
     """Least and largest step size, where `desired_kl` moves it."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
@@ -83,7 +136,7 @@ class Teacher(Section):
     """Environment steps in which the largest standard deviation halves, from the initial one down to `std_end`:
     exploration shrinks even where the gradient does not ask for it. Empty sets no such bound."""
     std_end: float = Field(default=0.2, gt=0)
-    """Where the largest standard deviation comes to rest."""
+    """Value at which the largest standard deviation comes to rest."""
     restart: Restart | None = Field(default=None, json_schema_extra=LATER)
     """Brings exploration back once; see `Restart`. Empty lets it shrink for good."""
     average_half_life: int | None = Field(default=None, ge=1, le=10**12, json_schema_extra=LATER)
@@ -95,7 +148,7 @@ class Teacher(Section):
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of the hidden layers."""
     symmetry: Literal["construction", "augment", "none"] = "construction"
-    """How the left-right symmetry of robot and task is used. `construction`: the networks commute with the mirror,
+    """Use of the left-right symmetry of robot and task. `construction`: the networks commute with the mirror,
     exactly, with half the multiplications. `augment`: dense networks that also see mirror images of their samples.
     `none`: early learning takes twice the steps."""
     mirror_gap: float = Field(default=3.0, gt=0)
@@ -138,13 +191,6 @@ class Teacher(Section):
     policy that learns before loses what it could."""
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
-
-    @model_validator(mode="after")
-    def _range_ascends(self) -> "Teacher":
-        low, high = self.learning_rate_range
-        if low > high:
-            raise ValueError(f"learning_rate_range: the least step size {low:g} is above the largest {high:g}")
-        return self
 
     @model_validator(mode="after")
     def _deviations_descend(self) -> "Teacher":

@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from pydantic import JsonValue
 
-from iowbc.recipe.reading.sweep import written
+from iowbc.recipe.sweep import written
 from iowbc.results.picture import COLOURS
 
 ORDERS = 30.0

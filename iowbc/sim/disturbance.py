@@ -4,7 +4,7 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.randomization import Distribution
 
 
 class Disturbance:

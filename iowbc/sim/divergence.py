@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import Robot
 from iowbc.sim.period import Period
 from iowbc.sim.timing import Timing

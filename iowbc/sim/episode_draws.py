@@ -6,11 +6,11 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.distribution import Distribution
 from iowbc.recipe.simulation.holding import BY_AXIS, SWITCHES
-from iowbc.recipe.simulation.partner import Partner
+from iowbc.recipe.simulation.partner import PartnerSettings
+from iowbc.recipe.simulation.randomization import Distribution
 from iowbc.recipe.simulation.scene import Scene
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.shapes import measured
 
@@ -181,7 +181,7 @@ def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]
     return entries
 
 
-def _habits(partner: Partner) -> dict[str, tuple[Distribution, int]]:
+def _habits(partner: PartnerSettings) -> dict[str, tuple[Distribution, int]]:
     """What is drawn of behaviours; a table of their own, so that they leave all other draws as they are."""
     sections = {"leader": partner.leader, "stopping": partner.stopping}
     return {

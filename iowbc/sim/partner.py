@@ -1,15 +1,15 @@
 """The second carrier: a spring, a damper and a preload at the object's far handle, on a path of its own.
 
 The path is that of the command, integrated from where the episode began, and changed by the partner's behaviour; a
-follower goes where the handle goes. All is real sums, products and roots, which round alike however many environments
-there are; NumPy's complex products do not.
+follower goes where the handle goes. A steered partner has a velocity of its own instead, and turns the object. All is
+real sums, products and roots, which round alike however many environments there are; NumPy's complex products do not.
 """
 
 import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.partner import BEHAVIOURS
-from iowbc.recipe.simulation.partner import Partner as Recipe
+from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
@@ -25,6 +25,8 @@ TINY = 1e-9
 """Keeps a division by a length from dividing by zero."""
 SLOW = 0.1
 """Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
+HESITANT = 0.03
+"""Speed below which a steered partner pushes a crate the less, the slower it wants it to roll [m/s]."""
 PATH, FOLLOWER, LEADER, STOPPING, TUGGING, LAGGING = range(len(BEHAVIOURS))
 REMEMBERED = (
     *("stiffness", "damping", "weight", "resistance", "bound", "pace", "gust", "drift", "share", "wandering"),
@@ -53,6 +55,12 @@ class Partner:
         self._stiffness, self._damping, self._weight = np.zeros(n), np.zeros(n), np.zeros(n)
         self._resistance, self._bound, self._pace, self._gust = np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
         self._drift, self._share, self._wandering = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.steered = np.zeros(n, np.bool_)
+        """Partners whose feed is their own: velocity of the handle in the frame of the heading at the start, yaw rate
+        of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of
+        snapshots."""
+        self._turning_inertia = np.array([measured(thing).about_axes[2] if thing else 0.0 for thing in things])
+        self._yaw_stiffness, self._yaw_damping, self._yaw_lead = np.zeros(n), np.zeros(n), np.zeros(n)
         self._present, self._height = np.zeros(n), np.full(n, np.nan)
         self._heading, self._offset = np.zeros((n, 2)), np.zeros((n, 2))
         self._aim, self._unsteady, self._centre = np.zeros((n, 3)), np.zeros((n, 2)), self._places[:, 1]
@@ -63,6 +71,7 @@ class Partner:
         self._stop, self._halted = np.zeros((n, 2)), np.zeros(n)
         """Begin and end of a stop [s]; part of the commanded velocity that remains in it."""
         self._followed, self._slow = np.zeros((n, 2)), np.full(n, TINY)
+        self._turn_rate, self._own_way = np.zeros(n), np.zeros((n, 2))
         self._keep = float(np.exp(-period / recipe.noise_time))
         self._keep_share = float(np.exp(-period / recipe.drift_time))
         self._derive()
@@ -77,11 +86,18 @@ class Partner:
         self._damping[which] = present * np.minimum(drawn["partner_damping"][which], stable)
         self._weight[which] = (present & ~pushing) * mass * GRAVITY
         self._resistance[which] = (present & pushing) * resistance
-        strongest = self._recipe.strongest
+        strongest, steered = self._recipe.strongest, self.steered[which]
         self._bound[which] = np.where(
-            pushing, np.minimum(self._recipe.push_yielding * np.abs(share) * resistance, strongest), strongest
+            pushing & ~steered,
+            np.minimum(self._recipe.push_yielding * np.abs(share) * resistance, strongest),
+            strongest,
         )
         self._behave(which, drawn)
+        turning = self._recipe.stability * mass * self._turning_inertia[which] / self._period
+        arm = steered * self._recipe.hand_distance**2
+        self._yaw_stiffness[which] = np.minimum(arm * self._stiffness[which], turning / self._period)
+        self._yaw_damping[which] = np.minimum(arm * self._damping[which], turning)
+        self._yaw_lead[which] = 0.0
         self._present[which], self._share[which] = present, share
         unsteady = np.where(pushing, resistance / self._recipe.noise_resistance, 1.0) * drawn["partner_noise"][which]
         self._gust[which] = present * unsteady * np.sqrt(1.0 - self._keep**2)
@@ -97,6 +113,7 @@ class Partner:
         forward = forward / (_length(forward) + TINY)[:, None]
         self._heading[which] = forward
         away = (self._at - state.base_position)[which]
+        away *= ~steered[:, None]
         self._offset[which, 0] = forward[:, 0] * away[:, 0] + forward[:, 1] * away[:, 1]
         self._offset[which, 1] = forward[:, 0] * away[:, 1] - forward[:, 1] * away[:, 0]
         self._derive()
@@ -140,6 +157,9 @@ class Partner:
         velocity = self._path(commanded)
         state.partner_velocity[:] = velocity * self._present[:, None]
         along = velocity[:, :2] / (_length(velocity) + self._slow)[:, None]
+        if self.steered.any():
+            own = self._own_way / (_length(self._own_way) + HESITANT)[:, None]
+            along = np.where(self.steered[:, None], own, along)
         lead = self._aim + velocity * self._period - self._at
         lead[:, :2] *= np.minimum(1.0, self._recipe.leash / (_length(lead) + TINY))[:, None]
         lead[:, 2] = lead[:, 2].clip(-self._recipe.leash, self._recipe.leash)
@@ -161,6 +181,19 @@ class Partner:
         self._steps += 1
         out[:, :3] = force
         out[:, 3:] = rotations.cross(self._arm, force)
+        if self.steered.any():
+            out[:, 5] += self._twist(state)
+
+    def _twist(self, state: SimulationState) -> Array:
+        """Torque of both hands of steered partners about the vertical, (n,) [N·m]: spring and damper of the arms at
+        the distance of the hands, towards the yaw rate that the partner gives the object."""
+        rate = self._turn_rate - state.object_angular_velocity[:, 2]
+        far = self._recipe.leash / self._recipe.hand_distance
+        self._yaw_lead += rate * self._period
+        self._yaw_lead.clip(-far, far, out=self._yaw_lead)
+        strongest = self._recipe.strongest * self._recipe.hand_distance
+        torque: Array = self._yaw_stiffness * self._yaw_lead + self._yaw_damping * rate
+        return torque.clip(-strongest, strongest)
 
     def _share_now(self, chance: Array, state: SimulationState) -> None:
         """The share wanders about the one drawn; it neither changes sign nor passes one."""
@@ -185,7 +218,9 @@ class Partner:
         velocity[:, 1] = sine * wanted[:, 0] + cosine * wanted[:, 1] + wanted[:, 2] * offset_x
         velocity[:, :2] *= self._pace[:, None]
         velocity[:, 2] = wanted[:, 3]
-        rate = wanted[:, 2]
+        self._own_way = velocity[:, :2].copy()
+        rate = np.where(self.steered, 0.0, wanted[:, 2])
+        self._turn_rate = np.where(self.steered, wanted[:, 2], 0.0)
         if len(self._which[LEADER]):
             rate = rate + self._lead(self._which[LEADER], wanted, velocity)
         if len(self._which[STOPPING]):
@@ -266,10 +301,10 @@ class Partner:
         state.handle_velocity[:] = self._speed
         self._arm = out - places[:, 1]
 
-    def handle(self, env: int) -> Array:
-        """The far handle of one environment's object, (3,) [m]."""
-        handle: Array = self._at[env].copy()
-        return handle
+    @property
+    def at(self) -> Array:
+        """The objects' far handles, (n, 3) [m]."""
+        return self._at.copy()
 
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""

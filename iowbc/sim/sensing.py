@@ -3,7 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Mask
-from iowbc.recipe.simulation.sensing import Sensing as Recipe
+from iowbc.recipe.simulation.simulation import SensorNoise as Recipe
 from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.state import MeasuredState, SimulationState

@@ -1,7 +1,8 @@
 """n environments stepped in one process: worlds, partner, disturbances, randomisation and sensors."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.errors import UsageError
+from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim import partner
@@ -54,10 +57,12 @@ class Simulation:
         scenes: Sequence[str],
         fixed: Mapping[str, Array] | None = None,
         control_frequency: float = 50.0,
+        drake: Drake | None = None,
     ) -> None:
         """`envs`: global indices of the environments, (n,); with `seed` (one, or one each) they key all that is random.
 
         `scenes`: name of each environment's scene. `fixed`: quantities held at a value, not drawn, (n,); NaN draws.
+        `drake`: settings with which Drake takes the steps, not MuJoCo; raises UsageError where it is not installed.
         """
         mujoco.set_mju_user_warning(_ignore)
         self.robot, self.recipe = robot, recipe
@@ -70,9 +75,10 @@ class Simulation:
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
+        make = World if drake is None else _stepped_by(drake)
         self._scenes = tuple(dict.fromkeys(self.scene_names))
         self.worlds = tuple(
-            World(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
+            make(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
             for name in self._scenes
         )
         self._owner, self._index = np.empty(n, np.int64), np.empty(n, np.int64)
@@ -159,6 +165,16 @@ class Simulation:
         """Where an impulse or a push acts in this control period, (n,)."""
         acting: NDArray[np.bool_] = np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
         return acting
+
+    @property
+    def steered(self) -> NDArray[np.bool_]:
+        """Partners that take `feed` as their own motion, to be written before a reset, (n,); see `Partner.steered`."""
+        return self._partner.steered
+
+    @property
+    def handle_position(self) -> Array:
+        """The objects' far handles, (n, 3) [m]."""
+        return self._partner.at
 
     @property
     def soles(self) -> dict[str, Array]:
@@ -270,6 +286,11 @@ class Simulation:
         self._sensing.advance(state)
         self._deliver()
 
+    def pause(self) -> None:
+        """A control period in which nothing moves; the sensors deliver anew."""
+        self.clock += 1
+        self._deliver()
+
     def _hand_over(self, wrench: Array) -> None:
         """Bears at first the robot's part of a held object's weight between its hands, less and less:
         f = (1 - share) m g (1 - t / T)."""
@@ -372,7 +393,8 @@ class Simulation:
 
     def partner_handle(self, env: int) -> Array:
         """Where the partner takes hold, (3,) [m]."""
-        return self._partner.handle(env)
+        place: Array = self._partner.at[env]
+        return place
 
     def impulse_force(self, env: int) -> Array:
         """The impulse that acts on the object in this control period, world frame, (3,) [N]."""
@@ -387,6 +409,17 @@ class Simulation:
 
 def _ignore(message: str) -> None:
     """MuJoCo's warnings are read from its counters; without this it prints them and writes a log file."""
+
+
+def _stepped_by(drake: Drake) -> Callable[..., World]:
+    """Makes worlds that Drake steps; imported here alone, for it is an extra."""
+    try:
+        from iowbc.sim.drake.world import DrakeWorld
+    except ModuleNotFoundError as missing:
+        if (missing.name or "").partition(".")[0] != "pydrake":
+            raise
+        raise UsageError("eval.engine: drake is not installed: pip install 'iowbc[drake]'") from None
+    return partial(DrakeWorld, settings=drake)
 
 
 def _scene(recipe: Recipe, name: str) -> Any:

@@ -82,7 +82,7 @@ class World:
         self._centres = bind("xipos")
         self._squeeze, self._grip = self._grasp(scene)
         self._rolling = Rolling(self.batch, self.layout, self.fields, scene) if scene.kind == "push" else None
-        self._memory = {} if self._rolling is None else {"touch": self._rolling.touch}
+        self._memory: dict[str, Array] = {} if self._rolling is None else {"touch": self._rolling.touch}
         self._memory |= {} if self._grip is None else self._grip.arrays()
         self._warning_counts = self.batch.warning[:, :, 1]
         self._warnings = self._warning_counts.copy()
@@ -180,6 +180,12 @@ class World:
         self._applied[:, self.layout.base, :3] = given.push
         if self.layout.object is not None:
             self._handle(given, self.layout.object)
+        self._advance(given, diverged)
+        self._look()
+        self._check(diverged)
+
+    def _advance(self, given: Period, diverged: Mask) -> None:
+        """Takes the physics steps."""
         try:
             self.batch.step(nstep=self.timing.substeps)
         except SimulationError as error:
@@ -187,8 +193,6 @@ class World:
         self._keep()
         if self._rolling is not None:
             self._rolling.observe(given.wrench)
-        self._look()
-        self._check(diverged)
 
     def _keep(self, ids: Indices | slice = EVERY) -> None:
         """Takes over the forces that MuJoCo computed last for some simulations."""

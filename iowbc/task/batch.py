@@ -69,6 +69,7 @@ class Batch:
             scenes=scenes,
             fixed=schedule.fixed,
             control_frequency=task.control_frequency,
+            drake=specification.drake,
         )
         self._holding = np.array([getattr(recipe.simulation.scenes, name).kind == "lift" for name in scenes])
         self._pushing = pushing = np.array([getattr(recipe.simulation.scenes, name).kind == "push" for name in scenes])
@@ -130,9 +131,7 @@ class Batch:
         memory, simulation = self.memory, self.simulation
         action = self.buffers["action"].astype(np.float64).clip(-self._bound, self._bound)
         simulation.target[:] = self.guidance.targets(memory, action)
-        simulation.feed[:, :3] = memory.command[:, VELOCITY]
-        left, right = memory.command[:, OFFSET][:, 2::3].T
-        simulation.feed[:, 3] = memory.command[:, HEIGHT] + 0.5 * (left + right)
+        self.feed_partner(simulation.feed)
         if self._pushes.any:
             simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)
         if self._pulls.any:
@@ -148,18 +147,29 @@ class Batch:
             disturbed=simulation.disturbed,
             resistance=simulation.drawn["rolling_resistance"],
         )
-        write_signals(self.buffers, simulation.state, judgement.motion, memory, judgement.ending, self.period)
+        self.record(judgement, action)
+        memory.earlier_action[:], memory.action[:] = memory.action, action
+        self.guidance.advance(memory, self._schedule.episode_key, self.observer.measured)
+        self.finish(judgement)
+
+    def record(self, judgement: Judgement, action: Array) -> None:
+        """Writes the signals of the step just made with an action (n, 15)."""
+        simulation, ending = self.simulation, judgement.ending
+        write_signals(self.buffers, simulation.state, judgement.motion, self.memory, ending, self.period)
         if self._schedule.repeats:
             write_trial_signals(self.buffers, simulation, action * self._scale)
-        memory.earlier_action[:], memory.action[:] = memory.action, action
-        self.guidance.advance(memory, self._schedule.episode_key, simulation.measured)
-        self._finish(judgement)
+
+    def feed_partner(self, feed: Array) -> None:
+        """Writes what the partner hears of the command, (n, 4)."""
+        feed[:, :3] = self.memory.command[:, VELOCITY]
+        left, right = self.memory.command[:, OFFSET][:, 2::3].T
+        feed[:, 3] = self.memory.command[:, HEIGHT] + 0.5 * (left + right)
 
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
         """Make a rollout of some control steps."""
         return roll(self, rollout_policy, steps)
 
-    def _finish(self, judgement: Judgement) -> None:
+    def finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""
         memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
         memory.total += scored.reward

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.termination import Termination
+from iowbc.recipe.task.task import Termination
 from iowbc.task.motion import Motion
 
 

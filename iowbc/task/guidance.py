@@ -40,7 +40,8 @@ class Guidance:
         self._settings, self._period = task.references.gait, period
         self.references = ReferenceLayer(robot, task.references, specification.rg)
         self.commander = Commander(task, self.references, scripts, holding, pushing, period)
-        self._grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
+        self.grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
+        """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)
@@ -49,7 +50,7 @@ class Guidance:
         """Begins new episodes with keys (k,): joints (k, joints) and pitch of the base (k,) to start in [rad]."""
         self.commander.start(which, memory, key)
         command = memory.command[which]
-        arms, posture = self.references.start(command, self._grasp[which])
+        arms, posture = self.references.start(command, self.grasp[which])
         memory.arms[which], memory.posture[which], memory.support[which] = arms, posture, posture
         memory.stepping[which] = False
         halves = np.floor(2.0 * random.uniform(key, "gait/phase", 1)[:, 0])
@@ -65,7 +66,7 @@ class Guidance:
         height = memory.command[:, HEIGHT].copy()
         self.commander.advance(memory, key)
         memory.height_rate[:] = (memory.command[:, HEIGHT] - height) / period
-        arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self._grasp, period)
+        arms, posture = self.references.advance(memory.arms, memory.posture, memory.command, self.grasp, period)
         memory.arms[:], memory.posture[:] = arms, posture
         moving = self.references.wants_steps(measured, posture, memory.command)
         phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
@@ -88,6 +89,6 @@ class Guidance:
 
     def object_place(self, memory: Memory) -> Array:
         """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
-        wrists = self.references.wrists(memory.command, self._grasp)
+        wrists = self.references.wrists(memory.command, self.grasp)
         place: Array = 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place
         return place

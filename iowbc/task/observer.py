@@ -22,7 +22,7 @@ class Observer:
     def __init__(self, robot: Robot, layout: FullLayout, simulation: Simulation, memory: Memory) -> None:
         self._layout, self._support, self._arms = layout, as_slice(robot.support), as_slice(robot.interaction)
         self._simulation, self._memory = simulation, memory
-        self._measured = Measured.of(simulation.measured)
+        self.measured = Measured.of(simulation.measured)
         self._joint_reference = np.tile(robot.default_position, (simulation.n, 1))
 
     def write(self, rows: NDArray[np.float32], moved: Motion, which: Indices | slice = EVERY) -> None:
@@ -31,7 +31,7 @@ class Observer:
         self._joint_reference[:, self._support] = memory.support
         self._joint_reference[:, self._arms] = memory.arms
         sensed = Sensed(
-            measured=self._measured,
+            measured=self.measured,
             command=memory.command,
             heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],
             joint_reference=self._joint_reference,

@@ -11,8 +11,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.errors import StageFailed, nearest
-from iowbc.recipe.beside import ModuleFile
-from iowbc.recipe.task.own_function import OwnFunction
+from iowbc.recipe.beside import ModuleFile, OwnFunction
 
 Source = TypeVar("Source")
 """What a function takes."""

@@ -7,7 +7,7 @@ from functools import cached_property
 from iowbc.arrays import Array
 from iowbc.control.layout import Part
 from iowbc.errors import StageFailed
-from iowbc.recipe.task.observation import Observation, OwnPart
+from iowbc.recipe.task.task import Observation, OwnPart
 from iowbc.robot.mirror import in_place
 from iowbc.task.own_function import Held, load_function
 from iowbc.task.privileged import PRIVILEGED, Truth

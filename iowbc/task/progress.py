@@ -4,7 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import VELOCITY, YAW_RATE
-from iowbc.recipe.task.termination import Termination
+from iowbc.recipe.task.task import Termination
 from iowbc.task.curriculum import Course
 from iowbc.task.endings import Ending
 from iowbc.task.memory import Memory

@@ -1,18 +1,18 @@
 """Which environment plays which scene."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from iowbc.recipe.task.task import SceneShares
 
-
-def scene_of(count: int, shares: SceneShares) -> list[str]:
-    """Scene of each of `count` environments, in the recipe's shares rounded to whole environments.
+def scene_of(count: int, shares: Iterable[tuple[str, float]]) -> list[str]:
+    """Scene of each of `count` environments, in given shares rounded to whole environments.
 
     Environments of one scene follow one another: most worker processes then hold one scene alone, and their arrays are
     copied as a block.
     """
-    names = [name for name, _ in shares]
-    weights = np.array([share for _, share in shares])
+    names, given = zip(*shares, strict=True)
+    weights = np.array(given)
     wanted = count * weights / weights.sum()
     whole = np.floor(wanted + 1e-9).astype(int)
     short = np.argsort(-(wanted - whole), kind="stable")[: count - whole.sum()]

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
+from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.recipe import Recipe
 
 
@@ -16,6 +17,8 @@ class Specification:
     """Folder of the robot's description."""
     rg: Path | None = None
     """Folder of the fitted reference generator; without one θ_S_ref is the default posture."""
+    drake: Drake | None = None
+    """Settings with which Drake takes the physics steps; without, MuJoCo does."""
 
     @property
     def deployed(self) -> Self:
@@ -29,10 +32,16 @@ class Specification:
             "recipe": self.recipe.model_dump(mode="json"),
             "robot": str(self.robot.resolve()),
             "rg": None if self.rg is None else str(self.rg.resolve()),
+            "drake": None if self.drake is None else self.drake.model_dump(mode="json"),
         }
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
         """Inverse of `as_json`."""
-        rg = values["rg"]
-        return cls(Recipe.model_validate(values["recipe"]), Path(values["robot"]), None if rg is None else Path(rg))
+        rg, drake = values["rg"], values["drake"]
+        return cls(
+            Recipe.model_validate(values["recipe"]),
+            Path(values["robot"]),
+            None if rg is None else Path(rg),
+            None if drake is None else Drake.model_validate(drake),
+        )

@@ -48,7 +48,7 @@ def npm_parts(cache: Path, say: Callable[[str], None]) -> Path:
 
 
 def parts_folder(cache: Path) -> Path:
-    """Where the pinned versions lie in a cache folder."""
+    """Folder of the pinned versions in a cache."""
     pinned = b"".join((SOURCE / name).read_bytes() for name in PINNED)
     return cache / hashlib.sha256(pinned).hexdigest()[:12]
 

@@ -12,7 +12,7 @@ from iowbc.web.bundling import bundle, npm_parts
 from iowbc.web.scenes import first_scene, web_scenes
 
 SCENES = "scenes.json"
-"""What the page adds to the exported files: scenes, and which of the files it has."""
+"""The page's addition to the exported files: scenes, and the names of the files that it has."""
 
 
 def write_page(exported: Path, out: Path, cache: Path, say: Callable[[str], None]) -> None:

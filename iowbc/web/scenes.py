@@ -1,8 +1,10 @@
-"""The simulation of a scene for the browser: its MJCF, the numbers that MJCF rounds, and how it begins."""
+"""The simulation of a scene for the browser: its MJCF, the numbers that MJCF rounds, its start, and its shapes for the
+eye."""
 
 from collections.abc import Mapping
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from iowbc.arrays import Array
@@ -18,7 +20,6 @@ from iowbc.sim.simulation import Simulation
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import World
 from iowbc.task.specification import Specification
-from iowbc.web.looks import looks
 
 KINDS = ("free", "lift")
 """Scenes that the page simulates; the wheels of a crate, whose friction follows their direction, it does not."""
@@ -28,12 +29,12 @@ FIELDS = (
     *("geom_size", "geom_friction", "geom_rbound", "geom_aabb", "site_pos", "site_quat"),
     *("actuator_gainprm", "actuator_biasprm"),
 )
-"""What of the model is written in full precision."""
+"""Arrays of the model that are written in full precision."""
 STILL = ("partner_share", "impulse_scale", "push_scale", "noise_scale")
 """Quantities of an episode that are zero on the page: nobody helps or pushes, and sensors tell the truth."""
 ABOVE = 1e-6
-"""How far the robot begins above the ground [m]: which corners of soles touch that lie exactly on it is a matter of the
-last bit, and the browser's differs."""
+"""Height above the ground at which the robot begins [m]: which corners of soles touch that lie exactly on it is a
+matter of the last bit, and the browser's differs."""
 HEAVIEST = 1.5
 """Mass to which the page's slider goes, as a part of the object's nominal one (Table I: to 150 %)."""
 
@@ -57,7 +58,7 @@ def accepted(recipe: Recipe) -> list[tuple[str, float]]:
 
 
 def _playable(scene: Scene) -> bool:
-    """Whether the page can simulate and draw a scene; it draws no meshes."""
+    """True where the page can simulate and draw a scene; it draws no meshes."""
     return scene.kind in KINDS and (scene.object is None or scene.object.mesh is None)
 
 
@@ -164,7 +165,7 @@ def _fields(world: World) -> dict[str, list[float]]:
 
 
 def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
-    """What the hands do beside their connection to the object, or the contact with it."""
+    """Actions of the hands beside their connection to the object, or the contact with it."""
     grasp, layout, model = scene.grasp, world.layout, world.model
     compliant = grasp.kind == "compliant"
     places = np.arange(model.nsite)[layout.grips] if layout.palms is None else layout.palms
@@ -189,3 +190,38 @@ def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mappi
         "stiffness": grasp.stiffness,
         "swing_damping": grasp.swing_damping,
     }
+
+
+SHOWN = 2
+"""Highest group of geoms that MuJoCo's viewer draws at first."""
+SHAPES = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+}
+
+
+def looks(dressed: Any, stepped: Any) -> list[dict[str, Any]]:
+    """Shapes of the model `dressed` for the eye, each with its body in the model that is `stepped`.
+
+    Half sizes and positions in m in the body's frame; quaternions wxyz; colours red, green, blue, alpha in 0 to 1.
+    """
+    found = []
+    for index in range(dressed.ngeom):
+        shape = SHAPES.get(mujoco.mjtGeom(dressed.geom_type[index]))
+        if shape is None or dressed.geom_group[index] > SHOWN or dressed.geom_rgba[index, 3] == 0.0:
+            continue
+        body = stepped.body(dressed.body(dressed.geom_bodyid[index]).name).id
+        found.append(
+            {
+                "body": int(body),
+                "shape": shape,
+                "size": [round(value, 5) for value in dressed.geom_size[index].tolist()],
+                "position": [round(value, 5) for value in dressed.geom_pos[index].tolist()],
+                "quaternion": [round(value, 6) for value in dressed.geom_quat[index].tolist()],
+                "colour": [round(value, 3) for value in dressed.geom_rgba[index].tolist()],
+            }
+        )
+    return found

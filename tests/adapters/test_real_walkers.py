@@ -13,7 +13,7 @@ from iowbc.adapters import holosoma
 from iowbc.adapters.adapter import Adapter, Seen, standing
 from iowbc.adapters.source import load_adapter
 from iowbc.recipe.reading.study import load_study
-from iowbc.recipe.simulation.simulation import Simulation as World
+from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.robot.description import Robot
 from iowbc.sim.simulation import Simulation
 
@@ -28,8 +28,8 @@ NAMES = ("holosoma_ppo", "holosoma_fastsac")
 
 def shipped(name: str) -> Adapter:
     study = load_study(RECIPE)
-    assert study is not None
-    (found,) = (one.recipe.eval.public for one in study.variants if one.recipe.name == name)
+    assert len(study) == 2
+    (found,) = (one.recipe.eval.public for one in study if one.recipe.name == name)
     assert found is not None
     return load_adapter(found)
 
@@ -107,7 +107,7 @@ def with_own_arms(
     own = {name: np.empty(len(places)) for name in ("kp", "kd", "default_position")}
     for name, values in zip(own, (adapter.kp, adapter.kd, adapter.default), strict=True):
         own[name][places] = values
-    world = World.model_validate({"randomization": {"enabled": False}, "sensing": {"enabled": False}})
+    world = SimulationSettings.model_validate({"randomization": {"enabled": False}, "sensing": {"enabled": False}})
     calm = {"impulse_scale": np.zeros(1), "push_scale": np.zeros(1)}
     simulation = Simulation(replace(robot, **own), world, envs=np.zeros(1), seed=0, scenes=["free"], fixed=calm)
     simulation.reset(np.zeros(1, np.int64), own["default_position"][None], yaw=np.zeros(1))

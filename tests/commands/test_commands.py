@@ -11,11 +11,9 @@ import pytest
 from processor_time import yardsticks
 from rich.console import Console
 
-from iowbc.commands.compare import compare
-from iowbc.commands.members import points_of
-from iowbc.commands.named import open_artifact
+from iowbc.commands.compare import compare, report
+from iowbc.commands.lookup import open_artifact, points_of
 from iowbc.commands.play import named_source
-from iowbc.commands.report import report
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import write_manifest
 from iowbc.pipeline.store.runs import Runs

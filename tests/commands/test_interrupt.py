@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.ending import INTERRUPTED, leave
+from iowbc.commands.process import INTERRUPTED, leave
 
 ROOT = Path(__file__).parents[2]
 INTERRUPTED_IMPORT = """
 import signal
-from iowbc.commands.ending import leave
+from iowbc.commands.process import leave
 signal.signal(signal.SIGINT, leave)
 try:
     import interrupted

@@ -11,7 +11,7 @@ import pytest
 from iowbc import open_artifact
 from iowbc.commands import completion
 from iowbc.commands.export import exported_folder as exported_by
-from iowbc.commands.named import named
+from iowbc.commands.lookup import named
 from iowbc.commands.play import playable
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import ContractBroken

@@ -14,10 +14,10 @@ import pytest
 from own_parts import own_part
 from rich.console import Console
 
-from iowbc.commands import filming
-from iowbc.commands.filming import Filming
-from iowbc.commands.in_training import in_training
+from iowbc.commands import printed
+from iowbc.commands.lookup import in_training
 from iowbc.commands.play import _source, named_source
+from iowbc.commands.printed import filming
 from iowbc.errors import UsageError
 from iowbc.evaluation.play import requested_episode
 from iowbc.evaluation.play_request import PlayRequest
@@ -77,7 +77,7 @@ def test_only_a_policy_that_sees_s_priv_is_played_with_its_parts_in_a_users_file
 def test_a_film_that_is_terminated_leaves_no_part_of_it(tmp_path: Path, number: signal.Signals) -> None:
     program = (
         "import os, signal\nfrom pathlib import Path\nimport numpy as np\n"
-        "from iowbc.commands.ending import close_on_termination, leave\n"
+        "from iowbc.commands.process import close_on_termination, leave\n"
         "from iowbc.evaluation.films import written_film\n"
         "signal.signal(signal.SIGINT, leave)\nclose_on_termination()\n"
         "with written_film(Path('x.mp4'), 10) as add:\n"
@@ -106,13 +106,13 @@ def test_play_that_is_terminated_leaves_no_part_of_its_film(tmp_path: Path) -> N
 
 
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filming, "INTERVAL", 0.0)
+    monkeypatch.setattr(printed, "INTERVAL", 0.0)
     stream = io.StringIO()
-    with Filming(Console(file=stream), Path("box.mp4")) as told:
+    with filming(Console(file=stream), Path("box.mp4")) as told:
         told(5.0, 40.0)
     assert stream.getvalue() == "box.mp4: sets up the simulation\nbox.mp4: 5 of 40 s\n"
     silent = io.StringIO()
-    with Filming(Console(file=silent), None) as told:
+    with filming(Console(file=silent), None) as told:
         told(5.0, 40.0)
     assert silent.getvalue() == ""
 

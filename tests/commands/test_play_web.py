@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from iowbc.commands import training
-from iowbc.commands.play_web import play_on_web
+from iowbc.commands import needs
+from iowbc.commands.play import play_on_web
 from iowbc.errors import UsageError
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.store.runs import Runs
@@ -33,7 +33,7 @@ def test_a_page_is_no_film(tmp_path: Path) -> None:
 
 
 def test_without_viser_the_command_that_installs_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = training.find_spec
-    monkeypatch.setattr(training, "find_spec", lambda name: None if name == "viser" else found(name))
+    found = needs.find_spec
+    monkeypatch.setattr(needs, "find_spec", lambda name: None if name == "viser" else found(name))
     with pytest.raises(UsageError, match=r"pip install 'iowbc\[web\]'"):
         play(tmp_path, 8080)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from iowbc.commands.report import report
+from iowbc.commands.compare import report
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.runs import Runs

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from iowbc.commands.named import last_used
+from iowbc.commands.lookup import last_used
 from iowbc.commands.results import headline, next_commands, print_results
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store

@@ -9,9 +9,9 @@ import pytest
 
 LEAN = """
 import importlib.util
-from iowbc.commands import training
+from iowbc.commands import needs
 known = importlib.util.find_spec
-training.find_spec = lambda name: None if name in {"torch", "mujoco", "mlflow"} else known(name)
+needs.find_spec = lambda name: None if name in {"torch", "mujoco", "mlflow"} else known(name)
 from iowbc.cli import main
 main()
 """

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.unexpected import described
+from iowbc.commands.process import described
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 BROKEN = """
-from iowbc.commands import ls
+from iowbc.commands import listing
 def broken(*arguments):
     raise KeyError("what nobody foresaw")
-ls.list_artifacts = broken
+listing.list_artifacts = broken
 from iowbc.cli import main
 main()
 """

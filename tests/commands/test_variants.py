@@ -9,8 +9,7 @@ from typing import Any, cast
 from made_up_trials import trials_of
 
 from iowbc.commands.compare import report_together
-from iowbc.commands.members import film_of, points_of, record_comparison
-from iowbc.commands.named import Named
+from iowbc.commands.lookup import Named, film_of, points_of, record_comparison
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.report.runs import Run, grouped

@@ -10,11 +10,11 @@ from iowbc.evaluation.trials.plan import SPLITS, planned_sweeps, trial_seed
 from iowbc.evaluation.trials.quick import quick_trials
 from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.evaluation.trials.transport import commanded_path
-from iowbc.recipe.check import Check
 from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.scripts import DrawnScripts
+from iowbc.recipe.evaluation.segment import DrawnScripts
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
+from iowbc.recipe.teacher import Check
 from iowbc.robot.description import robot_folder
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.specification import Specification

@@ -26,8 +26,8 @@ from iowbc.learning.acting import load_policy
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.check import Check
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.teacher import Check
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.stages import eval as evaluate
 from iowbc.stages.eval import play_everywhere

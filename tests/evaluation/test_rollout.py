@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from iowbc.errors import Interrupted
 from iowbc.evaluation.trials.rollout import RECORDED, play_in
 from iowbc.evaluation.trials.table import survived
-from iowbc.recipe.evaluation.success import Success
+from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.task.record.signals import SIGNALS, trial_signals
 
 WIDTHS = SIGNALS | trial_signals(29, 15)

@@ -7,7 +7,7 @@ from iowbc.arrays import Array
 from iowbc.evaluation.trials.errors import given_commands
 from iowbc.evaluation.trials.table import succeeded
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
-from iowbc.recipe.evaluation.success import Success
+from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.task.commands.script import CommandScript, CommandSegment
 
 DT = 0.02

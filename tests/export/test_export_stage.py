@@ -27,8 +27,8 @@ from iowbc.export.graph import ControllerGraph
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
+from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.video import Video
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.stages import export
@@ -229,7 +229,7 @@ def test_playing_an_exported_folder_tells_nobody(done: Job, tmp_path: Path) -> N
     program = (
         "from pathlib import Path; from iowbc.evaluation.play import exported_source, play;"
         "from iowbc.evaluation.play_request import PlayRequest; from iowbc.recipe.evaluation.segment import Segment;"
-        "from iowbc.recipe.evaluation.video import Video;"
+        "from iowbc.recipe.evaluation.evaluation import Video;"
         f"play(exported_source(Path({str(done.out)!r})), PlayRequest(sequence=(Segment(duration=0.1, ramp=0.0),),"
         f"video=Path({str(tmp_path / 'out.mp4')!r}), video_settings=Video(width=96, height=64, fps=10)))"
     )

@@ -11,8 +11,7 @@ from iowbc.errors import StageFailed
 from iowbc.learning.acting import Policy, TeacherPolicy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.teacher import TeacherTraining
-from iowbc.recipe.check import Check
-from iowbc.recipe.teacher import Teacher
+from iowbc.recipe.teacher import Check, Teacher
 
 CHECK = Check(every=1, rollbacks=2, patience=1)
 

@@ -8,6 +8,7 @@ import pytest
 from exported_policies import made_up_generator
 from standing_still import StandingStill
 
+from iowbc.control.command import nominal_command
 from iowbc.evaluation.play import Source
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.live import session as driven
@@ -17,7 +18,6 @@ from iowbc.live.session import Session
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot, robot_folder
 from iowbc.sim.rendering import appearance
-from iowbc.task.commands.drawing import nominal_command
 from iowbc.task.specification import Specification
 
 
@@ -41,7 +41,7 @@ def opened(source: Source) -> Iterator[Session]:
 @pytest.fixture
 def session(opened: Session) -> Session:
     """At the start of an episode with 4 kg, told to stand, let alone."""
-    opened.helm.wanted[:] = nominal_command(opened.source.world.recipe.task.commands)
+    opened.wanted[:] = nominal_command(opened.source.world.recipe.task.commands)
     opened.pull("robot", np.zeros(3))
     opened.pull("object", np.zeros(3))
     opened.begin(PlayRequest(mass=4.0)) if opened.request.mass != 4.0 else opened.reset()

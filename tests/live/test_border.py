@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from iowbc.live import border
+from iowbc.live import server as border
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import HOST, serving
 

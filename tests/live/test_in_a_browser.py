@@ -40,6 +40,6 @@ def test_the_tabs_of_a_browser_steer_one_robot(page: Page, tmp_path: Path) -> No
         second.evaluate("document.querySelectorAll('[role=slider]')[2].focus()")
         for _ in range(3):
             second.press("ArrowRight")
-        wait(lambda: bool(np.isclose(page.session.helm.wanted[0], 0.03)))
+        wait(lambda: bool(np.isclose(page.session.wanted[0], 0.03)))
         first.ask("Page.bringToFront")
         wait(lambda: ",0.03," in shown(first))

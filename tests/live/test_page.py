@@ -15,12 +15,12 @@ from iowbc.evaluation.play import requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.evaluation.trials.rollout import play_in
-from iowbc.live.drawing import Shown
+from iowbc.live.drawing import ShownParts
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.panel import LIVE
 from iowbc.live.server import HOST, serving
 from iowbc.live.session import Session
-from iowbc.live.trials import trial_titles
+from iowbc.live.track import trial_titles
 from iowbc.recipe.evaluation.segment import Segment
 
 STANDING = (Segment(duration=0.2, ramp=0.0),)
@@ -70,7 +70,7 @@ def test_a_slider_changes_the_command_in_force(page: Page) -> None:
     clock = Clock(page)
     clock.run(0.1)
     assert page.track.moments[-1].command[0] == 0.0
-    page.panel.set_command("v_x", 0.2)
+    page.panel._command[0].value = 0.2
     clock.run(0.4)
     assert page.track.moments[-1].command[0] == pytest.approx(0.2)
 
@@ -152,14 +152,14 @@ def test_what_is_drawn_follows_the_boxes(page: Page) -> None:
 def test_arrows_and_support_polygon_keep_their_shape_when_the_robot_has_moved(page: Page) -> None:
     Clock(page).run(0.4)
     drawing, moment, track = page.drawing, page.track.moments[page.place], page.track
-    drawing.show(track.model, moment, Shown())
+    drawing.show(track.model, moment, ShownParts())
     arrows, polygon, under = drawing._forces.points, drawing._support.vertices, drawing._beneath.position.copy()
     assert arrows[0, 0] + under == pytest.approx(moment.forces[0].start, abs=1e-6)
     way = np.array([3.0, -2.0, 0.0])
     bodies = moment.bodies.copy()
     bodies[:, :3] += way
     forces = tuple(replace(force, start=force.start + way) for force in moment.forces)
-    drawing.show(track.model, replace(moment, bodies=bodies, forces=forces, support=moment.support + way), Shown())
+    drawing.show(track.model, replace(moment, bodies=bodies, forces=forces, support=moment.support + way), ShownParts())
     np.testing.assert_allclose(drawing._forces.points, arrows, rtol=0, atol=1e-6)
     np.testing.assert_allclose(drawing._support.vertices, polygon, rtol=0, atol=1e-6)
     np.testing.assert_allclose(drawing._beneath.position - under, way, rtol=0, atol=1e-6)

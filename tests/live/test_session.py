@@ -26,7 +26,7 @@ def drawn(session: Session, name: str) -> float:
 
 def test_what_is_wanted_is_approached_at_the_recipe_s_rate(session: Session) -> None:
     rate, period = session.source.world.recipe.task.commands.rates.velocity, session.environment.period
-    session.helm.wanted[0] = 0.2
+    session.wanted[0] = 0.2
     run(session, 5)
     assert session.track.moments[-1].command[0] == pytest.approx(5 * rate * period)
     run(session, 10)
@@ -34,13 +34,13 @@ def test_what_is_wanted_is_approached_at_the_recipe_s_rate(session: Session) -> 
 
 
 def test_an_episode_begins_standing_in_the_wanted_posture(session: Session) -> None:
-    session.helm.wanted[[0, 3]] = (0.4, 0.65)
+    session.wanted[[0, 3]] = (0.4, 0.65)
     session.reset()
     assert session.track.moments[0].command[[0, 3]] == pytest.approx([0.0, 0.65])
 
 
 def test_a_command_beyond_what_is_feasible_is_clamped(session: Session) -> None:
-    session.helm.wanted[3] = 0.2
+    session.wanted[3] = 0.2
     session.reset()
     assert session.track.moments[0].command[3] > 0.4
 
@@ -83,11 +83,11 @@ def test_a_drag_lasts_until_it_is_let_go(session: Session) -> None:
 
 
 def test_other_conditions_begin_a_new_episode_with_them_and_keep_the_command(session: Session) -> None:
-    session.helm.wanted[0] = 0.3
+    session.wanted[0] = 0.3
     run(session, 3)
     session.begin(PlayRequest(mass=9.0, partner_share=0.4))
     assert (drawn(session, "object_mass"), drawn(session, "partner_share")) == (9.0, 0.4)
-    assert (len(session.track.moments), session.helm.wanted[0]) == (1, 0.3)
+    assert (len(session.track.moments), session.wanted[0]) == (1, 0.3)
     session.begin(PlayRequest(scene="push", mass=30.0))
     assert session.environment.batch.scenes[0] == "push"
     assert session.track.held_weight == 0.0

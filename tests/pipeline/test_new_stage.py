@@ -6,10 +6,10 @@ from typing import Literal
 import pytest
 from workplace import Workplace
 
-from iowbc.commands.in_training import in_training
+from iowbc.commands.compare import trainings_table
+from iowbc.commands.lookup import in_training
 from iowbc.commands.play import playable
 from iowbc.commands.results import headline, next_commands, policy_stages
-from iowbc.commands.trainings import trainings_table
 from iowbc.commands.ui import view
 from iowbc.learning.curves import Curves
 from iowbc.pipeline.planner import planner_for

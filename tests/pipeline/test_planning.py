@@ -8,7 +8,7 @@ import fake_stages
 import pytest
 from workplace import RECIPE, Workplace
 
-from iowbc.commands.sweep_plan import time_of
+from iowbc.commands.plan import time_of
 from iowbc.errors import RecipeError
 from iowbc.pipeline import planner as planning
 from iowbc.pipeline.code import stage_code

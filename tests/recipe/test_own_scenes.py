@@ -13,8 +13,8 @@ import yaml
 from iowbc.commands.schema import recipe_schema
 from iowbc.errors import RecipeError
 from iowbc.pipeline.nested import nested
+from iowbc.recipe.reading.document import as_yaml
 from iowbc.recipe.reading.loading import load_recipe
-from iowbc.recipe.reading.writing import as_yaml
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
 

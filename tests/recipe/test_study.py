@@ -29,15 +29,13 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_variants_lie_beside_the_file_and_take_the_overrides(folder: Path) -> None:
-    study = load_study(write(folder, "description: both\nvariants: [full, wo_rg.yaml]\n"), ["eval.trials=2"])
-    assert study is not None
-    assert study.name == "paper"
-    assert [variant.recipe.name for variant in study.variants] == ["full", "wo_rg"]
-    assert {variant.recipe.eval.trials for variant in study.variants} == {2}
+    variants = load_study(write(folder, "description: both\nvariants: [full, wo_rg.yaml]\n"), ["eval.trials=2"])
+    assert [variant.recipe.name for variant in variants] == ["full", "wo_rg"]
+    assert {variant.recipe.eval.trials for variant in variants} == {2}
 
 
-def test_a_recipe_proper_is_none(folder: Path) -> None:
-    assert load_study(folder / "full.yaml") is None
+def test_a_recipe_proper_has_no_variants(folder: Path) -> None:
+    assert load_study(folder / "full.yaml") == ()
 
 
 def test_what_is_wrong_is_named_with_its_place(folder: Path) -> None:

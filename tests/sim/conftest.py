@@ -8,7 +8,7 @@ import pytest
 from changes import changed
 
 from iowbc.control.arms import ArmKinematics
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import Robot
 from iowbc.sim import world
 from iowbc.sim.simulation import Simulation

@@ -5,7 +5,7 @@ import pytest
 from changes import changed
 from stepping import run
 
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 
 
 def test_an_impulse_brings_its_momentum(start, calm):

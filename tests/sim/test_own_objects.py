@@ -12,7 +12,7 @@ import pytest
 from iowbc.errors import UsageError
 from iowbc.recipe.beside import MeshFile
 from iowbc.recipe.simulation.scene import Object, Scene, Size
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.shapes import measured
 from iowbc.sim.simulation import Simulation

@@ -7,8 +7,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from iowbc.recipe.simulation.holding import HOLDABLE, Held
 from iowbc.recipe.simulation.partner import BEHAVIOURS, TRAINED, Behaviours
-from iowbc.recipe.simulation.partner import Partner as Recipe
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.sim.episode_draws import Draws
 from iowbc.sim.partner import Partner
 from iowbc.sim.state import SimulationState
@@ -23,7 +23,7 @@ class Handle:
     """Partners of one box whose motion is prescribed."""
 
     def __init__(self, robot, behaviour, *, share=0.4, recipe=None, **held):
-        simulation = Simulation() if recipe is None else recipe
+        simulation = SimulationSettings() if recipe is None else recipe
         scenes = [simulation.scenes.lift]
         draws = Draws(simulation, scenes, robot)
         held = {"partner_noise": 0.0, "partner_share_drift": 0.0, "partner_pace": 1.0, "partner_delay": 0.0} | held
@@ -111,7 +111,7 @@ def test_an_absent_partner_intends_and_exerts_nothing(robot):
 
 def test_training_draws_behaviours_by_their_shares_and_never_those_of_evaluation(robot):
     shares = Behaviours(path=0.0, follower=3.0, leader=1.0, stopping=0.0)
-    recipe = changed(Simulation(), "partner.behaviours", shares)
+    recipe = changed(SimulationSettings(), "partner.behaviours", shares)
     n = 4000
     draws = Draws(recipe, [recipe.scenes.lift] * n, robot)
     draws.draw(np.arange(n), np.arange(n, dtype=np.uint64), {})
@@ -122,7 +122,7 @@ def test_training_draws_behaviours_by_their_shares_and_never_those_of_evaluation
 
 
 def test_behaviours_leave_all_other_draws_as_they_are(robot):
-    recipe, key = Simulation(), np.arange(50, dtype=np.uint64)
+    recipe, key = SimulationSettings(), np.arange(50, dtype=np.uint64)
     drawn = []
     for shares in (Behaviours(), Behaviours(leader=2.0)):
         draws = Draws(changed(recipe, "partner.behaviours", shares), [recipe.scenes.lift] * 50, robot)

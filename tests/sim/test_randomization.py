@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from changes import changed
 
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 
 COUNT = 64
 

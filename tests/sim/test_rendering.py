@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stepping import run
 
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.sim.rendering import appearance as look
 from iowbc.sim.rendering import backend as headless
 from iowbc.sim.rendering.forces import COLOURS, SMALLEST_FORCE

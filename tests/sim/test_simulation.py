@@ -6,7 +6,7 @@ from changes import changed
 from stepping import run
 
 from iowbc import counter_random as random
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.sim.divergence import Divergence, replay
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.timing import Timing

@@ -13,11 +13,12 @@ from iowbc.recipe.section import Section, deciding
 from iowbc.stages import eval as evaluate
 from iowbc.stages.registry import STAGES
 
-SIMULATING = {"teacher", "distill", "eval", "export"}
+SKILL = {"skill", "skill-eval"}
+SIMULATING = {"teacher", "distill", "eval", "export", *SKILL}
 ALL = {"rg-dataset", "rg-fit", *SIMULATING}
 MOVED = {
     "name": {"export"},
-    "seed": {"rg-dataset", "rg-fit", "teacher", "distill", "export"},
+    "seed": {"rg-dataset", "rg-fit", "teacher", "distill", "export", "skill"},
     "rg.method": {"rg-dataset"},
     "rg.height": ALL,
     "rg.sampling": {"rg-dataset", "rg-fit"},
@@ -35,6 +36,11 @@ MOVED = {
     "distill": {"distill"},
     "eval": {"eval"},
     "export": {"export"},
+    "export.opset": {"export", "skill"},
+    "skill": SKILL,
+    "skill.learning": {"skill"},
+    "skill.eval": {"skill-eval"},
+    "skill.partners.held_out": {"skill-eval"},
 }
 """Stages whose own values change with a part of the recipe; the longest name that fits counts."""
 COSMETIC = {
@@ -52,6 +58,9 @@ COSMETIC = {
     "eval.success.capacity_rate",
     "eval.video",
     "export.timing_steps",
+    "skill.learning.checkpoint_every",
+    "skill.eval.others",
+    "skill.eval.games",
 }
 """Parts that move no key: they say how it is shown or carried out. (The robot's files count, not their folder.)"""
 

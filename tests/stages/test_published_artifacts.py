@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from iowbc.cli import app
-from iowbc.commands.named import named
+from iowbc.commands.lookup import named
 from iowbc.commands.play import playable
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
@@ -31,6 +31,7 @@ PUBLISHED_TO = {
     "wo_distill": "eval",
     "blind": "export",
     "compliant": "export",
+    "transport": "skill-eval",
 }
 
 

@@ -193,9 +193,7 @@ def test_a_student_of_any_history_can_be_made(length: int) -> None:
 
 
 def test_the_papers_recipe_compares_them() -> None:
-    study = load_study(RECIPES / "paper.yaml")
-    assert study is not None
-    labels = tuple(dict.fromkeys(variant.recipe.eval.label for variant in study.variants))
+    labels = tuple(dict.fromkeys(variant.recipe.eval.label for variant in load_study(RECIPES / "paper.yaml")))
     assert labels == (*VARIANTS_OF_THE_PAPER, "IO-WBC, blind")
 
 

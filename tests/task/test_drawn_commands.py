@@ -8,10 +8,10 @@ import pytest
 from task_worlds import rollout
 
 from iowbc import counter_random as random
-from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, VELOCITY, approach, rate_limits
+from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, VELOCITY, approach, nominal_command, rate_limits
 from iowbc.recipe.task.commands import CommandRates, Commands
 from iowbc.recipe.task.curriculum import Curriculum
-from iowbc.task.commands.drawing import draw_goals, draw_holding_time, nominal_command
+from iowbc.task.commands.drawing import draw_goals, draw_holding_time
 from iowbc.task.commands.script import CommandScript, CommandSegment
 from iowbc.task.curriculum import difficulty
 from iowbc.task.vector.vector_env import VectorEnv

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from task_worlds import QUIET, rollout, same
 
-from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.control.command import HEIGHT, OFFSET, PITCH, nominal_command
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.joint_references import ArmReference, References
 from iowbc.robot.description import Robot
-from iowbc.task.commands.drawing import nominal_command
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 

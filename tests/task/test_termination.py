@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from task_worlds import QUIET
 
-from iowbc.recipe.task.termination import Termination
+from iowbc.recipe.task.task import Termination
 from iowbc.task.endings import dropped, fallen, lagging
 from iowbc.task.vector.vector_env import VectorEnv
 

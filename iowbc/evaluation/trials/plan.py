@@ -10,7 +10,7 @@ from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
-from iowbc.recipe.evaluation.suites import EIGHT, Case, Sweep
+from iowbc.recipe.evaluation.suites import EIGHT, Case, MassSweep
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.recipe.simulation.partner import BEHAVIOURS
@@ -160,7 +160,7 @@ def _planned(cells: Callable[[Recipe], Iterator[TrialCell]]) -> Callable[[Recipe
     return trials
 
 
-def held_fixed(part: Sweep | Case, partner_share: float | None, *, disturbed: bool) -> dict[str, float]:
+def held_fixed(part: MassSweep | Case, partner_share: float | None, *, disturbed: bool) -> dict[str, float]:
     """The randomised quantities that a sweep or a case holds, by name."""
     held = {} if disturbed else dict(UNDISTURBED)
     if part.rolling_resistance is not None:
@@ -176,7 +176,7 @@ class PlannedSweep:
 
     recipe: Recipe
     kind: str
-    sweep: Sweep
+    sweep: MassSweep
     """As it is with that share (`Sweep.at`)."""
     disturbed: bool
     """True where impulses and pushes act."""

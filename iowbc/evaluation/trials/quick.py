@@ -10,7 +10,7 @@ from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, Trial, script_for
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import measure_of, trial_row
-from iowbc.recipe.check import Check
+from iowbc.recipe.teacher import Check
 from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv

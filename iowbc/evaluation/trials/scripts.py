@@ -6,10 +6,10 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, rate_limits
-from iowbc.recipe.evaluation.scripts import DrawnScripts, Range
+from iowbc.control.command import COMMAND, nominal_command, rate_limits
+from iowbc.recipe.evaluation.segment import DrawnScripts
+from iowbc.recipe.section import Range
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.drawing import nominal_command
 from iowbc.task.commands.script import CommandScript, CommandSegment
 
 WORDS = 256

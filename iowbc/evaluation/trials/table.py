@@ -10,7 +10,7 @@ from iowbc.arrays import Array
 from iowbc.evaluation.trials.metrics import Measure, Met, trial_metrics
 from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.recipe.evaluation.success import Success
+from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import GRAVITY, Robot

@@ -1,22 +1,108 @@
-"""What is evaluated: the suites of trials, their world, and what counts as success."""
+"""Evaluation: the suites of trials, their world, and the films of them."""
 
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.evaluation.compliance import Compliance
+from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.evaluation.model_based import ModelBased
-from iowbc.recipe.evaluation.probe import Probe
 from iowbc.recipe.evaluation.public import PublicController
-from iowbc.recipe.evaluation.push_map import PushMap
-from iowbc.recipe.evaluation.scripts import DrawnScripts
-from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.success import Success
-from iowbc.recipe.evaluation.suites import HeavyCase, Robustness, Stagnation, Sweep
-from iowbc.recipe.evaluation.trial_scenes import SIZES, TrialScene
-from iowbc.recipe.evaluation.video import Video
+from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
+from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
-from iowbc.recipe.simulation.simulation import Simulation
+from iowbc.recipe.simulation.scene import Object, Scene
+from iowbc.recipe.simulation.simulation import SimulationSettings
+
+
+class Success(Section):
+    """Survival: no fall and nothing dropped, by `task.termination`, for the whole trial. Success: survival and
+    transport of what the hands carry or do not lose; beside a partner also bounded force; where a push is infeasible,
+    survival, posture, feet that stay and a push that goes on. A robot that stands still never succeeds."""
+
+    slip_fails: bool = False
+    """Also count a trial as failed in which a hand ever lost the object, even though the other kept it."""
+    transport: float = Field(default=0.5, ge=0, le=1)
+    """Part of the commanded displacement that robot and object must cover; a robot that stands still covers none."""
+    weight_in_hands: float = Field(default=0.95, ge=0, le=1)
+    """Part of a held object's weight, less the partner's share, that must rest in the hands on average; the rest lies
+    on thighs or torso."""
+    least_weight: float = Field(default=5.0, ge=0)
+    """Weight on the robot under which nobody asks where it rests [N]: a box of 0.05 kg weighs a tenth of this, and a
+    touch of the torso is several times its weight."""
+    object_beside: float = Field(default=0.35, gt=0, json_schema_extra=LATER)
+    """A pushed object that is ever further than this to the robot's side is lost [m]: the middle of the hands is then
+    past the edge of a crate that is 0.6 m wide. A held one may be as far from its place (`object_distance`)."""
+    push_force: float = Field(default=0.5, ge=0, le=1)
+    """Part of what friction allows that the hands push with in a stagnating push that is a success. Friction allows
+    μ times the vertical force of the ground on both feet, or the crate's rolling resistance where that is smaller;
+    both forces are averaged over a gait period."""
+    push_time: float = Field(default=0.5, ge=0, le=1)
+    """Part of the time in which steps are commanded for which they have to push so."""
+    foot_slide: float = Field(default=0.1, gt=0)
+    """Largest mean speed at which the loaded soles slide, both feet together, in a stagnating push that is a success
+    [m/s]: twice that of a robot that walks."""
+    handle_force: float = Field(default=50.0, gt=0)
+    """Largest 95th percentile of the horizontal force between partner and object in a trial of compliance that is a
+    success [N]: a little above the 40 N of a firm pull of one arm, well below the 80 N at which the partner's own
+    arms give in."""
+    hand_force: float = Field(default=90.0, gt=0)
+    """Largest 95th percentile of the horizontal force at either hand before a blocked crate in such a trial [N]. Both
+    together then push with 180 N at most, half of what the best ground of training (friction 1.2) allows."""
+    least_push: float = Field(default=20.0, ge=0)
+    """Least mean force of both hands before a blocked crate in such a trial, while steps are commanded [N]: a robot
+    that does not push has nothing to yield to."""
+    compliance_transport: float = Field(default=0.25, ge=0, le=1)
+    """Part of the commanded displacement that robot and object must cover in such a trial: half of `transport`, for the
+    partner stops, lags and leads elsewhere."""
+    posture_pitch: float = Field(default=0.3, gt=0)
+    """Largest mean error of the torso pitch of a stagnating push that is a success [rad]; twice the paper's E_α."""
+    posture_height: float = Field(default=0.05, gt=0)
+    """Largest mean error of the height of a stagnating push that counts as success [m]; 2.5 times the paper's E_h."""
+    capacity_rate: float = Field(default=0.8, gt=0, le=1, json_schema_extra=COSMETIC)
+    """Success rate that a mass, and every lighter one, must reach to count as carried (load capacity)."""
+
+
+class Video(Section):
+    """Short films of trials."""
+
+    count: int = Field(default=2, ge=0, le=1000)
+    """Number of films, spread over the sweeps' masses; 0 makes none."""
+    width: int = Field(default=640, ge=64, le=3840, multiple_of=16)
+    """Width of a frame [pixel]; video codecs want multiples of 16."""
+    height: int = Field(default=480, ge=64, le=2160, multiple_of=16)
+    """Height of a frame [pixel]."""
+    fps: int = Field(default=20, ge=1, le=50)
+    """Frames per second; a frame takes 0.1 to 0.2 s to draw without a graphics card."""
+    duration: float = Field(default=12.0, gt=0)
+    """Longest film [s]."""
+    traces: bool = True
+    """Draw scene, mass, time and command into the frames."""
+
+
+class TrialScene(Section):
+    """A scene beside those of the training. What the policy observes does not change with it."""
+
+    scene: Scene
+    """The object and how it is held; it may also replace a scene of the training."""
+    wrists: tuple[float, float, float]
+    """Base grasp: left wrist from the pelvis, heading frame [m]; as an entry of `task.references.grasps`."""
+    load: float | None = Field(default=0.0, ge=0.0)
+    """Load that the arms expect to carry [kg], as an entry of `task.references.loads`; empty takes that of `lift`."""
+
+
+BESIDE = 0.035
+"""Distance of a wrist from the side of the box in its hands [m], in the scene `lift`."""
+
+
+def box(width: float) -> TrialScene:
+    """The box of the scene `lift` in another width [m], held as there."""
+    thing = Object(shape="box", size=(0.30, width, 0.30), mass=7.0)
+    return TrialScene(scene=Scene(kind="lift", object=thing), wrists=(0.30, width / 2 + BESIDE, 0.26), load=None)
+
+
+SIZES = {"narrow_box": box(0.2), "wide_box": box(0.45)}
+"""Boxes beyond the training's 0.25 m."""
+
 
 SceneName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 
@@ -25,8 +111,8 @@ class Evaluation(Section):
     """Trials of the trained policy."""
 
     policy: Literal["student", "teacher", "model", "public"] = "student"
-    """What acts: the deployable student, the teacher with its privileged observation, the quadratic program of `model`,
-    which nothing is trained for, or the controller of `public`, which others trained."""
+    """The acting policy: the deployable student, the teacher with its privileged observation, the quadratic program of
+    `model`, which nothing is trained for, or the controller of `public`, which others trained."""
     model: ModelBased = Field(default=ModelBased(), json_schema_extra=LATER)
     """The model-based rival: tasks and limits of its quadratic program."""
     public: PublicController | None = Field(default=None, json_schema_extra=LATER)
@@ -46,7 +132,7 @@ class Evaluation(Section):
     scripts: DrawnScripts | None = None
     """Scripts drawn trial by trial for every sweep and case without a sequence; empty takes the fixed sequence of
     lifting or pushing."""
-    simulation: Simulation | None = None
+    simulation: SimulationSettings | None = None
     """The world of all trials; empty is the training's. Pinned (`{}` to the default), variants that were trained
     in other worlds meet the same trials."""
     scenes: dict[SceneName, TrialScene] = Field(default=SIZES)
@@ -56,11 +142,11 @@ class Evaluation(Section):
     same bit for bit when it is played again alone; another size rounds differently."""
     foot_load: float = Field(default=50.0, gt=0)
     """Vertical force from which a foot counts as loaded when its sliding is measured [N]; 15 % of the weight."""
-    lifting: Sweep | None = Sweep()
+    lifting: MassSweep | None = MassSweep()
     """Masses lifted (paper's Table II); empty leaves the sweep out."""
-    pushing: Sweep | None = None
+    pushing: MassSweep | None = None
     """Masses pushed (paper's Table III), with a rolling resistance; empty leaves the sweep out."""
-    squeezing: Sweep | None = None
+    squeezing: MassSweep | None = None
     """Masses held between the palms by friction alone, in a scene such as `squeeze`; empty leaves the sweep out."""
     heavy: tuple[HeavyCase, ...] = ()
     """The paper's heavy tasks: 7 kg box, 18 kg tyre, 65 kg crate with a partner."""
@@ -77,6 +163,10 @@ class Evaluation(Section):
     disturbances: bool = False
     """Keep the impulses on the object and the pushes on the base during trials, at their nominal strength. Trials of
     `compliance` and those of planned pushes are without them."""
+    engine: Literal["mujoco", "drake"] = Field(default="mujoco", json_schema_extra=LATER)
+    """Physics engine of the trials. Drake, which is an extra, plays the same trials of a policy trained in MuJoCo."""
+    drake: Drake = Field(default=Drake(), json_schema_extra=LATER)
+    """How Drake integrates."""
     success: Success = Success()
     """When a trial counts as survived."""
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
@@ -106,12 +196,12 @@ class Evaluation(Section):
         return self
 
     @property
-    def sweeps(self) -> dict[str, Sweep]:
+    def sweeps(self) -> dict[str, MassSweep]:
         """The sweeps, by what is done with the objects."""
         asked = {"lifting": self.lifting, "pushing": self.pushing, "squeezing": self.squeezing}
         return {kind: sweep for kind, sweep in asked.items() if sweep is not None}
 
     @property
     def measured(self) -> bool:
-        """Whether there are trials whose errors are measured: a probe has none."""
+        """True where there are trials whose errors are measured: a probe has none."""
         return any((self.sweeps, self.heavy, self.stagnation, self.robustness, self.compliance, self.map))

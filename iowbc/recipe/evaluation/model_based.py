@@ -36,8 +36,8 @@ class Estimation(Section):
     model_error: Positive = 3.0
     """Standard deviation of what the planned acceleration misses in a control period [rad/s²]."""
     load_drift: Positive = 5.0
-    """How fast what the plan misses steadily may change, such as a load's doing [rad/s² per √s]. The estimate takes it
-    into account, the program does not."""
+    """Speed at which what the plan misses steadily may change, such as a load's doing [rad/s² per √s]. The estimate
+    takes it into account, the program does not."""
 
 
 class ModelBased(Section):
@@ -64,7 +64,7 @@ class ModelBased(Section):
     lead: NonNegative = 0.02
     """Time by which the program looks ahead [s]: the mean latency of sensors and actions together, as drawn."""
     estimation: Estimation = Estimation()
-    """How it estimates its motion."""
+    """Estimation of its motion."""
     friction: Positive = 0.5
     """Friction coefficient of the soles that the program may use; the least that the simulation draws."""
     sole_fraction: Share = 0.9

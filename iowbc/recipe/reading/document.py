@@ -1,4 +1,4 @@
-"""A YAML file as a tree that remembers where each value stands."""
+"""A YAML file as a tree that remembers where each value stands, and a resolved recipe as YAML."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import yaml
+from pydantic import BaseModel
 
 from iowbc.errors import Problem, RecipeError, shown
 
@@ -51,7 +52,7 @@ IMPLICIT = (
         list("-+.0123456789"),
     ),
 )
-"""What bare words are that are no text: tag, pattern, and the characters that they begin with."""
+"""Bare words that are no text: tag, pattern, and the characters that they begin with."""
 for _tag, _pattern, _first in IMPLICIT:
     _Loader.add_implicit_resolver(_tag, _pattern, _first)
 
@@ -101,7 +102,7 @@ def _limit_depth(text: str, place_of: PlaceOf) -> None:
 
 
 def _is_tab(text: str, mark: yaml.Mark) -> bool:
-    """Whether a mark of PyYAML's stands at a tab."""
+    """True where a mark of PyYAML's stands at a tab."""
     lines = text.splitlines()
     return mark.line < len(lines) and lines[mark.line][mark.column : mark.column + 1] == "\t"
 
@@ -205,3 +206,16 @@ def leaves(tree: Located, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
         yield path, tree
     for name, entry in entries:
         yield from leaves(entry, (*path, name))
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Puts in quotes what any version of YAML reads as something else than text: PyYAML alone leaves `1e3` bare."""
+
+
+for _tag, _pattern, _first in IMPLICIT:
+    _Dumper.add_implicit_resolver(_tag, _pattern, _first)
+
+
+def as_yaml(recipe: BaseModel) -> str:
+    """Every field with its value, in the order of the recipe's sections."""
+    return str(yaml.dump(recipe.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False))

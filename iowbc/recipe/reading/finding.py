@@ -1,4 +1,4 @@
-"""Where a recipe that is named on the command line lies."""
+"""The file of a recipe that is named on the command line."""
 
 import os
 from collections.abc import Iterator

@@ -7,12 +7,44 @@ from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.files import read_limited
-from iowbc.recipe.reading.beside import with_files
-from iowbc.recipe.reading.document import Located, leaves, merged, read_document
+from iowbc.recipe.beside import FileBeside
+from iowbc.recipe.reading.document import Located, leaves, located, merged, read_document
 from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in, known_files, recipe_file
 from iowbc.recipe.reading.overrides import overridden
-from iowbc.recipe.reading.validation import validate
+from iowbc.recipe.reading.validation import models_at, validate
 from iowbc.recipe.recipe import Recipe
+
+
+def with_files(tree: Located, folder: Path) -> Located:
+    """The tree with each named file as it is now; paths are taken from the recipe's file that says them.
+
+    `folder`: from where those are taken that are said on the command line. Raises `RecipeError`.
+    """
+    problems = []
+    for path, leaf in leaves(tree):
+        kinds = [model for model in models_at(path) if issubclass(model, FileBeside)]
+        if not kinds or not isinstance(leaf.value, str):
+            continue
+        below = folder if leaf.place.startswith("--set ") else Path(leaf.place.rsplit(":", 2)[0]).parent
+        file = below / leaf.value
+        try:
+            taken = kinds[0].taken_in(file, leaf.value)
+        except ValueError as error:
+            problems.append(Problem(leaf.place, f"key '{'.'.join(path)}' = {shown(leaf.value)}: {error}"))
+            continue
+        tree = _replaced(tree, path, located(taken.model_dump(mode="json"), leaf.place))
+    if problems:
+        raise RecipeError(problems)
+    return tree
+
+
+def _replaced(tree: Located, path: tuple[str, ...], value: Located) -> Located:
+    if not path:
+        return value
+    assert isinstance(tree.value, dict)
+    entries = {**tree.value, path[0]: _replaced(tree.value[path[0]], path[1:], value)}
+    return Located(entries, tree.place)
+
 
 LARGEST_FILE = 1_000_000
 """Bytes of the largest recipe that is read."""
@@ -35,7 +67,7 @@ class LoadedRecipe:
     """Place of each value that a file or an override wrote, by dotted path."""
 
     def place(self, path: str) -> str:
-        """Where the value at a dotted path was written (`file:line:column`, `--set ...`), or `default`."""
+        """Place where the value at a dotted path was written (`file:line:column`, `--set ...`), or `default`."""
         parts = path.split(".")
         for length in range(len(parts), 0, -1):
             found = self.places.get(".".join(parts[:length]))
@@ -117,7 +149,8 @@ def read_text(file: str, place: str) -> str:
 
 
 def _listed(missing: Path) -> str:
-    """What there is instead: the files beside it, where one with an ending was asked for, and recipes by name."""
+    """Alternatives to a missing file: the files beside it, where one with an ending was asked for, and recipes by
+    name."""
     folder, with_ending = missing.parent, missing.suffix in SUFFIXES
     beside = sorted(found.name for found in folder.glob("*.yaml")) if with_ending and folder.is_dir() else []
     elsewhere = list(dict.fromkeys(found.name for found in known_files() if found.parent != folder))

@@ -1,13 +1,10 @@
 """`--set a.b.c=value`: single values of a recipe changed on the command line."""
 
-from collections.abc import Mapping, Sequence
-
-from pydantic import BaseModel
+from collections.abc import Sequence
 
 from iowbc.errors import Problem, RecipeError, shown
-from iowbc.recipe.reading.document import MAXIMUM_DEPTH, Located, located, merged, read_value
-from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.section import Section
+from iowbc.recipe.reading.document import MAXIMUM_DEPTH, Located, merged, read_value
+from iowbc.recipe.reading.validation import defaults
 
 
 def overridden(tree: Located, overrides: Sequence[str]) -> Located:
@@ -49,13 +46,7 @@ def _replaced(tree: Located, path: tuple[str, ...], value: Located, place: str, 
 
 def _default(path: tuple[str, ...], place: str) -> Located:
     """The list that a recipe has at a path when it says nothing there; anything else starts empty."""
-    value: object = Recipe(name="default")
+    found: Located | None = defaults()
     for name in path:
-        if isinstance(value, Mapping):
-            value = value.get(name)
-        else:
-            value = getattr(value, name) if isinstance(value, Section) and name in type(value).model_fields else None
-    if not isinstance(value, (list, tuple)):
-        return Located({}, place)
-    items = [item.model_dump(mode="json") if isinstance(item, BaseModel) else item for item in value]
-    return Located([located(item, "default") for item in items], place)
+        found = found.value.get(name) if found is not None and isinstance(found.value, dict) else None
+    return found if found is not None and isinstance(found.value, list) else Located({}, place)

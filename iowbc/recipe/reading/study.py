@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, shown
@@ -17,24 +16,15 @@ KEYS = ("name", "description", "variants")
 """All that such a file holds; everything else belongs to the variants."""
 
 
-@dataclass(frozen=True)
-class Study:
-    """Recipes that belong together."""
-
-    name: str
-    file: Path
-    variants: tuple[LoadedRecipe, ...]
-
-
-def load_study(word: str | Path, overrides: Sequence[str] = ()) -> Study | None:
-    """The recipes that a file names, each with the overrides; None for a recipe proper. Raises `RecipeError`.
+def load_study(word: str | Path, overrides: Sequence[str] = ()) -> tuple[LoadedRecipe, ...]:
+    """The variants that a file names, each with the overrides; none for a recipe proper. Raises `RecipeError`.
 
     A variant is named as on the command line, or relative to the file.
     """
     file = recipe_file(word)
     tree = read_document(read_text(str(file), f"{file}:1:1"), str(file))
     if not isinstance(tree.value, dict) or "variants" not in tree.value:
-        return None
+        return ()
     entries = tree.value
     problems = [
         Problem(entry.place, f"key '{key}': a recipe that names variants holds {', '.join(KEYS)} alone")
@@ -55,7 +45,7 @@ def load_study(word: str | Path, overrides: Sequence[str] = ()) -> Study | None:
     if repeated:
         text = f"key 'variants': {', '.join(repeated)} is the name of more than one; give each its own"
         raise RecipeError([Problem(entries["variants"].place, text)])
-    return Study(str(name), file, variants)
+    return variants
 
 
 def _files(variants: Located, file: Path, problems: list[Problem]) -> list[Path]:

@@ -12,13 +12,13 @@ from pydantic_core import ErrorDetails
 from iowbc.errors import PROBLEMS_TOLD, Problem, RecipeError, nearest, shown
 from iowbc.recipe.reading.document import Located, leaves, located, merged, plain
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.section import Named, Unfitting
+from iowbc.recipe.section import NamedEntries, Unfitting
 
 LARGEST_NUMBER = 1e12
 """No quantity, size or count of a recipe is larger."""
 
 SEVERAL = re.compile(r"[^,],[^,]|\d\.\.\d")
-"""What reads as more than one value: `1,2` or `0..4`."""
+"""Text that reads as more than one value: `1,2` or `0..4`."""
 
 
 def validate(tree: Located) -> Recipe:
@@ -27,30 +27,27 @@ def validate(tree: Located) -> Recipe:
 
     Raises `RecipeError` with all problems.
     """
-    whole = merged(_defaults(), _opened(tree, _defaults()))
+    whole = merged(defaults(), _opened(tree, defaults()))
     try:
         recipe = Recipe.model_validate(plain(whole))
     except ValidationError as error:
         errors = error.errors(include_url=False)
         raise RecipeError(_problems(whole, errors), max(0, len(errors) - PROBLEMS_TOLD)) from None
-    booleans = [
-        Problem(found.place, f"key '{'.'.join(path)}' = {found.value}: should be a number, not true or false")
-        for path, found in leaves(tree)
-        if isinstance(found.value, bool) and type(_value_at(recipe, path)) in (int, float)
-    ]
-    absurd = [
-        Problem(found.place, f"key '{'.'.join(path)}' = {shown(found.value)}: is larger than any number of a recipe")
-        for path, found in leaves(tree)
-        if isinstance(found.value, (int, float)) and abs(found.value) > LARGEST_NUMBER
-    ]
-    if booleans or absurd:
-        raise RecipeError(booleans + absurd)
+    problems = []
+    for path, found in leaves(tree):
+        head = f"key '{'.'.join(path)}' = {shown(found.value)}"
+        if isinstance(found.value, bool) and type(_value_at(recipe, path)) in (int, float):
+            problems.append(Problem(found.place, f"{head}: should be a number, not true or false"))
+        elif isinstance(found.value, (int, float)) and abs(found.value) > LARGEST_NUMBER:
+            problems.append(Problem(found.place, f"{head}: is larger than any number of a recipe"))
+    if problems:
+        raise RecipeError(problems)
     return recipe
 
 
 @functools.cache
-def _defaults() -> Located:
-    """What a recipe says that says nothing; only its name has to be given."""
+def defaults() -> Located:
+    """A recipe that says nothing, but for its name, which has to be given."""
     return located(Recipe(name="default").model_dump(mode="json", exclude={"name"}), "default")
 
 
@@ -145,7 +142,7 @@ def _problem(tree: Located, error: ErrorDetails) -> tuple[str, str, str]:
 def _meant(path: Sequence[str]) -> str:
     """`; did you mean 'x'?` where an entry of a recipe's own lacks something and its name is nearly a known one."""
     for model in models_at(path[:-1]) if path else ():
-        if issubclass(model, Named) and path[-1] not in model.model_fields:
+        if issubclass(model, NamedEntries) and path[-1] not in model.model_fields:
             return nearest(path[-1], model.model_fields)
     return ""
 
@@ -172,31 +169,31 @@ def models_at(path: Sequence[str]) -> list[type[BaseModel]]:
     return [model for candidate in candidates for model in _models(candidate)]
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    elif get_origin(annotation) in (Union, types.UnionType):
+def _alternatives(annotation: Any) -> Iterator[Any]:
+    """The members of a union; of anything else itself, without its marks."""
+    if get_origin(annotation) in (Union, types.UnionType):
         for member in get_args(annotation):
-            yield from _models(member)
+            yield from _alternatives(member)
     elif get_origin(annotation) is Annotated:
-        yield from _models(get_args(annotation)[0])
+        yield from _alternatives(get_args(annotation)[0])
+    else:
+        yield annotation
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    return [one for one in _alternatives(annotation) if isinstance(one, type) and issubclass(one, BaseModel)]
 
 
 def _inside(annotation: Any, name: str) -> Iterator[Any]:
     """Annotations of what `name` leads to inside a value of an annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        if name in annotation.model_fields:
-            yield annotation.model_fields[name].annotation
-        elif issubclass(annotation, Named):
-            yield annotation.own_type()
-    elif get_origin(annotation) in (Union, types.UnionType):
-        for member in get_args(annotation):
-            yield from _inside(member, name)
-    elif get_origin(annotation) is Annotated:
-        yield from _inside(get_args(annotation)[0], name)
-    else:
-        arguments = [argument for argument in get_args(annotation) if argument is not Ellipsis]
-        yield from arguments[-1:]
+    for model in (models := _models(annotation)):
+        if name in model.model_fields:
+            yield model.model_fields[name].annotation
+        elif issubclass(model, NamedEntries):
+            yield model.own_type()
+    for collection in _alternatives(annotation):
+        if collection not in models:
+            yield from [argument for argument in get_args(collection) if argument is not Ellipsis][-1:]
 
 
 @functools.cache

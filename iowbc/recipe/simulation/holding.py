@@ -4,9 +4,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from iowbc.recipe.simulation.distribution import Distribution
-from iowbc.recipe.simulation.partner import BEHAVIOURS, Leader, Partner, Stopping
-from iowbc.recipe.simulation.randomization import Randomization
+from iowbc.recipe.simulation.partner import BEHAVIOURS, Leader, PartnerSettings, Stopping
+from iowbc.recipe.simulation.randomization import Distribution, Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
 SCENES = tuple(Scenes.model_fields)
@@ -23,7 +22,7 @@ HOLDABLE = (
     *(name for name, field in Randomization.model_fields.items() if field.annotation is Distribution),
     *(
         f"partner_{name}"
-        for name, field in Partner.model_fields.items()
+        for name, field in PartnerSettings.model_fields.items()
         if field.annotation is Distribution and name != "push_share"  # in a push it is drawn as the partner's share
     ),
     *(
@@ -62,8 +61,10 @@ def _behaviour_by_name(held: Any) -> Any:
     return held | {"partner_behaviour": float(BEHAVIOURS.index(name))}
 
 
+WITH_OBJECT = AfterValidator(_with_object)
+"""Marks the fields that name a scene with an object."""
 ObjectScene = Annotated[
-    str, AfterValidator(_with_object), Field(json_schema_extra={"examples": [name for name in SCENES if name != FREE]})
+    str, WITH_OBJECT, Field(json_schema_extra={"examples": [name for name in SCENES if name != FREE]})
 ]
 """A scene with an object; which ones there are, the recipe says."""
 Held = Annotated[dict[str, float], AfterValidator(_known_quantities), BeforeValidator(_behaviour_by_name)]

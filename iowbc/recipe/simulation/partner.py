@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, field_validator, model_validator
 
 from iowbc.recipe.section import LATER, Section
-from iowbc.recipe.simulation.distribution import Distribution
+from iowbc.recipe.simulation.randomization import Distribution
 
 LONGEST_DELAY = 10.0
 """Commands of so long a time are remembered at most [s]."""
@@ -16,7 +16,7 @@ BEHAVIOURS = (*TRAINED, "tugging", "lagging")
 
 
 class Behaviours(Section):
-    """How often a partner behaves in which way; only the proportions matter. An absent partner has the share 0."""
+    """Shares of the behaviours of a partner; only the proportions matter. An absent partner has the share 0."""
 
     path: float = Field(default=1.0, ge=0.0)
     """Follows the commanded motion and height from where the episode began, wherever the robot is."""
@@ -82,7 +82,7 @@ class Lagging(Section):
     """Part of the drawn damping that it has."""
 
 
-class Partner(Section):
+class PartnerSettings(Section):
     """A compliant carrier: a spring, a damper and a preload at the far handle. Its behaviour decides where it goes."""
 
     enabled: bool = True
@@ -133,6 +133,9 @@ class Partner(Section):
     one another."""
     strongest: float = Field(default=80.0, ge=0.0)
     """Bound on the force of spring and damper, horizontal and vertical [N]."""
+    hand_distance: float = Field(default=0.25, gt=0.0, json_schema_extra=LATER)
+    """Distance of the partner's hands from the middle between them [m], at which their springs turn the object; used
+    where the partner is steered."""
     push_yielding: float = Field(default=0.5, ge=0.0)
     """Bound on that force in a push, as a part of the partner's share of the resistance: who helps does not do it
     all."""

@@ -5,13 +5,13 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from iowbc.recipe.beside import MeshFile
-from iowbc.recipe.section import LATER, Named, Section
+from iowbc.recipe.section import LATER, NamedEntries, Section
 
 Size = tuple[float, float, float]
 
 
 class Grasp(Section):
-    """How the hands hold an object."""
+    """Hold of the hands on an object."""
 
     kind: Literal["compliant", "contact"] = "compliant"
     """A compliant connection that lets go above its slip force, or frictional squeeze between two palms."""
@@ -91,9 +91,9 @@ class Scene(Section):
     object: Object | None = None
     """The object; none in a free scene."""
     grasp: Grasp = Grasp()
-    """How an object is held in a lift scene."""
+    """Hold on the object in a lift scene."""
     palm: tuple[float, float, float] = (0.0, -0.03, 0.0)
-    """Where the left palm touches an object, from the grip in the hand's frame [m]; the right one mirrors it."""
+    """Place where the left palm touches an object, from the grip in the hand's frame [m]; the right one mirrors it."""
     gap: float = Field(default=0.01, ge=0.0)
     """Distance from the palms to the crate's face at the start of a push [m]."""
     palm_radius: float = Field(default=0.03, gt=0.0)
@@ -113,7 +113,7 @@ class Scene(Section):
         return self
 
 
-class Scenes(Named):
+class Scenes(NamedEntries):
     """The scenes by name; a recipe may add its own, with `task.references.grasps` and `.loads` of the same name."""
 
     __pydantic_extra__: dict[str, Scene] = Field(init=False)

@@ -4,14 +4,13 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Range, Section
 
-Range = tuple[float, float]
 Vector = tuple[float, float, float]
 
 
 class CommandRates(Section):
-    """How fast a command may change; a new value is approached at this rate."""
+    """Rate limits of a command; a new value is approached at this rate."""
 
     velocity: float = Field(default=1.0, gt=0.0)
     """Change of the planar velocity, per axis [m/s²]."""
@@ -89,11 +88,7 @@ class Commands(Section):
     """Rate limits."""
 
     @model_validator(mode="after")
-    def _ranges_ascend(self) -> Self:
-        for name in ("velocity_x", "velocity_y", "yaw_rate", "height", "pitch", "deep_pitch", "resampling"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ValueError(f"{name}: the lower end {low} is above the upper end {high}")
+    def _commands_last(self) -> Self:
         if self.resampling[0] <= 0.0:
             raise ValueError(f"resampling: {self.resampling[0]} s is no positive time")
         return self

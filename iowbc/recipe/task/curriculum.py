@@ -1,4 +1,4 @@
-"""How training grows harder: four axes, each with a level of its own, in the order of the paper's three phases."""
+"""The curriculum of training: four axes, each with a level of its own, in the order of the paper's three phases."""
 
 from typing import Self
 
@@ -19,7 +19,7 @@ class Scale(Section):
 
 
 class Ceilings(Section):
-    """How high each axis may rise during a phase."""
+    """Highest level of each axis during a phase."""
 
     posture: float = Field(ge=0.0, le=2.0)
     """Heights, torso pitches and wrist offsets."""

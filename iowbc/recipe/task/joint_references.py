@@ -1,15 +1,15 @@
-"""How a command becomes joint references."""
+"""Joint references that follow from a command."""
 
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import LATER, Named, Section
+from iowbc.recipe.section import LATER, NamedEntries, Section
 
 Vector = tuple[float, float, float]
 
 
-class Grasps(Named):
+class Grasps(NamedEntries):
     """Base grasp of each scene: left wrist from the pelvis, heading frame [m]; the right one mirrors it."""
 
     __pydantic_extra__: dict[str, Vector] = Field(init=False)
@@ -26,8 +26,9 @@ class Grasps(Named):
     """Behind the crate's upper edge."""
 
 
-class Loads(Named):
-    """What the arms expect to carry in each scene [kg]: as much lighter or heavier objects lift or lower the hands."""
+class Loads(NamedEntries):
+    """Loads that the arms expect to carry in each scene [kg]: as much lighter or heavier objects lift or lower the
+    hands."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.0, ge=0.0)
@@ -64,7 +65,7 @@ class ArmReference(Section):
     posture_gain: float = Field(default=1.0, ge=0.0)
     """Rate at which the redundant joints return to the rest posture [1/s]; slow, for the wrists come first."""
     gravity: bool = True
-    """Whether the arms' targets are offset by the torques of their own weight and of the expected load, divided by the
+    """Offsets the arms' targets by the torques of their own weight and of the expected load, divided by the
     gains: without, wrists sag by 4 cm under the arms alone."""
     joint_speed: float | None = Field(default=None, gt=0.0)
     """Bound on the speed of the references [rad/s]; empty takes each joint's own limit from `robot.yaml`."""
@@ -116,14 +117,14 @@ class References(Section):
     """The reference generation layer of the control loop."""
 
     use_rg: bool = True
-    """Whether θ_S_ref comes from the reference generator; otherwise it is the constant default posture ("w/o RG")."""
+    """Takes θ_S_ref from the reference generator; otherwise it is the constant default posture ("w/o RG")."""
     grasps: Grasps = Grasps()
     """Base grasp of each scene."""
     lean: float = Field(default=0.3, ge=0.0)
     """Way that grasps move ahead as the torso leans by a right angle [m], in proportion to the sine: as far as the
     chest at the height of the object's upper edge, so that the torso does not come to lie on it."""
     loads: Loads = Loads()
-    """What the arms expect to carry in each scene."""
+    """Loads that the arms expect to carry in each scene."""
     largest_pitch: float | None = Field(default=None, gt=0.0, le=1.6, json_schema_extra=LATER)
     """Torso pitch at which commands are clamped, before the feasible map ends [rad]. The map holds what has a support
     posture in equilibrium; a policy may hold less. Empty clamps to the map alone."""

@@ -4,8 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from iowbc.recipe.beside import OwnFunction
 from iowbc.recipe.section import LATER, OWN_NAME, Section
-from iowbc.recipe.task.own_function import OwnFunction
 
 
 class Kernel(Section):

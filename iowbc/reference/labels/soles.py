@@ -7,7 +7,7 @@ import pinocchio
 from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
-from iowbc.recipe.generator import Problem
+from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
 from iowbc.reference.labels.sample import mean_stance
 from iowbc.reference.labels.support_model import SupportModel
@@ -48,13 +48,13 @@ class SoleLimits:
         return rows, bound
 
 
-def sole_limits(robot: Robot, problem: Problem) -> SoleLimits:
+def sole_limits(robot: Robot, problem: PostureProblem) -> SoleLimits:
     """Limits of both soles: the rectangle inside the contact points, shrunk by the recipe."""
     half_length, half_width = problem.sole_fraction * np.abs(robot.sole_polygon).min(axis=(0, 1))
     return SoleLimits(problem.friction, float(half_length), float(half_width), problem.smallest_load)
 
 
-def support_edges(robot: Robot, problem: Problem) -> tuple[Array, Array]:
+def support_edges(robot: Robot, problem: PostureProblem) -> tuple[Array, Array]:
     """Inward normals n (edges, 2) and offsets d (edges,) [m] of both soles' convex hull: distance inside is n·p + d."""
     corners = robot.sole_polygon + mean_stance(problem.stance_width)[:, None, :2]
     equations = np.unique(ConvexHull(corners.reshape(-1, 2)).equations.round(12), axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio
 
 from iowbc.arrays import Array
-from iowbc.recipe.generator import Problem
+from iowbc.recipe.generator import PostureProblem
 from iowbc.reference.labels.sample import Sample, mean_stance
 from iowbc.robot.description import Robot
 from iowbc.robot.pinocchio_model import build_model
@@ -15,7 +15,7 @@ from iowbc.robot.pinocchio_model import build_model
 class SupportModel:
     """Base and support joints in the robot's order; `lock` sets what the arms add."""
 
-    def __init__(self, robot: Robot, problem: Problem) -> None:
+    def __init__(self, robot: Robot, problem: PostureProblem) -> None:
         self.robot, self.problem = robot, problem
         self.full = build_model(robot)
         self.full_data = self.full.createData()
@@ -90,7 +90,7 @@ class SupportModel:
         return forces
 
 
-def posture_weights(robot: Robot, problem: Problem) -> Array:
+def posture_weights(robot: Robot, problem: PostureProblem) -> Array:
     """Weight w of ½ w (θ - θ_default)², shape (15,) [1/rad²]: waist, sagittal (axis across the body) or lateral."""
     weights = np.full(len(robot.support), problem.sagittal_weight)
     weights[robot.lateral] = problem.lateral_weight

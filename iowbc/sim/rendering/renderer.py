@@ -1,5 +1,6 @@
 """Pictures of an environment: a camera that follows the robot, and arrows for the forces."""
 
+from itertools import pairwise
 from types import TracebackType
 from typing import Self
 
@@ -8,9 +9,12 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.sim.rendering.appearance import Appearance
-from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS, Force, forces
+from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS, forces
 from iowbc.sim.rendering.offscreen import Image, Offscreen
 from iowbc.sim.simulation import Simulation
+
+LINE_RADIUS = 0.012
+"""Of lines on the ground [m]."""
 
 
 class SceneRenderer:
@@ -39,6 +43,8 @@ class SceneRenderer:
             azimuth=azimuth,
             elevation=elevation,
         )
+        self.lines: list[tuple[Array, tuple[float, ...]]] = []
+        """Lines to draw beside: points (k, 3) [m] and a colour (red, green, blue, opacity) each."""
         self.camera = self._offscreen.camera
         self.camera.lookat[:] = self._aim()
 
@@ -46,7 +52,7 @@ class SceneRenderer:
         """The environment as it is now, (height, width, 3)."""
         data = self._appearance.update()
         self.camera.lookat[:] += 0.1 * (self._aim() - self.camera.lookat)
-        return self._offscreen.draw(data, self._draw_forces if self._forces else lambda: None)
+        return self._offscreen.draw(data, self._draw_beside)
 
     def _aim(self) -> Array:
         """Between the ground and the pelvis, on the side of the object."""
@@ -57,19 +63,21 @@ class SceneRenderer:
         aim[2] *= 0.9
         return aim
 
-    def _draw_forces(self) -> None:
-        for force in forces(self._simulation, self._env):
-            self._arrow(force)
+    def _draw_beside(self) -> None:
+        for points, colour in self.lines:
+            for start, end in pairwise(points):
+                self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE.value, LINE_RADIUS, start, end, colour)
+        for force in forces(self._simulation, self._env) if self._forces else ():
+            self._connect(mujoco.mjtGeom.mjGEOM_ARROW.value, ARROW_RADIUS, force.start, force.end, COLOURS[force.kind])
 
-    def _arrow(self, force: Force) -> None:
+    def _connect(self, kind: int, radius: float, start: Array, end: Array, colour: tuple[float, ...]) -> None:
+        """Draws an arrow or a capsule between two points, (3,) [m], where there is room for it."""
         scene = self._offscreen.scene
         if scene.ngeom >= scene.maxgeom:
             return
         geom = scene.geoms[scene.ngeom]
-        arrow = mujoco.mjtGeom.mjGEOM_ARROW.value
-        colour = np.array(COLOURS[force.kind], np.float32)
-        mujoco.mjv_initGeom(geom, arrow, np.zeros(3), np.zeros(3), np.zeros(9), colour)
-        mujoco.mjv_connector(geom, arrow, ARROW_RADIUS, force.start, force.end)
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32))
+        mujoco.mjv_connector(geom, kind, radius, start, end)
         scene.ngeom += 1
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Where commands come from: drawn goals in training, scripts in trials; rate-limited, clamped to what is feasible."""
+"""Commands: drawn goals in training, scripts in trials, or a user's; rate-limited, clamped to what is feasible."""
 
 from collections.abc import Sequence
 
@@ -6,10 +6,10 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
-from iowbc.control.command import COMMAND, VELOCITY, approach, rate_limits
+from iowbc.control.command import COMMAND, VELOCITY, approach, nominal_command, rate_limits
 from iowbc.control.references import ReferenceLayer
 from iowbc.recipe.task.task import Task
-from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpolate, nominal_command
+from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpolate
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty
 from iowbc.task.memory import Memory
@@ -36,6 +36,13 @@ class Commander:
         self.scripted = np.array([script is not None for script in scripts])
         self._drawn, self._any_script = ~self.scripted, bool(self.scripted.any())
         self._times, self._values = _knots(scripts)
+        self._given: Array | None = None
+
+    def steer(self, wanted: Array) -> None:
+        """Follow commands that somebody gives, (11,) or (n, 11), in place of drawn and scripted ones; they may be
+        changed in place. Episodes begin in their posture, standing."""
+        self._given = wanted
+        self.scripted[:], self._drawn[:], self._any_script = True, False, True
 
     def start(self, which: Indices, memory: Memory, key: Keys) -> None:
         """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
@@ -48,6 +55,8 @@ class Commander:
         if scripted.any():
             memory.goal[which[scripted]] = self._scripted(memory)[which[scripted]]
             command[scripted] = memory.goal[which[scripted]]
+            if self._given is not None:
+                command[:, VELOCITY] = 0.0
         memory.command[which] = self._references.clamp(command)
 
     def advance(self, memory: Memory, key: Keys) -> None:
@@ -70,6 +79,8 @@ class Commander:
         memory.draws[which] += 1
 
     def _scripted(self, memory: Memory) -> Array:
+        if self._given is not None:
+            return np.broadcast_to(self._given, memory.goal.shape)
         return interpolate(self._times, self._values, memory.steps * self._period)
 
 

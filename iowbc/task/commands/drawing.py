@@ -4,16 +4,9 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Keys, Mask
-from iowbc.control.command import COMMAND, HEIGHT, PITCH
+from iowbc.control.command import COMMAND, PITCH
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.curriculum import Difficulty
-
-
-def nominal_command(commands: Commands) -> Array:
-    """Standing still in the nominal posture, (11,)."""
-    command = np.zeros(len(COMMAND))
-    command[HEIGHT], command[PITCH] = commands.nominal_height, commands.nominal_pitch
-    return command
 
 
 def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty, *, pushing: Mask, walking: Mask) -> Array:

@@ -101,7 +101,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             raise AttributeError(
                 "the environments live in worker processes; make the vector environment with workers=0"
             )
-        return self.workers.batch
+        batch: Batch = self.workers.batch
+        return batch
 
     def reset(self) -> NDArray[np.float32]:
         """Begins an episode everywhere; after `seed` with those seeds."""

@@ -45,11 +45,10 @@ def main() -> None:
 def _serve(connection: Connection, memory: int) -> None:
     """Answers messages."""
     try:
-        from iowbc.task.vector.setup import Setup
         from iowbc.task.vector.shared import attach_shared
 
-        text, first, last = connection.recv()
-        setup = Setup.from_json(text)
+        kind, text, first, last = connection.recv()
+        setup = kind.from_json(text)
         batch = setup.batch(first, last, attach_shared(memory, setup.buffer_fields(), setup.count).rows(first, last))
         gc.freeze()  # what lives as long as the process need not be looked through at every collection
         connection.send((True, None))

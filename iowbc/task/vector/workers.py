@@ -19,12 +19,10 @@ from typing import Any, Protocol
 from iowbc.errors import WorkerFailed
 from iowbc.processes import SINGLE_THREADED
 from iowbc.rollouts.blocks import shares_in_blocks
-from iowbc.task.batch import Batch
 from iowbc.task.record.signals import COUNTERS
 from iowbc.task.vector import worker
 from iowbc.task.vector.messages import Message
-from iowbc.task.vector.setup import Setup
-from iowbc.task.vector.shared import Buffers, create_shared, private_buffers
+from iowbc.task.vector.shared import Buffers, Fields, create_shared, private_buffers
 
 STARTING = 300.0
 """How long workers may take to build their environments [s]."""
@@ -56,13 +54,30 @@ class Workers(Protocol):
         """Ends it all."""
 
 
+class Building(Protocol):
+    """What a process needs to know to build its part of some environments; `Setup` is one."""
+
+    @property
+    def count(self) -> int:
+        """Number of environments."""
+
+    def buffer_fields(self) -> Fields:
+        """What passes between the environments and the parent, with the counters of steps."""
+
+    def batch(self, first: int, last: int, buffers: Buffers) -> Any:
+        """The environments from `first` to `last`, the latter excluded."""
+
+    def as_json(self) -> str:
+        """Text from which the class's `from_json` makes the same."""
+
+
 class InProcess:
     """All environments in this process."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Building) -> None:
         self.groups = [(0, setup.count)]
         self.buffers = private_buffers(setup.buffer_fields(), setup.count)
-        self.batch: Batch = setup.batch(0, setup.count, self.buffers)
+        self.batch: Any = setup.batch(0, setup.count, self.buffers)
         self._answer: Any = None
 
     def ask(self, messages: Sequence[Message]) -> None:
@@ -91,7 +106,7 @@ class WorkerProcess:
 class WorkerProcesses:
     """Environments spread over worker processes, which share memory with this one."""
 
-    def __init__(self, setup: Setup, count: int, patience: float) -> None:
+    def __init__(self, setup: Building, count: int, patience: float) -> None:
         """`patience`: how long a request may take before a worker counts as hung [s]."""
         self.groups = shares_in_blocks(setup.count, count)
         self._patience = patience
@@ -110,7 +125,7 @@ class WorkerProcesses:
                 self._poll.register(process.connection.fileno(), select.POLLIN)
                 self._processes.append(process)
             for index, ((first, last), process) in enumerate(zip(self.groups, self._processes, strict=True)):
-                process.connection.send((setup.as_json(), first, last))
+                process.connection.send((type(setup), setup.as_json(), first, last))
                 self._asked.add(index)
             self._wait(STARTING)
         except BaseException:

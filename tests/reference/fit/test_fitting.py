@@ -11,7 +11,7 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, Smoothness
+from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, SmoothnessCheck
 from iowbc.reference.fit.fitting import FitData, fit
 from iowbc.reference.fit.gates import judge_fit
 from iowbc.reference.fit.preparation import split_by_group
@@ -160,7 +160,7 @@ def linear_network(slope: float) -> ReferenceNetwork:
 
 
 def test_the_jump_is_the_slope_times_a_step() -> None:
-    recipe = ReferenceGenerator(fit=Fit(smoothness=Smoothness(lines=200)))
+    recipe = ReferenceGenerator(fit=Fit(smoothness=SmoothnessCheck(lines=200)))
     region = FeasibleMap(np.array([0.0, 1.0]), np.array([0.5, 0.5]), np.array([0.8, 0.8]))
     jumps = measure_jumps(linear_network(8.0), recipe, region, np.zeros((3, 14)), seed=0)
     assert jumps.largest.max() <= 8.0 * 0.005 + 1e-6

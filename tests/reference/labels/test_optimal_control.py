@@ -7,7 +7,7 @@ import pinocchio
 import pytest
 
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.generator import LabelGates, Problem, ReferenceGenerator
+from iowbc.recipe.generator import LabelGates, PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.gates import LabelJudge
@@ -39,7 +39,7 @@ def test_mid_horizon_postures_equal_static_labels(
 
 
 def test_its_waist_takes_the_lean_as_that_of_static_labels_does(robot: Robot, command: Callable[..., Sample]) -> None:
-    recipe = ReferenceGenerator(problem=Problem(waist_share=1.0))
+    recipe = ReferenceGenerator(problem=PostureProblem(waist_share=1.0))
     support = SupportModel(robot, recipe.problem)
     sample = command(0.66, 0.35)
     solved = OptimalControlMethod(support, recipe).solve(sample).support

@@ -10,7 +10,7 @@ import pytest
 
 from iowbc.errors import Rejected
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.generator import Problem, ReferenceGenerator
+from iowbc.recipe.generator import PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.static import StaticMethod
@@ -137,7 +137,7 @@ def test_no_neighbour_that_is_in_equilibrium_costs_less(
 def test_a_waist_that_takes_the_lean_keeps_the_pelvis_level_as_far_as_it_turns(
     robot: Robot, command: Callable[..., Sample]
 ) -> None:
-    method = StaticMethod(SupportModel(robot, Problem(waist_share=1.0)), "pelvis")
+    method = StaticMethod(SupportModel(robot, PostureProblem(waist_share=1.0)), "pelvis")
     upright = method.solve(command(0.66, 0.0)).support
     for pitch in (-0.3, 0.2, 0.4):
         bent = method.solve(command(0.66, pitch)).support

@@ -1,0 +1,184 @@
+"""`iowbc status`, `iowbc ls` and `iowbc show`: work in progress, stored artifacts, and one of them in detail."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.columns import Columns
+from rich.console import Console
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from iowbc.commands.lookup import known_recipes, last_used, named
+from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json, shown_path, tell
+from iowbc.commands.results import metrics_text
+from iowbc.errors import require_known, shown
+from iowbc.pipeline.console.live_table import sparkline
+from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
+from iowbc.pipeline.nested import flattened
+from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.last_used import ever_used, recall
+from iowbc.pipeline.store.links import named_folder
+from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.workspace import unfinished
+from iowbc.pipeline.tracking.delivery import DAMAGED_LINE
+from iowbc.pipeline.tracking.tracker import backlog
+from iowbc.recipe.recipe import PIPELINE, Recipe
+
+
+def print_status(store: Store, console: Console, as_json: bool = False) -> None:
+    """Print running and unfinished stages, the finished stages of each recipe, and the backlog of MLflow."""
+    if as_json:
+        print_json(console, _data(store))
+        return
+    going_on, recipes = unfinished(store.runs), known_recipes(store)
+    for folder, record in going_on:
+        _print_work(store, console, folder, record)
+    stopped = [record.get("command") for folder, record in going_on if not holder(store.runs, folder.name)]
+    for command in dict.fromkeys(filter(None, stopped)):
+        tell(console, f"to go on: {command}")
+    if recipes:
+        table = plain_table("recipe", "finished stages", "last")
+        for recipe in recipes:
+            stages = recall(store.runs, recipe).get("stages", {})
+            last = max((float(use["time"]) for use in stages.values()), default=0.0)
+            table.add_row(recipe, ", ".join(last_used(store, recipe)), ago(last))
+        console.print(table)
+    if not (going_on or recipes):
+        console.print(f"nothing has run in {store.runs.root} yet; `iowbc run RECIPE` starts", highlight=False)
+    aside = sorted(store.runs.damaged.glob(f"{DAMAGED_LINE}*"))
+    if aside:
+        text = f"{len(aside)} damaged lines of MLflow's journals were put aside, as {shown_path(aside[-1])}"
+        console.print(text, highlight=False)
+    if waiting := backlog(store.runs):
+        log = shown_path(store.runs.tracking / "sender.log")
+        text = f"MLflow lacks something of {len(waiting)} runs; the next run sends it (its log: {log})"
+        console.print(text, highlight=False)
+
+
+def _print_work(store: Store, console: Console, folder: Path, record: Mapping[str, Any]) -> None:
+    """A stage that is being made, or was left unfinished: who works on it, how far it is, and its small curve."""
+    who = holder(store.runs, folder.name)
+    state = ("runs", "bold yellow") if who else (f"stopped {ago(float(record.get('updated', 0.0)))}", "magenta")
+    title = f" of {record.get('recipe', '?')} ({folder.name[:KEY_LENGTH]}): "
+    by = f", {who}" if who else ""
+    console.print(Text.assemble((str(record.get("stage", "?")), "bold"), title, state, by))
+    total = float(record.get("total", 0.0))
+    share = [f"{100 * float(record.get('done', 0.0)) / total:.0f} %"] if total else []
+    spent = f"{duration(float(record.get('seconds', 0.0)))} spent"
+    note = [str(record["note"])] if record.get("note") else []
+    attempt = f"attempt {record.get('attempts', '?')}"
+    console.print(Padding(Text(", ".join([*share, spent, attempt, *note])), (0, 0, 0, 2)))
+    values = [value for _, value in record.get("curve", [])]
+    if values:
+        text = f"{record.get('metric')} {sparkline(values)} {values[-1]:.4g}"
+        console.print(Padding(Text(text), (0, 0, 0, 2)))
+
+
+def _data(store: Store) -> dict[str, Any]:
+    """The same for other programs."""
+    working = [
+        {
+            "stage": record.get("stage"),
+            "recipe": record.get("recipe"),
+            "key": folder.name,
+            "holder": asdict(who) if (who := holder(store.runs, folder.name)) else None,
+            **{name: record.get(name) for name in ("done", "total", "seconds", "attempts", "updated", "note")},
+        }
+        for folder, record in unfinished(store.runs)
+    ]
+    recipes = {name: recall(store.runs, name).get("stages", {}) for name in known_recipes(store)}
+    return {"unfinished": working, "recipes": recipes, "unsent": len(backlog(store.runs))}
+
+
+METRICS_SHOWN = 2
+"""Metrics of an artifact in its row; `show` has all."""
+
+
+def list_artifacts(store: Store, console: Console, stage: str | None, as_json: bool = False) -> None:
+    """A row for each artifact, oldest first. Raises `UsageError` for an unknown stage."""
+    if stage is not None:
+        require_known(stage, "stage", PIPELINE)
+    users: dict[str, list[str]] = {}
+    for recipe in known_recipes(store):
+        for key in ever_used(store.runs, recipe):
+            users.setdefault(key, []).append(recipe)
+    if as_json:
+        found = [artifact_data(artifact) for artifact in store.artifacts(stage)]
+        print_json(console, [data | {"used_by": users.get(data["key"], [])} for data in found])
+        return
+    wide = console.width >= NARROW
+    table = plain_table("stage", "key", "used by", "made", "took", "size", *(["metrics"] if wide else []))
+    artifacts = store.artifacts(stage)
+    for artifact in artifacts:
+        manifest = artifact.manifest
+        table.add_row(
+            manifest.stage,
+            manifest.key[:KEY_LENGTH],
+            ", ".join(users.get(manifest.key, [f"{manifest.recipe} (published)" if artifact.published else "-"])),
+            ago(manifest.made),
+            duration(manifest.seconds),
+            size(artifact.size),
+            *([Text(metrics_text(artifact, METRICS_SHOWN))] if wide else []),
+        )
+    if artifacts:
+        console.print(table)
+    else:
+        console.print(f"nothing is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it", highlight=False)
+
+
+def show(store: Store, console: Console, word: str, as_json: bool = False) -> None:
+    """All of one artifact, or the stages and metrics of a recipe."""
+    found = named(store, word)
+    if as_json:
+        artifacts = [
+            artifact_data(artifact) | {"ingredients": artifact.ingredients} for artifact in found.artifacts.values()
+        ]
+        print_json(console, artifacts if found.recipe is None else {"recipe": found.recipe, "stages": artifacts})
+        return
+    if found.recipe is not None:
+        for stage, artifact in found.artifacts.items():
+            manifest = artifact.manifest
+            took = f"made {ago(manifest.made)}, took {duration(manifest.seconds)}"
+            console.print(Text.assemble((stage, "bold"), f" {manifest.key[:KEY_LENGTH]}, {took}"))
+            cells = [Text.assemble((f"{name} ", "dim"), figure(value)) for name, value in artifact.metrics.items()]
+            console.print(Padding(Columns(cells, padding=(0, 2), equal=True, column_first=True), (0, 0, 0, 2)))
+        return
+    (artifact,) = found.artifacts.values()
+    _show_artifact(store, artifact, console)
+
+
+def _show_artifact(store: Store, artifact: Artifact, console: Console) -> None:
+    manifest, ingredients = artifact.manifest, artifact.ingredients
+    inputs = ingredients.get("inputs", {})
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    rows = {
+        "stage": f"{manifest.stage}, version {manifest.version}",
+        "key": manifest.key,
+        "made": f"{ago(manifest.made)} by recipe {manifest.recipe} on {manifest.host}",
+        "took": f"{duration(manifest.seconds)} in {manifest.attempts} attempt(s) with {manifest.workers} worker(s)",
+        "reads": "\n".join(f"{name} (content {digest[:KEY_LENGTH]})" for name, digest in inputs.items()),
+        "metrics": "\n".join(f"{name} {figure(value, 6)}" for name, value in artifact.metrics.items()),
+        "files": "\n".join(f"{name} ({size(record.size)})" for name, record in manifest.files.items()),
+        "versions": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),
+        "recipe": "\n".join(_unusual(ingredients.get("recipe", {}))),
+    }
+    for name, text in rows.items():
+        if text:
+            grid.add_row(Text(name, style="bold"), Text(text))
+    console.print(grid)
+    folder = named_folder(store.runs, manifest.recipe, manifest.stage, artifact.folder)
+    tell(console, f"folder  {shown_path(folder)}")
+
+
+def _unusual(slices: Mapping[str, Any]) -> list[str]:
+    """The values of a stage's part of the recipe that are not the defaults."""
+    usual = flattened(Recipe(name="default").model_dump(mode="json"))
+    own = flattened(slices)
+    found = [f"{path}: {shown(value)}" for path, value in own.items() if path not in usual or usual[path] != value]
+    return [*found, "all else is default"]

@@ -1,0 +1,283 @@
+"""Artifacts, recipes and trainings by what a user calls them, and what an artifact was made from."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from iowbc.deploy.exported_folder import SHORTEST_PREFIX
+from iowbc.errors import UsageError, nearest
+from iowbc.files import write_whole
+from iowbc.pipeline.console.wording import ago
+from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
+from iowbc.pipeline.store.last_used import recall
+from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
+from iowbc.pipeline.store.store import Store
+from iowbc.pipeline.store.workspace import unfinished
+from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.reading.study import load_study
+from iowbc.recipe.recipe import PIPELINE, Recipe
+from iowbc.recipe.sweep import Sweep
+from iowbc.stages.registry import STAGES
+
+if TYPE_CHECKING:
+    from iowbc.task.specification import Specification
+
+SWEEP_RECORD, COMPARISON_RECORD = "sweep.json", "runs.json"
+"""Files of a sweep with its points, and of a comparison with its runs."""
+FILM = "side_by_side.mp4"
+"""Film of one trial of a comparison."""
+PLAYED = "teacher"
+"""The stage whose checkpoint can be played."""
+CHECKPOINT = Path("scratch", "training.checkpoint")
+
+
+@dataclass(frozen=True)
+class Named:
+    """Meaning of a word of the command line."""
+
+    word: str
+    artifacts: Mapping[str, Artifact]
+    """By stage: all that a recipe used last, or the one artifact that was named."""
+    recipe: Mapping[str, Any] | None = None
+    """The resolved recipe, where the word names a recipe."""
+    shipped: Mapping[str, Artifact] = field(default_factory=dict)
+    """By stage: what came with the repository under the recipe's name, where it has used nothing else yet."""
+
+    @property
+    def usable(self) -> dict[str, Artifact]:
+        """By stage: all that there is to play or to take along."""
+        return {**self.shipped, **self.artifacts}
+
+
+def named(store: Store, word: str) -> Named:
+    """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
+    recipes = finished_recipes(store)
+    if word in recipes or Path(word).suffix in SUFFIXES:
+        return _recipe(store, word, _name_in(word), recipes)
+    head, slash, stage = word.rpartition("/")
+    if slash and (name := _name_in(head)) in recipes:
+        found = _recipe(store, word, name, recipes).usable
+        if stage not in found:
+            stages = ", ".join(found) or "none"
+            raise UsageError(f"{word}: recipe {name} has no finished stage '{stage}'; finished: {stages}")
+        return Named(word, {stage: found[stage]})
+    artifact = _by_key(store, word)
+    return Named(word, {artifact.manifest.stage: artifact})
+
+
+def open_artifact(word: str, runs: Path | str = "runs") -> Artifact:
+    """From Python: the artifact that `RECIPE/STAGE` or the first characters of a key name. Raises `UsageError`."""
+    found = named(Store(Runs(Path(runs))), word)
+    if found.recipe is not None:
+        stages = ", ".join(f"{word}/{stage}" for stage in found.usable)
+        raise UsageError(f"'{word}' is a recipe; name one of its artifacts: {stages or 'none is stored'}")
+    (artifact,) = found.artifacts.values()
+    return artifact
+
+
+def known_recipes(store: Store) -> list[str]:
+    """Names of the recipes that have finished a stage, alphabetically."""
+    return sorted(path.stem for path in store.runs.recipes.glob("*.json"))
+
+
+def finished_recipes(store: Store) -> list[str]:
+    """Names of the recipes that have finished a stage here, or came with the repository, alphabetically."""
+    return sorted({*known_recipes(store), *_published(store)})
+
+
+def nameable(store: Store) -> dict[str, tuple[str, ...]]:
+    """By the name of each recipe that `named` knows, alphabetically: stages that can be named with it."""
+    names = finished_recipes(store)
+    return {name: tuple(_recipe(store, name, name, names).usable) for name in names}
+
+
+def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
+    """By stage: the artifacts that a recipe used last, as far as they are still stored."""
+    used = recall(store.runs, recipe).get("stages", {})
+    found = {stage: store.find_any(stage, use["key"]) for stage, use in used.items()}
+    return {stage: artifact for stage, artifact in found.items() if artifact is not None}
+
+
+def _recipe(store: Store, word: str, name: str, recipes: Sequence[str]) -> Named:
+    if name not in recipes:
+        listing = ", ".join(recipes) or "none"
+        raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
+    shipped = _published(store).get(name, {})
+    if name not in known_recipes(store):
+        return Named(word, shipped, list(shipped.values())[-1].recipe)
+    used = last_used(store, name)
+    others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
+    return Named(word, used, recall(store.runs, name)["recipe"], others)
+
+
+def _name_in(word: str) -> str:
+    """The name that a recipe file gives, else that of the file; any other word as it is."""
+    if Path(word).suffix not in SUFFIXES:
+        return word
+    return load_recipe(word).recipe.name if os.path.isfile(word) else Path(word).stem.lower()
+
+
+def _published(store: Store) -> dict[str, dict[str, Artifact]]:
+    """By the recipe that made them, and by stage: the artifacts that came with the repository."""
+    found: dict[str, dict[str, Artifact]] = {}
+    for stage in PIPELINE:
+        for artifact in store.artifacts(stage):
+            if artifact.published:
+                found.setdefault(artifact.manifest.recipe, {})[stage] = artifact
+    return found
+
+
+def _by_key(store: Store, prefix: str) -> Artifact:
+    long_enough = len(prefix) >= SHORTEST_PREFIX
+    found = [one for one in store.artifacts() if long_enough and one.manifest.key.startswith(prefix)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        keys = ", ".join(f"{artifact.manifest.stage} {artifact.manifest.key[:12]}" for artifact in found)
+        raise UsageError(f"'{prefix}' is the beginning of several keys: {keys}")
+    recipes = [*nameable(store)]
+    raise UsageError(
+        f"'{prefix}' is neither a recipe that has run or is published in {store.runs.root} "
+        f"({', '.join(recipes) or 'none is'}), "
+        f"nor RECIPE/STAGE, nor the first {SHORTEST_PREFIX} or more characters of a key; `iowbc ls` lists them"
+        f"{nearest(prefix, recipes)}"
+    )
+
+
+def record_sweep(found: Sweep, folder: Path) -> None:
+    """Keep a sweep's points and their settings in its folder, so that other commands know them by its name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    points = {point.name: dict(point.settings) for point in found.points}
+    write_whole(folder / SWEEP_RECORD, json.dumps({"axes": found.axes, "points": points}, indent=1))
+
+
+def record_comparison(words: Sequence[str], folder: Path) -> None:
+    """Keep the names of the runs in the folder of their comparison."""
+    write_whole(folder / COMPARISON_RECORD, json.dumps({"runs": list(words)}, indent=1))
+
+
+def points_of(store: Store, words: Sequence[str]) -> list[str]:
+    """Names of recipes, with the finished ones of a sweep, of a study, or of a comparison in place of its
+    name."""
+    recipes = finished_recipes(store)
+    found: list[str] = []
+    for word in words:
+        names: Sequence[str] = ()
+        if word not in recipes:
+            swept = _recorded(store.runs.sweeps / word / SWEEP_RECORD, "points")
+            names = swept or members_of(word) or _recorded(store.runs.compared / word / COMPARISON_RECORD, "runs")
+        found += [name for name in names if name in recipes] or [word]
+    return found
+
+
+def _recorded(file: Path, key: str) -> list[str]:
+    """Names in the record of a sweep or a comparison; none where the file is no such record."""
+    record = read_json(file)
+    names = record.get(key) if isinstance(record, dict) else None
+    return [name for name in names if isinstance(name, str)] if isinstance(names, (dict, list)) else []
+
+
+def members_of(word: str) -> tuple[str, ...]:
+    """Names of the recipes that a study names; of anything else none. Raises `RecipeError`."""
+    return tuple(one.recipe.name for one in load_study(word)) if os.path.isfile(recipe_file(word)) else ()
+
+
+def film_of(runs: Runs, words: Sequence[str]) -> Path | None:
+    """The film of a comparison of the same runs, if one was made."""
+    for film in (runs.compared / FILM, *sorted(runs.compared.glob(f"*/{FILM}"))):
+        if film.is_file() and sorted(_recorded(film.with_name(COMPARISON_RECORD), "runs")) == sorted(words):
+            return film
+    return None
+
+
+@dataclass(frozen=True)
+class InTraining:
+    """A training that is not finished."""
+
+    stage: str
+    key: str
+    text: str
+    """Its state, for the user."""
+    checkpoint: Path
+    ingredients: Mapping[str, Any]
+    """The ingredients of its key."""
+    recipe: Mapping[str, Any] | None
+    """The resolved recipe; None where the checkpoint cannot be played."""
+
+
+def in_training(store: Store, word: str, stage: str | None) -> InTraining | None:
+    """The newest unfinished training that `RECIPE/STAGE`, or a recipe and `--stage`, names, if there is one."""
+    name, slash, last = word.rpartition("/")
+    name, wanted = (name, last) if slash else (word, stage)
+    if wanted not in STAGES or not STAGES[wanted].presentation.trained_by:
+        return None
+    for folder, record in unfinished(store.runs):
+        if (record.get("stage"), record.get("recipe")) == (wanted, Path(name).stem):
+            return _training(store, folder, record)
+    return None
+
+
+def _training(store: Store, folder: Path, record: Mapping[str, Any]) -> InTraining:
+    checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
+    total = float(record.get("total", 0.0))
+    state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
+    share = f", {100 * float(record.get('done', 0.0)) / total:.0f} % done" if total else ""
+    known = isinstance(recipe, dict) and isinstance(ingredients, dict)
+    playable = record["stage"] == PLAYED and checkpoint.is_file() and known
+    then = f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else ""
+    return InTraining(
+        stage=str(record["stage"]),
+        key=folder.name,
+        text=f"{record['stage']} of {record['recipe']} {state}{share}{then}",
+        checkpoint=checkpoint,
+        ingredients=ingredients if isinstance(ingredients, dict) else {},
+        recipe=recipe if playable else None,
+    )
+
+
+def input_of(store: Store, artifact: Artifact, stage: str) -> Artifact | None:
+    """The input of a stage that an artifact was made from; None where it read nothing of that stage. Raises
+    `UsageError` if it is gone."""
+    manifest = artifact.manifest
+    return made_from(store, artifact.ingredients, stage, f"{manifest.stage} {manifest.key[:12]}")
+
+
+def made_from(store: Store, ingredients: Mapping[str, Any], stage: str, what: str) -> Artifact | None:
+    """The artifact of a stage among the ingredients of the key of `what`. Raises `UsageError` if it is gone."""
+    digest = ingredients.get("inputs", {}).get(stage)
+    if digest is None:
+        return None
+    found = next((one for one in store.artifacts(stage) if one.manifest.digest == digest), None)
+    if found is None:
+        raise UsageError(
+            f"the {stage} (content {digest[:12]}) that {what} was made from is no longer stored; run its recipe again"
+        )
+    return found
+
+
+def policy_of(store: Store, evaluation: Artifact) -> Artifact:
+    """The policy that an evaluation played. Raises `UsageError`."""
+    for name, stage in reversed(STAGES.items()):
+        if stage.presentation.trained_by and (policy := input_of(store, evaluation, name)) is not None:
+            return policy
+    raise UsageError(f"{evaluation.folder}: this evaluation read no policy; run its recipe again")
+
+
+def policy_stages() -> list[str]:
+    """Stages that leave a policy, the one to prefer first."""
+    return [name for name, stage in reversed(STAGES.items()) if stage.presentation.leaves_policy]
+
+
+def world_of(resolved: Mapping[str, Any], generator: Artifact | None) -> "Specification":
+    """The world that a resolved recipe describes; `generator`: the reference generator that its policy was trained
+    on."""
+    from iowbc.robot.description import robot_folder
+    from iowbc.task.specification import Specification
+
+    recipe = Recipe.model_validate(resolved)
+    return Specification(recipe, robot_folder(recipe.robot), None if generator is None else generator.folder)

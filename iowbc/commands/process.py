@@ -1,0 +1,135 @@
+"""A command as a process: exit codes, signals outside of a run, output streams, unexpected errors."""
+
+import errno
+import io
+import os
+import shlex
+import signal
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, TextIO
+
+from iowbc.full_disk import FULL, nothing_fits, what_is_full
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
+"""Exit codes."""
+IMPORTS = "importlib._bootstrap"
+"""Module whose code is on the stack while a module is being read."""
+GONE = (errno.EIO, errno.EPIPE, *FULL)
+"""Errors of a terminal or reader that has gone away, and of a file that takes no more."""
+STANDARD_OUTPUT = 1
+
+
+@dataclass(frozen=True)
+class RunEnding:
+    """Exit code of one run."""
+
+    code: int
+    failure: str = ""
+    """The stage that failed and the reason, in a line; empty where none did."""
+
+
+def close_on_termination() -> None:
+    """From now on a termination, or a lost terminal, closes what is open, as Ctrl-C does."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.getsignal(signal.SIGINT))
+
+
+def leave(number: int, frame: FrameType | None) -> None:
+    """End the command: by `SystemExit`, so that what is open is closed.
+
+    While a module is being read that would reach its caller as an error of that module, if at all; then the process
+    ends at once.
+    """
+    while frame is not None:
+        if frame.f_globals.get("__name__") == IMPORTS:
+            os._exit(INTERRUPTED)
+        frame = frame.f_back
+    sys.exit(INTERRUPTED)
+
+
+def prepare_streams() -> None:
+    """Let every text be written somehow: characters that the terminal does not know, and streams that are closed."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open("/dev/null", "w", encoding="utf-8"))  # noqa: SIM115 (for the whole process)
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def let_go() -> None:
+    """Drop what the ends of the streams do not take any more, before Python tries to write it once again."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            _lead_to_nowhere(stream.fileno())
+
+
+@contextmanager
+def outlasting_readers() -> Iterator[None]:
+    """Inside, what cannot be written any more is dropped: a lost terminal or a full log file does not end a run."""
+    former = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = map(_outlasting, former)
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        sys.stdout, sys.stderr = former
+
+
+def _outlasting(stream: TextIO) -> TextIO:
+    stream.flush()
+    buffer = io.BufferedWriter(_Outlasting(stream.fileno(), "wb", closefd=False))
+    return io.TextIOWrapper(buffer, encoding=stream.encoding, errors="replace", line_buffering=True)
+
+
+class _Outlasting(io.FileIO):
+    """Leads to nowhere from the first write on that fails because the other end is gone or full."""
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        try:
+            return super().write(data) or 0
+        except OSError as error:
+            if error.errno not in GONE:
+                raise
+            _lead_to_nowhere(self.fileno())
+            if error.errno in FULL and self.fileno() == STANDARD_OUTPUT:
+                print(f"what is printed cannot be written any more: {error.strerror}; the run goes on", file=sys.stderr)
+            return memoryview(data).nbytes
+
+
+def _lead_to_nowhere(descriptor: int) -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    os.close(nowhere)
+
+
+def described(error: Exception, arguments: Sequence[str]) -> str:
+    """The message of an unexpected error: one sentence, the place of the details, and the next command. Needs no disk:
+    where the details cannot be written they follow it."""
+    again = f"to go on: {shlex.join(['iowbc', *arguments])}"
+    if nothing_fits(error):
+        full = what_is_full(error, (Path("runs"), Path(os.environ.get("TMPDIR", "/tmp"))))
+        return f"no space is left: {full}; make some (`iowbc gc` removes what you name), and then\n{again}"
+    summary = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    details = "".join(traceback.format_exception(error))
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="iowbc-", suffix=".txt", delete=False, encoding="utf-8") as file:
+            file.write(details)
+        where = f"the details are in {file.name}"
+    except OSError:
+        where = f"the details could not be written:\n{details.rstrip()}"
+    return f"unexpected error: {summary}; {where}\n{again}"

@@ -1,0 +1,175 @@
+"""`iowbc robot` and `iowbc robot-sim`: an exported controller on the robot's bus, and a simulated robot there."""
+
+import signal
+import threading
+from collections.abc import Collection
+from contextlib import ExitStack
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from rich.console import Console
+
+from iowbc.commands.printed import plain_table, tell
+from iowbc.deploy.controller import Controller
+from iowbc.deploy.exported_folder import exported_folder
+from iowbc.errors import UsageError, require_known
+
+if TYPE_CHECKING:
+    from iowbc.onboard.checks import Check
+    from iowbc.onboard.process import Clock
+
+LISTENING = 3.0
+"""For how long the bus is listened to before the checks [s]; the battery's state comes once or twice a second."""
+
+
+def require_bus(command: str) -> None:
+    """Raises UsageError where the packages of the extra `robot` are missing."""
+    if missing := [name for name in ("cyclonedds", "mcap") if find_spec(name) is None]:
+        raise UsageError(f"iowbc {command} needs {' and '.join(missing)}; pip install 'iowbc[robot]'")
+
+
+def robot(
+    console: Console,
+    what: str,
+    *,
+    network: str,
+    domain: int,
+    scene: str,
+    commands: str,
+    log: Path | None,
+    waived: Collection[str],
+    dry_run: bool,
+    lockstep: bool,
+    seconds: float,
+) -> None:
+    """Check the robot and drive it. Raises UsageError where a check fails."""
+    require_bus("robot")
+    from iowbc.onboard.checks import checks
+    from iowbc.onboard.dds import DdsBus
+    from iowbc.onboard.limits import LIMITS
+    from iowbc.onboard.log import LogWriter
+    from iowbc.onboard.machine import Machine
+    from iowbc.onboard.operators import Keyboard, Ranges, Udp, operator, single_keys
+    from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
+    from iowbc.onboard.replay import export_digest
+
+    controller = Controller.load(exported_folder(what))
+    require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
+    source = operator(commands, controller.contract)
+    stop = _stop_request()
+    bus = DdsBus(network, domain)
+    with ExitStack() as stack:
+        stack.callback(bus.close)
+        tell(console, f"{controller.contract.recipe}: listening on {network} for {LISTENING:g} s")
+        standing = Ranges(controller.contract).standing
+        _report(console, checks(controller, listen(bus, LISTENING), standing, LIMITS), waived)
+        if dry_run:
+            return
+        about = {
+            "recipe": controller.contract.recipe,
+            "export": export_digest(controller),
+            "scene": scene,
+            "limits": LIMITS.model_dump_json(),
+        }
+        writer = None if log is None else stack.enter_context(LogWriter(log, about))
+        if isinstance(source, Keyboard):
+            stack.enter_context(single_keys())
+        if isinstance(source, Udp):
+            stack.callback(source.close)
+        source.wanted(0.0, None)  # what was asked for before the robot was ready
+        pace = "in step with the simulated robot" if lockstep else prefer_this_process()
+        tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
+        clock: Clock = LockStep() if lockstep else MonotonicClock()
+        times = drive(
+            bus,
+            Machine(controller, scene),
+            source,
+            clock,
+            seconds=seconds,
+            log=writer,
+            tell=lambda text: tell(console, text),
+            stopped=stop.is_set,
+        )
+        tell(console, str(times))
+
+
+def _stop_request() -> threading.Event:
+    """What Ctrl+C and termination set."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    return stop
+
+
+def _report(console: Console, found: "list[Check]", waived: Collection[str]) -> None:
+    """Print the checks. Raises UsageError for failed ones that are not waived."""
+    for name in waived:
+        require_known(name, "check", [check.name for check in found])
+    table = plain_table("check", "", "found")
+    for check in found:
+        verdict = "ok" if check.passed else "waived" if check.name in waived else "FAILED"
+        table.add_row(check.name, verdict, check.text)
+    console.print(table)
+    if failed := [check.name for check in found if not check.passed and check.name not in waived]:
+        raise UsageError(
+            f"{', '.join(failed)}: failed, nothing was sent; put it right, or pass --waive {failed[0]} if you know why"
+        )
+
+
+def simulated_robot(
+    console: Console,
+    what: str,
+    *,
+    network: str,
+    domain: int,
+    scene: str,
+    mass: float | None,
+    seed: int,
+    support: Literal["band", "fixture", "none"] | None,
+    release: float,
+    lockstep: bool,
+    seconds: float,
+) -> None:
+    """Simulate a robot on the bus until it is stopped."""
+    require_bus("robot-sim")
+    from iowbc.commands.needs import require_training
+
+    require_training("robot-sim")
+    from iowbc.evaluation.exported import exported_world
+    from iowbc.onboard.dds import DdsBus
+    from iowbc.onboard.operators import Ranges
+    from iowbc.onboard.process import PERIOD
+    from iowbc.twin.process import serve
+    from iowbc.twin.robot import Twin
+    from iowbc.twin.support import Support
+
+    folder = exported_folder(what)
+    world, controller = exported_world(folder), Controller.load(folder)
+    simulation = world.recipe.simulation
+    require_known(scene, "scene", simulation.scenes.names)
+    controller.reset(scene=scene)
+    loaded = getattr(simulation.scenes, scene).object is not None
+    kind = support or ("fixture" if loaded else "band")
+    fixed = {"impulse_scale": 0.0, "push_scale": 0.0}
+    if loaded:
+        fixed |= {"partner_share": 0.0} | ({} if mass is None else {"object_mass": mass})
+    posture = controller.settled_posture(Ranges(controller.contract).standing)[0]
+    frequency = controller.contract.control_frequency
+    twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
+    bus = DdsBus(network, domain)
+    tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
+    stop, told = _stop_request(), False
+
+    def watch(robot: Twin) -> None:
+        nonlocal told
+        if robot.fallen and not told:
+            told = True
+            tell(console, f"{robot.periods * PERIOD:8.3f} s  fallen")
+
+    def going() -> bool:
+        return not stop.is_set() and twin.periods * PERIOD < seconds
+
+    serve(bus, twin, going, lockstep=lockstep, each=watch, answer=bus.answer_mode_requests)
+    tell(console, twin.verdict)
+    bus.close()

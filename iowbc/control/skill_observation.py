@@ -1,0 +1,111 @@
+"""What a robot observes at each decision of the skill layer, from its sensors alone."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.robot import rotations
+
+FORCE = 50.0
+"""Forces are observed in this unit [N], so that parts are of the size of one."""
+TIME = 10.0
+"""The same for times and ways left [s, m]."""
+SENSED = 44
+"""Size of what the robot observes beside the estimated forces."""
+
+
+WAYPOINTS, OBJECT = 9, 10
+"""Sizes of the parts of a known path and of the object."""
+YAW = 3
+"""Place of the yaw in the part of the object."""
+
+
+class Sensed(Protocol):
+    """Measurements of n robots, as `iowbc.control.sensors.Measured` has them."""
+
+    @property
+    def projected_gravity(self) -> Array: ...
+    @property
+    def base_angular_velocity(self) -> Array: ...
+    @property
+    def object_position(self) -> Array | None: ...
+    @property
+    def object_quaternion(self) -> Array | None: ...
+    @property
+    def object_linear_velocity(self) -> Array | None: ...
+    @property
+    def object_angular_velocity(self) -> Array | None: ...
+
+
+def robot_observation(
+    command: Array,
+    measured: Sensed,
+    wrist_error: Array,
+    sees_object: bool,
+    pushing: Mask,
+    known: Mask,
+    path: Array,
+    felt: Array,
+) -> Array:
+    """The robot's observation, (n, SENSED + 6 history) float32.
+
+    `command` (n, 11): in force; `wrist_error` (n, 2, 3) [m]; `pushing`, `known` (n,): whether there is a crate, and
+    whether the path is known; `path` (n, 9): its next waypoints; `felt` (n, history, 2, 3): estimated forces on the
+    hands, the newest last [N].
+    """
+    parts = sensed(command, measured, wrist_error, sees_object)
+    parts |= {"pushing": pushing, "known": known, "waypoints": path * known[:, None]}
+    return joined(parts | {"forces": felt.reshape(len(felt), -1) / FORCE})
+
+
+def joined(parts: Mapping[str, Array]) -> Array:
+    """Parts (n, k) or (n,) side by side, (n, sum of k) float32."""
+    columns = [values if values.ndim == 2 else values[:, None] for values in parts.values()]
+    return np.concatenate(columns, axis=1).astype(np.float32)
+
+
+def sensed(command: Array, measured: Sensed, wrist_error: Array, sees_object: bool) -> dict[str, Array]:
+    """What a robot senses, heading frame: `command` (n, 11), `wrist_error` (n, 2, 3) [m]; without `sees_object` the
+    object's part is zero."""
+    parts = {
+        "command": command,
+        "gravity": measured.projected_gravity,
+        "rates": measured.base_angular_velocity,
+        "wrist_error": 10.0 * wrist_error.reshape(-1, 6),
+    }
+    return parts | {"object": of_object(measured) if sees_object else np.zeros((len(command), OBJECT))}
+
+
+def of_object(measured: Sensed) -> Array:
+    """Measured object in the heading frame, (n, OBJECT): its place from the base, yaw, upward axis, velocity and yaw
+    rate relative to the base. Raises ValueError where there is no measurement of it."""
+    quaternion = _given(measured, "object_quaternion")
+    forward, up = (rotations.rotate(quaternion, np.tile(axis, (len(quaternion), 1))) for axis in np.eye(3)[::2])
+    names = ("object_position", "object_linear_velocity", "object_angular_velocity")
+    level, vectors = leveling(measured.projected_gravity), [forward, up, *(_given(measured, name) for name in names)]
+    forward, up, place, velocity, rates = (np.einsum("nij,nj->ni", level, vector) for vector in vectors)
+    yaw = np.arctan2(forward[:, 1], forward[:, 0])
+    return np.concatenate([place, yaw[:, None], up[:, :2], velocity, rates[:, 2:]], axis=1)
+
+
+def object_yaw(measured: Sensed) -> Array:
+    """Measured yaw of the object in the heading frame, (n,) [rad]."""
+    yaw: Array = of_object(measured)[:, YAW]
+    return yaw
+
+
+def _given(measured: Sensed, name: str) -> Array:
+    value: Array | None = getattr(measured, name)
+    if value is None:
+        raise ValueError(f"{name}: this skill observes the object; measure it")
+    return value
+
+
+def leveling(gravity: Array) -> Array:
+    """Rotations (n, 3, 3) from the base frame into the heading frame, of measured directions of gravity (n, 3)."""
+    up = -gravity / np.linalg.norm(gravity, axis=1, keepdims=True)
+    forward = np.array([1.0, 0.0, 0.0]) - up[:, :1] * up
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    return np.stack([forward, rotations.cross(up, forward), up], axis=1)

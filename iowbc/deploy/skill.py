@@ -1,0 +1,113 @@
+"""The exported skill, as it runs on a robot beside the controller: onnxruntime and NumPy, no torch and no simulator.
+
+controller, skill = Controller.load("exported"), Skill.load("skill", controller)
+command = skill.step(measured)                    # every 1 / controller.frequency seconds, and then
+targets = controller.step(measured, command)
+"""
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import onnxruntime
+
+from iowbc.arrays import Array, Mask
+from iowbc.control.command import approach, nominal_command, rate_limits
+from iowbc.control.hand_forces import HandForces
+from iowbc.control.references import ReferenceLayer, both_wrists
+from iowbc.control.sensors import Measured
+from iowbc.control.skill_command import SkillCommand
+from iowbc.control.skill_observation import WAYPOINTS, object_yaw, robot_observation
+from iowbc.deploy.contract import readable
+from iowbc.deploy.controller import Controller, base_grasp
+from iowbc.deploy.session import open_session, run
+from iowbc.deploy.skill_contract import GRAPH, SkillContract, read_skill_contract
+from iowbc.errors import ContractBroken
+
+
+class Skill:
+    """Commands of the skill layer for the robots of a controller, in games whose goal only the partner knows."""
+
+    def __init__(
+        self,
+        contract: SkillContract,
+        session: onnxruntime.InferenceSession,
+        controller: Controller,
+        scene: str,
+        pushing: bool,
+    ) -> None:
+        n, references = controller.robots, ReferenceLayer(controller.robot, controller.contract.references, None)
+        self.contract, self._session, self._controller = contract, session, controller
+        self._every = round(controller.frequency / contract.frequency)
+        self._references, self._hands = references, HandForces(controller.robot, references, n)
+        self._grasp = np.tile(both_wrists(base_grasp(controller.contract.references.grasps, scene)), (n, 1, 1))
+        self._largest_step = rate_limits(contract.commands.rates) / controller.frequency
+        self._pushing: Mask = np.full(n, pushing)
+        self._rule = SkillCommand(contract.robot, contract.commands, self._pushing)
+        self.observation = np.zeros((n, contract.observation), np.float32)
+        """What the skill last saw, (n, size)."""
+        self.reset()
+
+    @classmethod
+    def load(cls, folder: Path | str, controller: Controller, *, scene: str = "lift", pushing: bool = False) -> Self:
+        """The skill in the artifact of the stage `skill`, for the robots of a controller. `scene`: of the base grasp;
+        `pushing`: whether a crate is before the robots. Raises ContractBroken where the folder is not what its contract
+        says or belongs to another controller."""
+        folder = Path(folder)
+        contract = read_skill_contract(folder)
+        own, other = contract.sources.get("distill"), controller.contract.sources.get("distill")
+        if own != other:
+            raise ContractBroken(f"{folder}: trained with the student {own}, the controller has {other}; export both")
+        if (ratio := controller.frequency / contract.frequency) != round(ratio):
+            raise ContractBroken(f"{folder}: {contract.frequency} Hz is no whole part of {controller.frequency} Hz")
+        with readable(folder / GRAPH):
+            session = open_session(folder / GRAPH)
+            sizes = [tuple(port.shape[1:]) for port in (*session.get_inputs(), *session.get_outputs())]
+        if sizes != [(contract.observation,), (len(nominal_command(contract.commands)),)]:
+            raise ContractBroken(f"{folder / GRAPH}: shapes are {sizes}, not those of the contract; export again")
+        return cls(contract, session, controller, scene, pushing)
+
+    def reset(self) -> None:
+        """Forget the past of all robots."""
+        n = self._controller.robots
+        self._felt = np.zeros((n, self.contract.robot.history, 2, 3))
+        self._wrist_error = np.zeros((n, 2, 3))
+        self._passed = 0
+        self._command = self._rule.standing()
+
+    def step(self, measured: Measured) -> Array:
+        """Commands C, (n, 11), for the control period to come; a decision takes effect a period after it, as in
+        training.
+
+        A robot whose measurements are no numbers keeps its command. Raises ValueError for a missing quantity.
+        """
+        if self._passed:
+            target = self._controller.outputs["target"].astype(np.float64)
+            self._hands.add(target, measured.joint_position, measured.joint_velocity)
+        command = self._command
+        if self._passed % self._every == 0:
+            self._decide(measured)
+        self._passed += 1
+        return command.copy()
+
+    def _decide(self, measured: Measured) -> None:
+        state = self._controller.state
+        if self._passed:
+            force, wrists = self._hands.read(measured.projected_gravity)
+            self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
+            posture, last = (state[name].astype(np.float64) for name in ("posture", "command"))
+            wanted = self._references.wrist_target(posture, last, self._grasp)
+            self._wrist_error = wrists - wanted
+        command = self._command
+        if self._passed:
+            command = approach(state["command"].astype(np.float64), command, self._largest_step)
+        n, sees_object = len(command), self.contract.sees_object
+        unknown, no_path = np.zeros(n, np.bool_), np.zeros((n, WAYPOINTS))
+        self.observation = robot_observation(
+            command, measured, self._wrist_error, sees_object, self._pushing, unknown, no_path, self._felt
+        )
+        action = run(self._session, {"observation": self.observation})["action"]
+        yaw = object_yaw(measured) if sees_object else np.zeros(n)
+        decided = self._rule.with_action(self._rule.following(self._felt[:, -1].sum(axis=1), yaw), action)
+        whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
+        self._command = np.where(whole, decided, self._command)

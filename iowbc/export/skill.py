@@ -1,0 +1,62 @@
+"""Writes the exported skill: graph, contract, golden vectors."""
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from torch import Tensor
+
+from iowbc.arrays import Array
+from iowbc.control.command import COMMAND
+from iowbc.deploy.contract import PortEntry
+from iowbc.deploy.session import open_session, run
+from iowbc.deploy.skill_contract import GOLDEN, GRAPH, SkillContract, seal_skill
+from iowbc.export.folder import PACKAGES
+from iowbc.export.golden import largest_difference, write_golden
+from iowbc.export.graph import Program
+from iowbc.export.onnx_graph import run_torch, write_onnx
+from iowbc.learning.networks import TeacherNetwork
+from iowbc.recipe.recipe import Recipe
+
+
+class SkillProgram(Program):
+    """`skill.onnx`: the mean action of the robot's policy."""
+
+    def __init__(self, network: TeacherNetwork) -> None:
+        super().__init__()
+        self.network, size = network, len(network.normalizer.mean)
+        meaning = "see iowbc.control.skill_observation"
+        self.inputs = (PortEntry(name="observation", shape=(size,), unit="SI", frame="heading", meaning=meaning),)
+        meaning = "departure of C from the nominal command, in parts of its scales"
+        self.outputs = (PortEntry(name="action", shape=(len(COMMAND),), unit="1", frame="heading", meaning=meaning),)
+        self.eval().requires_grad_(False)
+
+    def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
+        return (self.network(values[0]).clamp(-1.0, 1.0),)
+
+
+def write_skill(
+    out: Path, network: TeacherNetwork, recipe: Recipe, sources: Mapping[str, str], observations: Array
+) -> float:
+    """Write the skill; returns the largest difference between torch and onnxruntime over the observations (n, size).
+
+    sources: artifact keys of what went into the skill, by stage.
+    """
+    contract = SkillContract(
+        frequency=recipe.skill.frequency,
+        observation=observations.shape[1],
+        sees_object=recipe.task.observation.observe_object and recipe.distill.observe_object,
+        robot=recipe.skill.robot,
+        commands=recipe.task.commands,
+        sources=dict(sources),
+        versions={name: version(name) for name in PACKAGES},
+    )
+    program = SkillProgram(network)
+    about = {"contract": contract.model_dump_json(exclude={"files"}), **sources}
+    write_onnx(program, out / GRAPH, recipe.export.opset, about)
+    inputs = {"observation": np.ascontiguousarray(observations, np.float32)}
+    expected = run_torch(program, inputs)
+    write_golden(inputs, expected, out / GOLDEN)
+    seal_skill(contract, out)
+    return max(largest_difference(expected, run(open_session(out / GRAPH), inputs)).values())

@@ -1,0 +1,103 @@
+"""Checks before a robot moves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.control.sensors import quantities
+from iowbc.deploy.controller import Controller
+from iowbc.onboard import watchdogs
+from iowbc.onboard.limits import Limits
+from iowbc.onboard.messages import Record
+from iowbc.onboard.sensors import Sensors
+
+MODEL = 5
+"""`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
+PITCH_ROLL = 0
+"""`mode_pr` in which ankles and waist are commanded by pitch and roll, not by their motors' angles."""
+DRY_STEPS = 5
+"""Steps of the policy on the measured posture; none is sent."""
+FURTHEST = 1.0
+"""Largest distance of a dry step's target from the default posture that is believed [rad]."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check and how it ended."""
+
+    name: str
+    passed: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class Listened:
+    """What the bus carried while the robot was listened to."""
+
+    states: Sequence[Record]
+    seconds: float
+    battery: Record | None
+    others: int
+    """Low-level commands of other programs."""
+    mode: str | None
+    """Active controller of the robot's own, "" for none, None without an answer."""
+
+
+def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits: Limits) -> list[Check]:
+    """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
+    contract = controller.contract
+    if not heard.states:
+        text = f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?"
+        return [Check("states", False, text)]
+    sensors = Sensors(len(contract.joints))
+    sensors.take(tuple(heard.states), heard.seconds)
+    assert sensors.posture is not None
+    state, rate = heard.states[-1], len(heard.states) / heard.seconds
+    beyond = watchdogs.beyond(sensors.posture, contract, limits)
+    warmest = int(state["motor_state"]["temperature"][: len(contract.joints)].max())
+    charge = None if heard.battery is None else int(heard.battery["soc"])
+    model, order = int(state["mode_machine"]), int(state["mode_pr"])
+    return [
+        Check("states", rate > 400.0, f"{rate:.0f} a second, 400 or more are needed"),
+        Check("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
+        Check("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
+        Check("mode", heard.mode == "", _mode(heard.mode)),
+        Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
+        Check("joints", beyond is None, beyond or "within limits, no motor overloaded, upright enough"),
+        Check("battery", charge is not None and charge >= limits.battery, _charge(charge, limits)),
+        Check(
+            "temperature", warmest <= limits.temperature, f"warmest motor {warmest} °C, {limits.temperature:g} allowed"
+        ),
+        _dry_run(controller, sensors, wanted),
+    ]
+
+
+def _mode(active: str | None) -> str:
+    if active is None:
+        return "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
+    return f"the robot's own controller {active!r} is active: release it first" if active else "released"
+
+
+def _charge(charge: int | None, limits: Limits) -> str:
+    return "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
+
+
+def _dry_run(controller: Controller, sensors: Sensors, wanted: "np.ndarray") -> Check:
+    """Steps of the policy on the posture as measured, of which no command is sent."""
+    if any(name in quantities(of_object=True) for name in (port.name for port in controller.contract.inputs)):
+        return Check("policy", True, "observes the object: tried when its pose arrives")
+    controller.reset()
+    default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0
+    for step in range(DRY_STEPS):
+        targets = controller.step(sensors.measured, wanted, measured_at=float(step))
+        if targets.held[0]:
+            return Check("policy", False, targets.reasons[0])
+        away = np.abs(targets.position[0] - default)
+        joint = int(np.argmax(away))
+        furthest = max(furthest, float(away[joint]))
+    controller.reset()
+    name = controller.contract.joints[joint]
+    return Check(
+        "policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})"
+    )

@@ -1,0 +1,115 @@
+"""The paper's errors of a logged run, as far as the robot's own sensors tell them.
+
+Height and velocity come from the legs' kinematics: the lower sole is taken to stand still. The velocity is that of the
+pelvis, not v_sys, for nobody measures the object.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+from iowbc.errors import UsageError
+from iowbc.onboard.log import read_turns
+from iowbc.onboard.machine import FREQUENCY
+from iowbc.onboard.sensors import Sensors
+from iowbc.robot import rotations
+from iowbc.robot.description import Robot
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a robot did in Run, at the rate of the policy; first axis: T control steps."""
+
+    time: Array
+    """From the log's beginning, (T,) [s]."""
+    command: Array
+    """C as it was asked for, (T, 11)."""
+    height: Array
+    """Of the pelvis above the lower sole, (T,) [m]."""
+    pitch: Array
+    """Lean of the torso, (T,) [rad]."""
+    heading: Array
+    """(T,) [rad]."""
+    velocity: Array
+    """Of the pelvis in the heading frame, averaged over a gait period, (T, 2) [m/s]."""
+
+    def deviations(self) -> dict[str, Array]:
+        """Deviation from the command as given, by the error's name, (T,) each."""
+        period = np.diff(self.time, prepend=self.time[0])
+        wanted = self.heading[0] + np.cumsum(self.command[:, YAW_RATE] * period)
+        return {
+            "E_v": np.linalg.norm(self.velocity - self.command[:, :2], axis=1),
+            "E_ψ": np.abs(self.heading - wanted),
+            "E_α": np.abs(self.pitch - self.command[:, PITCH]),
+            "E_h": np.abs(self.height - self.command[:, HEIGHT]),
+        }
+
+
+UNITS = {"E_v": "m/s", "E_ψ": "rad", "E_α": "rad", "E_h": "m"}
+
+
+def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> Run:
+    """The part of a log in which the policy acted. Raises UsageError where it never did, Damaged for another file."""
+    sensors, every = Sensors(len(robot.joints)), round(FREQUENCY / control_frequency)
+    full, rows, soles, begin = 0.99 * robot.kp, [], [], None
+    for number, turn in enumerate(read_turns(path)):
+        begin = turn.given.now if begin is None else begin
+        sensors.take(turn.given.states, turn.given.now)
+        stiff = (turn.command["motor_cmd"]["kp"][: len(robot.joints)] >= full).all()
+        if number % every or not stiff or sensors.posture is None:
+            continue
+        now, wanted = sensors.posture, turn.given.wanted
+        angles = dict(zip(robot.joints, now.position, strict=True))
+        upright = rotations.matrix(rotations.from_euler(*_lean(now.gravity), np.zeros(())))
+        feet = np.stack([upright @ robot.tree.forward(angles, robot.base, sole)[0] for sole in robot.soles])
+        pitch = float(rotations.lean_of(upright @ _torso(robot, angles)))
+        rows.append([turn.given.now - begin, pitch, sensors.heading, *wanted.command])
+        soles.append(feet)
+    if len(rows) < 2:
+        raise UsageError(f"{path}: the robot never ran")
+    table, feet = np.array(rows), np.array(soles)
+    return Run(
+        time=table[:, 0],
+        command=table[:, 3:],
+        height=-feet[..., 2].min(axis=1),
+        pitch=table[:, 1],
+        heading=table[:, 2],
+        velocity=_averaged(_velocity(feet, table[:, 0], table[:, 2]), round(control_frequency / gait_frequency)),
+    )
+
+
+def _lean(gravity: Array) -> tuple[Array, Array]:
+    """Roll and pitch of a base by the direction of gravity in it."""
+    return np.arctan2(-gravity[1], -gravity[2]), np.arctan2(gravity[0], np.hypot(gravity[1], gravity[2]))
+
+
+def _torso(robot: Robot, angles: dict[str, float]) -> Array:
+    """Rotation of the torso in the base, (3, 3)."""
+    rotation = np.eye(3)
+    for body in robot.tree.chain(robot.torso, robot.base):
+        rotation = rotation @ rotations.matrix(body.quaternion)
+        if body.hinge is not None:
+            rotation = rotation @ rotations.axis_matrix(body.hinge.axis, np.asarray(angles[body.hinge.name]))
+    return rotation
+
+
+def _velocity(feet: Array, time: Array, heading: Array) -> Array:
+    """Planar velocity of the pelvis, (T, 2) [m/s]; `feet` (T, 2, 3): soles from the base; all in the heading frame."""
+    period = np.maximum(np.diff(time), 1e-6)
+    lower = feet[1:, :, 2].argmin(axis=1)
+    place = np.arange(len(lower))
+    moved = (feet[1:] - feet[:-1])[place, lower, :2] / period[:, None]
+    turning = (np.diff(heading) / period)[:, None]
+    arm = feet[1:][place, lower, :2]
+    velocity = -moved - turning * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    return np.concatenate([velocity[:1], velocity])
+
+
+def _averaged(values: Array, window: int) -> Array:
+    """Centred moving average over a window of rows."""
+    kernel = np.ones(min(window, len(values)))
+    weight = np.convolve(np.ones(len(values)), kernel, "same")
+    return np.stack([np.convolve(column, kernel, "same") / weight for column in values.T], axis=1)

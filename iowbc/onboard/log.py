@@ -1,0 +1,162 @@
+"""The log of a robot: every message and every input of the state machine, in the MCAP format.
+
+Messages of one turn of the loop have one time. `inputs` begins a turn, and the low-level command ends it.
+"""
+
+import json
+import queue
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from mcap.reader import NonSeekingReader
+from mcap.writer import Writer
+
+from iowbc.errors import Damaged, UsageError
+from iowbc.onboard import messages
+from iowbc.onboard.machine import Inputs, State, Wanted
+from iowbc.onboard.messages import Record, from_cdr, to_cdr
+
+TOPICS = {messages.LOW_STATE: "rt/lowstate", messages.LOW_COMMAND: "rt/lowcmd"}
+JSON_TOPICS = ("inputs", "event", "timing")
+ABOUT = "iowbc"
+"""Name of the metadata with which the robot's program can be set up again."""
+
+
+class LogWriter:
+    """Writes a log in a thread of its own, so that no disk holds up the loop."""
+
+    def __init__(self, path: Path, about: dict[str, str]) -> None:
+        """`about`: what is needed to replay the log. Raises UsageError where the file cannot be written."""
+        try:
+            self._file = path.open("xb")
+        except OSError as error:
+            raise UsageError(f"--log {path}: {error.strerror}; name a new file in a folder that exists") from error
+        self._writer = Writer(self._file)
+        self._writer.start(profile="iowbc", library="iowbc")
+        self._writer.add_metadata(ABOUT, about)
+        self._channels: dict[str, int] = {}
+        for kind, topic in TOPICS.items():
+            name = f"unitree_hg/msg/dds_/{messages.NAMES[kind]}"
+            schema = self._writer.register_schema(name, "omgidl", messages.idl(kind).encode())
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", schema)
+        for topic in JSON_TOPICS:
+            schema = self._writer.register_schema(topic, "jsonschema", b'{"type": "object"}')
+            self._channels[topic] = self._writer.register_channel(topic, "json", schema)
+        self._queue: queue.SimpleQueue[tuple[str, float, bytes] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._write, name="log")
+        self._thread.start()
+
+    def turn(self, given: Inputs, command: Record) -> None:
+        """A turn of the loop."""
+        wanted = given.wanted
+        self.add(
+            "inputs",
+            given.now,
+            now=given.now,
+            command=wanted.command.tolist(),
+            at=_finite(wanted.at),
+            request=wanted.request,
+            seen={name: values.tolist() for name, values in wanted.seen.items()},
+            seen_at=_finite(wanted.seen_at),
+            others=given.others,
+        )
+        for state in given.states:
+            self._queue.put((TOPICS[messages.LOW_STATE], given.now, to_cdr(state)))
+        self._queue.put((TOPICS[messages.LOW_COMMAND], given.now, to_cdr(command)))
+
+    def add(self, topic: str, at_time: float, **values: Any) -> None:
+        """A JSON message at a time of the loop [s]."""
+        self._queue.put((topic, at_time, json.dumps(values).encode()))
+
+    def _write(self) -> None:
+        while (entry := self._queue.get()) is not None:
+            topic, now, data = entry
+            time = round(1e9 * now)
+            self._writer.add_message(self._channels[topic], time, data, time)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._queue.put(None)
+        self._thread.join()
+        self._writer.finish()
+        self._file.close()
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A logged turn of the loop."""
+
+    given: Inputs
+    command: Record
+
+
+def read_about(path: Path) -> dict[str, str]:
+    """What the log says of the program that wrote it. Raises Damaged."""
+    with path.open("rb") as file:
+        try:
+            about = [entry.metadata for entry in NonSeekingReader(file).iter_metadata() if entry.name == ABOUT]
+        except Exception as error:
+            raise Damaged(f"{path}: cannot be read as MCAP: {error}") from error
+    if not about:
+        raise Damaged(f"{path}: no log of `iowbc robot`")
+    return dict(about[0])
+
+
+def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
+    """Topic, time [s] and data of every message, as written; a file that was cut is read as far as it goes.
+
+    Raises UsageError for a missing file, Damaged for one without a message.
+    """
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from error
+    with file:
+        found = False
+        try:
+            for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+                found = True
+                yield channel.topic, 1e-9 * message.log_time, message.data
+        except Exception as error:  # of many kinds, by where the file was cut
+            if not found:
+                raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
+
+
+def read_turns(path: Path) -> Iterator[Turn]:
+    """The turns of a log, in order. Raises Damaged and UsageError."""
+    inputs: dict[str, Any] | None = None
+    states: list[Record] = []
+    for topic, _, data in read_messages(path):
+        if topic == "inputs":
+            inputs, states = json.loads(data), []
+        elif topic == TOPICS[messages.LOW_STATE]:
+            states.append(from_cdr(messages.LOW_STATE, data))
+        elif topic == TOPICS[messages.LOW_COMMAND] and inputs is not None:
+            yield Turn(_inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data))
+
+
+def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:
+    request = logged["request"]
+    wanted = Wanted(
+        command=np.array(logged["command"]),
+        at=_never(logged["at"]),
+        request=None if request is None else State(request),
+        seen={name: np.array(values) for name, values in logged["seen"].items()},
+        seen_at=_never(logged["seen_at"]),
+    )
+    return Inputs(logged["now"], tuple(states), wanted, logged["others"])
+
+
+def _finite(time: float) -> float | None:
+    """A time for JSON, which has no infinity."""
+    return time if np.isfinite(time) else None
+
+
+def _never(time: float | None) -> float:
+    return -np.inf if time is None else time

@@ -1,0 +1,205 @@
+"""The state machine that drives a robot: what arrived on the bus in, the next low-level command out.
+
+ZeroTorque → Damping → Stand → Run → Damping. It is a function of its inputs and of what it was given before, without
+clock, bus or files, so that a log of its inputs gives its commands again bit for bit.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.control.sensors import Measured, quantities
+from iowbc.deploy.controller import Controller
+from iowbc.onboard import messages, watchdogs
+from iowbc.onboard.limits import LIMITS, Limits
+from iowbc.onboard.messages import Record
+from iowbc.onboard.sensors import Sensors
+
+FREQUENCY = 500.0
+"""Rate at which commands are sent [Hz], that of the robot's states."""
+
+
+class State(StrEnum):
+    """States of a robot."""
+
+    ZERO_TORQUE = "zero-torque"
+    """The motors give nothing."""
+    DAMPING = "damping"
+    """The motors brake."""
+    STAND = "stand"
+    """Gains and posture move to those of standing, and stay there."""
+    RUN = "run"
+    """The policy acts."""
+
+
+BEFORE = {State.STAND: (State.DAMPING,), State.RUN: (State.STAND,)}
+"""States from which one is entered; the others are entered from everywhere."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What an operator asks for."""
+
+    command: Array
+    """C, (11,)."""
+    at: float
+    """When the command was given [s]."""
+    request: State | None = None
+    """State to enter."""
+    seen: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
+    """Measurements of the object by name, a row each; none for a controller that observes none."""
+    seen_at: float = -np.inf
+    """When the object was measured [s]."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a turn of the loop is given."""
+
+    now: float
+    """Monotonic clock [s]."""
+    states: tuple[Record, ...]
+    """States that arrived since the last turn, oldest first."""
+    wanted: Wanted
+    others: int = 0
+    """Low-level commands that others sent since the last turn."""
+
+
+class Machine:
+    """State machine, watchdogs and controller of a robot."""
+
+    def __init__(self, controller: Controller, scene: str, limits: Limits = LIMITS) -> None:
+        """`controller` of one robot; `scene`: base grasp and expected load. Raises ValueError for an unknown scene."""
+        self.controller, self.limits, self._scene = controller, limits, scene
+        controller.reset(scene=scene)
+        self._contract = contract = controller.contract
+        self._joints = len(contract.joints)
+        self._observed = quantities(of_object=True).keys() & {port.name for port in contract.inputs}
+        self.sensors = Sensors(self._joints)
+        self.state = State.ZERO_TORQUE
+        self.events: list[str] = []
+        """What happened in the last turn: states entered and why, and requests refused and why."""
+        self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
+        self._turns = round(FREQUENCY / contract.control_frequency)
+        """Turns of the loop for each step of the policy."""
+        self._turn = 0
+        self._last = -np.inf
+        self._entered = 0.0
+        self._from = self._goal = self._target = np.array(contract.default_position)
+
+    def turn(self, given: Inputs) -> Record:
+        """The command to send."""
+        self.events = []
+        self.sensors.take(given.states, given.now)
+        moving = self.state in (State.STAND, State.RUN)
+        reason = self._danger(given) if moving else None
+        if reason is not None:
+            self._enter(State.DAMPING, given, reason)
+        elif given.wanted.request not in (None, self.state):
+            self._request(given.wanted.request, given)
+        self._last = given.now
+        if self.state is State.RUN:
+            self._act(given)
+        return self._command(given.now)
+
+    def _danger(self, given: Inputs) -> str | None:
+        """The reason to damp, if there is one."""
+        limits = self.limits
+        assert self.sensors.posture is not None
+        if given.others:
+            return f"second publisher: {given.others} low-level commands of another program"
+        if (gap := given.now - self._last) > limits.overrun:
+            return f"loop overrun: {1e3 * gap:.1f} ms since the last turn"
+        if self.state is State.RUN and (reason := self._uninformed(given)) is not None:
+            return reason
+        return watchdogs.stale(self.sensors, given.now, limits) or watchdogs.beyond(
+            self.sensors.posture, self._contract, limits
+        )
+
+    def _request(self, wanted: State, given: Inputs) -> None:
+        """Enters the state that is asked for, or says why not."""
+        refusal = self._refusal(wanted, given)
+        if refusal is None:
+            self._enter(wanted, given, "requested")
+        else:
+            self.events.append(f"{wanted} refused: {refusal}")
+
+    def _refusal(self, wanted: State, given: Inputs) -> str | None:
+        limits, now = self.limits, self.sensors.posture
+        if wanted not in BEFORE:
+            return None
+        if self.state not in BEFORE[wanted]:
+            return f"it follows {' or '.join(BEFORE[wanted])}, and the robot is in {self.state}"
+        if now is None:
+            return "no state has arrived"
+        reason = watchdogs.stale(self.sensors, given.now, limits) or watchdogs.beyond(now, self._contract, limits)
+        if reason is not None:
+            return reason
+        if now.tilt > limits.standing_tilt:
+            return f"the pelvis leans by {now.tilt:.2f} rad, more than {limits.standing_tilt:g}"
+        if wanted is State.STAND and (speed := np.abs(now.velocity).max()) > limits.standing_speed:
+            return f"a joint moves at {speed:.1f} rad/s, more than {limits.standing_speed:g}"
+        if wanted is State.RUN:
+            if given.now - self._entered < limits.ramp:
+                return "the standing posture is not reached yet"
+            error = np.abs(now.position - self._goal)
+            if error[worst := int(np.argmax(error))] > limits.standing_error:
+                return f"{self._contract.joints[worst]} is {error[worst]:.2f} rad from the standing posture"
+            return self._uninformed(given)
+        return None
+
+    def _uninformed(self, given: Inputs) -> str | None:
+        """The reason where the newest command, or object pose that the policy observes, is old."""
+        wanted, limits = given.wanted, self.limits
+        if (age := given.now - wanted.at) > limits.command_age:
+            return f"stale command: nothing new for {age:.2f} s"
+        if missing := self._observed - wanted.seen.keys():
+            return f"no object pose: {', '.join(sorted(missing))}; this policy observes the object"
+        if self._observed and (age := given.now - wanted.seen_at) > limits.object_age:
+            return f"stale object pose: nothing new for {age:.2f} s"
+        return None
+
+    def _enter(self, state: State, given: Inputs, why: str) -> None:
+        self.state, self._entered, self._turn = state, given.now, 0
+        self.events.append(f"{state}: {why}")
+        if state is State.STAND:
+            assert self.sensors.posture is not None
+            self._from = self.sensors.posture.position
+            self._goal = self.controller.settled_posture(given.wanted.command)[0]
+        elif state is State.RUN:
+            self.controller.reset(scene=self._scene)
+
+    def _act(self, given: Inputs) -> None:
+        """A step of the policy every `_turns` turns; what it refuses leads to damping."""
+        if self._turn == 0:
+            targets = self.controller.step(self._measured(given), given.wanted.command, measured_at=self.sensors.at)
+            if targets.held[0]:
+                self._enter(State.DAMPING, given, targets.reasons[0])
+                return
+            self._target = targets.position[0]
+        self._turn = (self._turn + 1) % self._turns
+
+    def _measured(self, given: Inputs) -> Measured:
+        measured = self.sensors.measured
+        return Measured(**(vars(measured) | dict(given.wanted.seen)))
+
+    def _command(self, now: float) -> Record:
+        command = messages.empty(messages.LOW_COMMAND)
+        motors = command["motor_cmd"][: self._joints]
+        motors["mode"] = 1
+        if self.state is State.DAMPING:
+            motors["kd"] = self.limits.damping * self._kd
+        elif self.state is State.STAND:
+            part = min(1.0, (now - self._entered) / self.limits.ramp)
+            motors["q"] = self._from + part * (self._goal - self._from)
+            motors["kp"], motors["kd"] = part * self._kp, self._kd
+        elif self.state is State.RUN:
+            motors["q"], motors["kp"], motors["kd"] = self._target, self._kp, self._kd
+        if self.sensors.state is not None:
+            command["mode_machine"] = self.sensors.state["mode_machine"]
+        command["crc"] = messages.checksum(command)
+        return command

@@ -1,0 +1,214 @@
+"""Where commands come from: the wireless remote, the keyboard, or JSON over UDP."""
+
+import contextlib
+import json
+import os
+import select
+import socket
+import struct
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from iowbc.arrays import Array
+from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE
+from iowbc.control.sensors import quantities
+from iowbc.deploy.contract import Contract
+from iowbc.errors import UsageError
+from iowbc.onboard.machine import State, Wanted
+from iowbc.onboard.messages import Record
+from iowbc.recipe.section import Section
+
+BUTTONS = ("R1", "L1", "start", "select", "R2", "L2", "F1", "F2", "A", "B", "X", "Y", "up", "right", "down", "left")
+"""Bits of the remote's buttons."""
+REQUESTS = {"B": State.DAMPING, "select": State.ZERO_TORQUE, "start": State.DAMPING, "X": State.STAND, "A": State.RUN}
+"""States that a button asks for; the first one pressed counts."""
+DEAD = 0.1
+"""Part of a stick's way that counts as its middle."""
+HEIGHT_RATE, PITCH_RATE = 0.1, 0.3
+"""How fast the remote's arrows change height [m/s] and torso pitch [rad/s]."""
+KEYS = {" ": State.DAMPING, "0": State.ZERO_TORQUE, "1": State.DAMPING, "2": State.STAND, "3": State.RUN}
+STEPS = {"i": (0, 0.1), "k": (0, -0.1), "j": (1, 0.05), "l": (1, -0.05), "u": (YAW_RATE, 0.1), "o": (YAW_RATE, -0.1)}
+STEPS |= {"r": (HEIGHT, 0.02), "f": (HEIGHT, -0.02), "t": (PITCH, 0.1), "g": (PITCH, -0.1)}
+"""What a key adds to an entry of the command [m/s, rad/s, m, rad]."""
+LARGEST_DATAGRAM = 8192
+
+
+class Operator(Protocol):
+    """A source of commands."""
+
+    def wanted(self, now: float, state: Record | None) -> Wanted:
+        """What is asked for at `now` [s]; `state`: the robot's newest one."""
+
+
+class Ranges:
+    """Commands as training knew them: standing at first, and clipped."""
+
+    def __init__(self, contract: Contract) -> None:
+        known = contract.commands
+        self.velocity = np.array([known.velocity_x, known.velocity_y, known.yaw_rate]).T
+        self._low, self._high = np.full(len(COMMAND), -1.0), np.ones(len(COMMAND))
+        self._low[:HEIGHT], self._high[:HEIGHT] = self.velocity
+        for place, (low, high) in ((HEIGHT, known.height), (PITCH, known.deep_pitch)):
+            self._low[place], self._high[place] = low, high
+        self._high[OFFSET] = np.tile(np.add(known.common_offset, known.single_offset), 2)
+        self._low[OFFSET] = -self._high[OFFSET]
+        self.standing = np.zeros(len(COMMAND))
+        self.standing[HEIGHT], self.standing[PITCH] = known.nominal_height, known.nominal_pitch
+
+    def clipped(self, command: Array) -> Array:
+        """The command within the ranges, (11,)."""
+        inside: Array = np.clip(command, self._low, self._high)
+        return inside
+
+
+class Remote:
+    """The wireless remote, whose bytes come with the robot's state.
+
+    Left stick: velocity; right stick: turning; arrows: height and torso pitch. B damps, Start leaves zero torque, X
+    stands, A runs, Select gives zero torque.
+    """
+
+    def __init__(self, ranges: Ranges) -> None:
+        self._ranges, self._command, self._pressed, self._last = ranges, ranges.standing.copy(), 0, 0.0
+
+    def wanted(self, now: float, state: Record | None) -> Wanted:
+        if state is None:
+            return Wanted(self._command.copy(), now)
+        data = state["wireless_remote"].tobytes()
+        bits, left_x, right_x, _, _, left_y = struct.unpack_from("<2xHfffff", data)
+        down = {name for place, name in enumerate(BUTTONS) if bits >> place & 1}
+        fresh = {name for name in down if not self._pressed >> BUTTONS.index(name) & 1}
+        self._pressed, passed = bits, min(max(now - self._last, 0.0), 0.1)
+        self._last = now
+        self._command[:HEIGHT] = [self._stick(i, value) for i, value in enumerate((left_y, -left_x, -right_x))]
+        self._command[HEIGHT] += HEIGHT_RATE * passed * (("up" in down) - ("down" in down))
+        self._command[PITCH] += PITCH_RATE * passed * (("right" in down) - ("left" in down))
+        self._command = self._ranges.clipped(self._command)
+        request = next((wanted for name, wanted in REQUESTS.items() if name in fresh), None)
+        return Wanted(self._command.copy(), now, State.DAMPING if "B" in down else request)
+
+    def _stick(self, axis: int, value: float) -> float:
+        if not abs(value) > DEAD:
+            return 0.0
+        low, high = self._ranges.velocity[:, axis]
+        return float(min(abs(value), 1.0) * (high if value > 0.0 else low))
+
+
+class Keyboard:
+    """Keys of this terminal: 1 damping, 2 stand, 3 run, 0 zero torque, space damping; i k j l u o velocity, r f height,
+    t g torso pitch, x stops."""
+
+    def __init__(self, ranges: Ranges) -> None:
+        self._ranges, self._command = ranges, ranges.standing.copy()
+
+    def wanted(self, now: float, state: Record | None) -> Wanted:
+        request = None
+        while select.select([sys.stdin], [], [], 0.0)[0] and (key := os.read(sys.stdin.fileno(), 1).decode("latin-1")):
+            request = State.DAMPING if request is State.DAMPING else KEYS.get(key, request)
+            if key in STEPS:
+                place, step = STEPS[key]
+                self._command[place] += step
+            elif key == "x":
+                self._command[:HEIGHT] = 0.0
+        self._command = self._ranges.clipped(self._command)
+        return Wanted(self._command.copy(), now, request)
+
+
+@contextlib.contextmanager
+def single_keys() -> Iterator[None]:
+    """A terminal that gives each key at once. Raises UsageError where there is none."""
+    import termios
+    import tty
+
+    if not sys.stdin.isatty():
+        raise UsageError("--commands keyboard: the standard input is no terminal; use remote or udp")
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+class Datagram(Section):
+    """A command over UDP, as JSON."""
+
+    velocity: tuple[float, float] = (0.0, 0.0)
+    """Forward and to the left [m/s]."""
+    yaw_rate: float = 0.0
+    """To the left [rad/s]."""
+    height: float | None = None
+    """Of the pelvis [m]; that of training's nominal posture by default."""
+    pitch: float | None = None
+    """Of the torso, forward [rad]; the same."""
+    wrists: tuple[float, float, float, float, float, float] = (0.0,) * 6
+    """Offsets of the left and right wrist, heading frame [m]."""
+    request: State | None = None
+    """State to enter."""
+    seen: dict[str, tuple[float, ...]] = Field(default_factory=dict)
+    """Measurements of the object by the names of the contract's inputs."""
+
+
+class Udp:
+    """JSON datagrams at a port of this machine; see `Datagram`. One that cannot be read changes nothing."""
+
+    def __init__(self, ranges: Ranges, port: int) -> None:
+        self._ranges = ranges
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(("127.0.0.1", port))
+        except OSError as error:
+            raise UsageError(f"--commands udp:{port}: {error}; choose another port") from error
+        self._socket.setblocking(False)
+        self.port: int = self._socket.getsockname()[1]
+        self.refused = ""
+        """What is wrong with the last datagram that could not be read."""
+        self._wanted = Wanted(ranges.standing, -np.inf)
+
+    def wanted(self, now: float, state: Record | None) -> Wanted:
+        request = None
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                data = self._socket.recv(LARGEST_DATAGRAM)
+                try:
+                    given = Datagram.model_validate(json.loads(data))
+                except (ValueError, ValidationError, RecursionError) as error:
+                    self.refused = f"{type(error).__name__}: {error}"
+                    continue
+                request = State.DAMPING if request is State.DAMPING else given.request or request
+                self._wanted = self._given(given, now)
+        last = self._wanted
+        return replace(last, request=request)
+
+    def close(self) -> None:
+        """Gives the port free."""
+        self._socket.close()
+
+    def _given(self, given: Datagram, now: float) -> Wanted:
+        command = self._ranges.standing.copy()
+        command[:HEIGHT] = *given.velocity, given.yaw_rate
+        for place, value in ((HEIGHT, given.height), (PITCH, given.pitch)):
+            command[place] = command[place] if value is None else value
+        command[OFFSET] = given.wrists
+        command = np.where(np.isfinite(command), self._ranges.clipped(command), self._ranges.standing)
+        known = quantities(of_object=True)
+        seen: dict[str, Any] = {name: np.array([given.seen[name]]) for name in known if name in given.seen}
+        return Wanted(command, now, None, seen or self._wanted.seen, now if seen else self._wanted.seen_at)
+
+
+def operator(kind: str, contract: Contract) -> Remote | Keyboard | Udp:
+    """The operator that `--commands` names. Raises UsageError."""
+    ranges = Ranges(contract)
+    if kind == "remote":
+        return Remote(ranges)
+    if kind == "keyboard":
+        return Keyboard(ranges)
+    name, _, port = kind.partition(":")
+    if name == "udp" and port.isdecimal() and 0 <= int(port) < 65536:
+        return Udp(ranges, int(port))
+    raise UsageError(f"--commands {kind}: valid: remote, keyboard, udp:PORT")

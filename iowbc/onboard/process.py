@@ -1,0 +1,168 @@
+"""The process that drives a robot: checks, then the loop of states in and commands out, timed and logged."""
+
+import ctypes
+import gc
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from iowbc.onboard import messages
+from iowbc.onboard.bus import Bus
+from iowbc.onboard.checks import Listened
+from iowbc.onboard.log import LogWriter
+from iowbc.onboard.machine import FREQUENCY, Inputs, Machine, State
+from iowbc.onboard.messages import Record
+from iowbc.onboard.operators import Operator
+
+PERIOD = 1.0 / FREQUENCY
+PATIENCE = 1.0
+"""Time after which a robot in lock step counts as gone [s]."""
+DISCOVERY = 10.0
+"""For how long the first state is waited for [s]: participants find each other within some seconds."""
+FAREWELL = 0.5
+"""For how long damping is commanded at the end [s]."""
+REALTIME_PRIORITY = 60
+"""Above ordinary threads of the kernel's real-time class, below its own."""
+KEPT_TIMES = 1 << 20
+"""Turns of which times are kept for the statistics: 35 minutes."""
+
+
+class Clock(Protocol):
+    """When the turns of the loop take place."""
+
+    late: float
+    """How late the last turn began [s]."""
+
+    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+        """Waits for the next turn; its time [s], and the states that have arrived."""
+
+
+class MonotonicClock:
+    """Turns at equal times of this machine's monotonic clock; those that were missed are left out."""
+
+    def __init__(self) -> None:
+        self._due = time.monotonic()
+        self.late = 0.0
+
+    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+        self._due += PERIOD
+        now = time.monotonic()
+        if now < self._due:
+            time.sleep(self._due - now)
+            now = time.monotonic()
+        self.late = now - self._due
+        self._due += PERIOD * (self.late // PERIOD)
+        return now, tuple(bus.take(messages.LOW_STATE))
+
+
+class LockStep:
+    """A turn for each state that a simulated robot sends, which waits for the command: as fast or slow as both are."""
+
+    late = 0.0
+
+    def __init__(self) -> None:
+        self._now = 0.0
+
+    def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
+        arrived = bus.wait(messages.LOW_STATE, PATIENCE)
+        states = tuple(bus.take(messages.LOW_STATE))
+        self._now = 1e-3 * float(states[-1]["tick"]) if arrived and states else self._now + PATIENCE
+        return self._now, states
+
+
+@dataclass(frozen=True)
+class Times:
+    """How regular the loop was."""
+
+    late: np.ndarray
+    """How late each turn began [s]."""
+    busy: np.ndarray
+    """How long each turn took [s]."""
+
+    def __str__(self) -> str:
+        if not len(self.late):
+            return "no turn"
+        parts = [
+            f"{name} p50 {1e3 * np.median(values):.2f}, p99 {1e3 * np.quantile(values, 0.99):.2f}, "
+            f"worst {1e3 * values.max():.2f} ms"
+            for name, values in (("late", self.late), ("turn", self.busy))
+        ]
+        return "; ".join([f"{len(self.late)} turns", *parts])
+
+
+def listen(bus: Bus, seconds: float) -> Listened:
+    """What the bus carries for some time [s], from the first state on."""
+    states: list[Record] = []
+    battery: Record | None = None
+    others = 0
+    if not bus.wait(messages.LOW_STATE, DISCOVERY):
+        return Listened([], DISCOVERY, None, 0, None)
+    begin = time.monotonic()
+    while (spent := time.monotonic() - begin) < seconds:
+        bus.wait(messages.LOW_STATE, 0.01)
+        states += bus.take(messages.LOW_STATE)
+        others += len(bus.take(messages.LOW_COMMAND))
+        battery = next(iter(bus.take(messages.BATTERY_STATE)[::-1]), battery)
+    return Listened(states, spent, battery, others, bus.high_level_mode(seconds))
+
+
+def prefer_this_process() -> str:
+    """Locks memory and raises priority where allowed; says what was."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    locked = libc.mlockall(3) == 0  # MCL_CURRENT | MCL_FUTURE
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(REALTIME_PRIORITY))
+        raised = True
+    except PermissionError:
+        raised = False
+    gc.collect()
+    gc.freeze()
+    return f"memory {'locked' if locked else 'not locked'}, priority {'raised' if raised else 'not raised'}"
+
+
+def drive(
+    bus: Bus,
+    machine: Machine,
+    operator: Operator,
+    clock: Clock,
+    *,
+    seconds: float = float("inf"),
+    log: LogWriter | None = None,
+    tell: Callable[[str], None] = print,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Times:
+    """Drives the robot until `stopped` or for some time [s], and damps it at the end."""
+    kept: tuple[list[float], list[float]] = ([], [])
+    begin: float | None = None
+    leaving: float | None = None
+    while True:
+        now, states = clock.turn(bus)
+        started = time.perf_counter()
+        others = len(bus.take(messages.LOW_COMMAND))
+        begin = now if begin is None else begin
+        wanted = operator.wanted(now, states[-1] if states else machine.sensors.state)
+        if leaving is None and (stopped() or now - begin >= seconds):
+            leaving = now
+        if leaving is not None:
+            wanted = replace(wanted, request=State.DAMPING)
+        given = Inputs(now, states, wanted, others)
+        command = machine.turn(given)
+        bus.publish(command)
+        for event in machine.events:
+            tell(f"{now - begin:8.3f} s  {event}")
+            if log is not None:
+                log.add("event", now, text=event, state=machine.state)
+        if log is not None:
+            log.turn(given, command)
+        if len(kept[0]) < KEPT_TIMES:
+            kept[0].append(clock.late)
+            kept[1].append(time.perf_counter() - started)
+        if leaving is not None and now - leaving >= FAREWELL:
+            times = Times(np.array(kept[0]), np.array(kept[1]))
+            if log is not None:
+                log.add("timing", now, text=str(times))
+            return times

@@ -1,0 +1,107 @@
+"""From the bus's states to the measurements of the controller; refuses what is old, repeated or no number."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.control.sensors import Measured
+from iowbc.onboard.messages import Record
+from iowbc.robot import rotations
+
+CLOCK_DRIFT = 2e-4
+"""Drift between the robot's clock and this one that is not taken for delay [s/s]."""
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A robot's state in the order of its joints."""
+
+    position: Array
+    """(joints,) [rad]."""
+    velocity: Array
+    """(joints,) [rad/s]."""
+    torque: Array
+    """Estimated by the motors' drives, (joints,) [N·m]."""
+    gravity: Array
+    """Direction of gravity, base frame, (3,)."""
+    turning: Array
+    """Angular velocity, base frame, (3,) [rad/s]."""
+    yaw: float
+    """Heading without the turns before [rad]."""
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the base and the vertical [rad]."""
+        return float(np.arccos(np.clip(-self.gravity[2], -1.0, 1.0)))
+
+
+def posture(state: Record, joints: int) -> Posture:
+    """The values of a state; numbers need not be finite."""
+    motors, imu = state["motor_state"][:joints], state["imu_state"]
+    quaternion = imu["quaternion"].astype(np.float64)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        rotation = rotations.matrix(rotations.normalized(quaternion))
+    return Posture(
+        position=motors["q"].astype(np.float64),
+        velocity=motors["dq"].astype(np.float64),
+        torque=motors["tau_est"].astype(np.float64),
+        gravity=-rotation[2],
+        turning=imu["gyroscope"].astype(np.float64),
+        yaw=float(np.arctan2(rotation[1, 0], rotation[0, 0])),
+    )
+
+
+class Sensors:
+    """Newest state of a robot, its age, and its heading over any number of turns."""
+
+    def __init__(self, joints: int) -> None:
+        self._joints = joints
+        self.state: Record | None = None
+        self.posture: Posture | None = None
+        self.heading = 0.0
+        self.at = -np.inf
+        """When the newest state arrived [s]."""
+        self.late = 0.0
+        """How much later than usual it arrived, by the robot's clock [s]."""
+        self.refused = 0
+        """States that were repeated, or older than one before."""
+        self._least, self._least_at = np.inf, 0.0
+
+    def take(self, states: tuple[Record, ...], now: float) -> None:
+        """Takes in what arrived, oldest first, at `now` [s]."""
+        for state in states:
+            if self._repeated(state):
+                self.refused += 1
+                continue
+            found = posture(state, self._joints)
+            if self.posture is not None:
+                turned = (found.yaw - self.posture.yaw + np.pi) % (2.0 * np.pi) - np.pi
+                self.heading += float(turned) if np.isfinite(turned) else 0.0
+            else:
+                self.heading = found.yaw
+            self.state, self.posture, self.at = state, found, now
+            offset = now - 1e-3 * float(state["tick"])
+            self._least = min(self._least + CLOCK_DRIFT * (now - self._least_at), offset)
+            self._least_at, self.late = now, offset - self._least
+
+    def _repeated(self, state: Record) -> bool:
+        """Whether a state is no newer than the last, or has its very values: sensors have noise."""
+        last = self.state
+        if last is None:
+            return False
+        frozen = last["imu_state"] == state["imu_state"] and (last["motor_state"] == state["motor_state"]).all()
+        return bool(state["tick"] <= last["tick"] or frozen)
+
+    @property
+    def measured(self) -> Measured:
+        """The newest measurements as a row."""
+        assert self.posture is not None
+        now = self.posture
+        return Measured(
+            projected_gravity=now.gravity[None],
+            base_angular_velocity=now.turning[None],
+            heading=np.full((1, 1), self.heading),
+            joint_position=now.position[None],
+            joint_velocity=now.velocity[None],
+        )

@@ -1,0 +1,84 @@
+"""Multi-agent PPO of the skill layer: a robot and a human, with one critic."""
+
+from typing import Literal, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from iowbc.recipe.section import COSMETIC, DEEPEST, Section, Width
+
+LARGEST_ROLLOUT = 1_000_000
+"""Decisions that are kept in memory for one update."""
+
+
+class SkillLearning(Section):
+    """Multi-agent PPO: decentralised policies of robot and human, a centralised value network in training."""
+
+    algorithm: Literal["mappo", "happo", "ppo"] = "mappo"
+    """`mappo`: both policies learn at once from the same advantages (Yu et al. 2022). `happo`: one after the other, the
+    later one with its advantages weighted by what the earlier one changed (Kuba et al. 2022). `ppo`: the robot alone,
+    against scripted humans throughout, with a value of its own observation."""
+    steps: int = Field(default=400_000, ge=1, le=10**12)
+    """Decisions of the whole training, summed over the games."""
+    games: int = Field(default=32, ge=1, le=100_000)
+    """Games that are played at the same time."""
+    rollout: int = Field(default=100, ge=2, le=10_000)
+    """Decisions of each game between two updates. All games begin anew with each rollout, so that a resumed training
+    needs no state of the simulation; an episode should therefore fit into one."""
+    imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
+    """First decisions, in which the robot does not learn from the reward: it acts, and imitates what it would do if it
+    knew the path (DAgger), while the value learns. From the reward alone 80,000 decisions had changed nothing."""
+    scripted_steps: int = Field(default=200_000, ge=0, le=10**12)
+    """First decisions, those of the imitation included, in which every human is a scripted one."""
+    learnt_share: float = Field(default=0.5, ge=0, le=1)
+    """Part of the episodes in which the learnt human acts afterwards; the robot goes on meeting scripted ones in the
+    others, so that it does not learn to rely on one partner."""
+    minibatches: int = Field(default=4, ge=1, le=100_000)
+    """Parts into which a rollout is split for the gradient steps; must divide games x rollout."""
+    epochs: int = Field(default=5, ge=1, le=1000)
+    """Passes over a rollout."""
+    imitation_gradient_steps: int = Field(default=200, ge=1, le=100_000)
+    """Gradient steps of the imitation after each rollout."""
+    imitation_rate: float = Field(default=1e-3, gt=0)
+    """Adam's step size of the imitation."""
+    hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
+    """Hidden layers of the policies and of the value network."""
+    activation: Literal["elu", "relu", "tanh"] = "elu"
+    """Activation of the hidden layers."""
+    normalization_clip: float = Field(default=5.0, gt=0)
+    """Normalised inputs are clipped to this many standard deviations."""
+    learning_rate: float = Field(default=6e-5, gt=0)
+    """Adam's step size of the policies at the start; at 3e-4 the first update after the imitation had a KL divergence
+    of 0.35."""
+    value_learning_rate: float = Field(default=3e-4, gt=0)
+    """Adam's step size of the value."""
+    desired_kl: float | None = Field(default=0.012, gt=0)
+    """KL divergence that an update of a policy should have; moves its step size as in `teacher.desired_kl`."""
+    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (1e-5, 1e-3)
+    """Least and largest step size, where `desired_kl` moves it."""
+    gamma: float = Field(default=0.98, gt=0, lt=1)
+    """Discount factor of a decision; 0.98 looks ten seconds ahead at 5 Hz."""
+    gae_lambda: float = Field(default=0.95, ge=0, le=1)
+    """Decay of the generalised advantage estimate."""
+    clip: float = Field(default=0.2, gt=0)
+    """PPO's clip range of the probability ratio."""
+    entropy: float = Field(default=0.0, ge=0)
+    """Weight of the entropy bonus."""
+    gradient_norm: float = Field(default=1.0, gt=0)
+    """Largest norm of a gradient step."""
+    initial_std: float = Field(default=0.4, gt=0)
+    """Initial standard deviation of the actions, which range from -1 to 1."""
+    std_floor: float = Field(default=0.05, gt=0)
+    """Least standard deviation."""
+    seed: int | None = Field(default=None, ge=0, lt=2**32)
+    """Seed of this training alone; the recipe's `seed` when empty."""
+    checkpoint_every: int = Field(default=5, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
+    """Updates between two checkpoints."""
+
+    @model_validator(mode="after")
+    def _minibatches_divide(self) -> Self:
+        samples = self.games * self.rollout
+        if samples > LARGEST_ROLLOUT:
+            raise ValueError(f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory")
+        if samples % self.minibatches:
+            raise ValueError(f"minibatches ({self.minibatches}) does not divide games x rollout ({samples})")
+        return self

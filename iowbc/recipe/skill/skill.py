@@ -1,0 +1,139 @@
+"""The skill layer of a recipe: tasks, agents and reward of the Markov game."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.partner import BEHAVIOURS
+from iowbc.recipe.skill.evaluation import SkillEvaluation
+from iowbc.recipe.skill.learning import SkillLearning
+from iowbc.recipe.skill.reward import GameReward
+from iowbc.recipe.skill.task import Tasks
+
+PartnerKind = Literal["path", "follower", "leader", "stopping", "tugging", "lagging", "agent"]
+"""Behaviours of scripted humans, and the human of the actions."""
+
+
+class RobotAgent(Section):
+    """Nominal command of the robot, and how far its action departs from it."""
+
+    velocity: tuple[float, float] = (0.25, 0.15)
+    """Largest change of v_x and v_y by the action [m/s]."""
+    yaw_rate: float = Field(default=0.25, gt=0.0)
+    """Largest change of the yaw rate by the action [rad/s]."""
+    height: float = Field(default=0.1, gt=0.0)
+    """Largest change of the height by the action [m]."""
+    pitch: float = Field(default=0.2, gt=0.0)
+    """Largest change of the torso pitch by the action [rad]."""
+    offset: float = Field(default=0.05, gt=0.0)
+    """Largest change of a wrist offset by the action [m]."""
+    push_pitch: float = 0.2
+    """Torso pitch of the nominal command in a push [rad], that of the trials' sequences."""
+    admittance: tuple[float, float] = (0.012, 0.008)
+    """Velocity of a nominal follower for a force on its hands, forward and to the left [m/(N·s)]: 30 N make it walk at
+    0.36 m/s."""
+    deadband: float = Field(default=4.0, ge=0.0)
+    """Force below which a nominal follower stands [N]; the estimate of force errs by as much."""
+    push_force: float = Field(default=40.0, gt=0.0)
+    """Force that a nominal follower in a push approaches [N]; it goes forward until its hands meet it."""
+    alignment: float = Field(default=1.0, ge=0.0)
+    """Yaw rate of a nominal follower for the object's yaw in its heading frame [1/s]."""
+    history: int = Field(default=5, ge=1, le=50)
+    """Decisions over which the robot observes the estimated forces on its hands."""
+
+
+class HumanAgent(Section):
+    """The human: its strength, and how far the learnt one's action departs from the scripted way along the path."""
+
+    strongest: float = Field(default=50.0, gt=0.0)
+    """Bound on the force of spring and damper of its arms [N], in place of `simulation.partner.strongest`: with its
+    share of the resistance it does not move the crate alone."""
+    velocity: float = Field(default=0.3, gt=0.0)
+    """Largest change of the horizontal velocity of the handle, per axis [m/s]: as fast as the script walks."""
+    vertical_velocity: float = Field(default=0.1, gt=0.0)
+    """Largest change of the vertical velocity of the handle [m/s], and the script's largest."""
+    height: float = Field(default=0.1, gt=0.0)
+    """Largest offset of the handle's height from what the vertical velocity has led to [m]."""
+    yaw_rate: float = Field(default=0.3, gt=0.0)
+    """Largest change of the yaw rate that the human gives the object [rad/s]."""
+
+
+class Pursuit(Section):
+    """How scripted agents that know the path move along it."""
+
+    speed: float = Field(default=0.3, gt=0.0)
+    """Speed along the path [m/s]; a little more than half of what the controller is trained for."""
+    slowing: float = Field(default=0.4, gt=0.0)
+    """Distance from the end at which it slows down [m]."""
+    lateral: float = Field(default=0.6, ge=0.0)
+    """Velocity towards the path for the distance from it [1/s]."""
+    yaw: float = Field(default=0.8, ge=0.0)
+    """Yaw rate for the deviation from the path's heading [1/s]."""
+    vertical: float = Field(default=1.0, ge=0.0)
+    """Vertical velocity of the handle for the object's distance from the path's height [1/s]."""
+    ahead: float = Field(default=0.3, ge=0.0)
+    """Distance ahead at which the path's heading and height are read [m]; a second of walking."""
+    waypoints: tuple[float, float] = (0.5, 1.0)
+    """Distances ahead of the next two waypoints that agents observe [m]."""
+
+
+class Finish(Section):
+    """When a game ends."""
+
+    distance: float = Field(default=0.15, gt=0.0)
+    """Distance along the path from its end that counts as reached [m]."""
+    lateral: float = Field(default=0.2, gt=0.0)
+    """Largest distance from the path at the end [m]."""
+    yaw: float = Field(default=0.3, gt=0.0)
+    """Largest deviation from the path's heading at the end [rad]."""
+    height: float = Field(default=0.08, gt=0.0)
+    """Largest distance from the path's height at the end [m], for an object that is carried."""
+    walls: Literal["end", "cost"] = "cost"
+    """Consequence of an object's corner in a wall: the end of the game, or a cost by time."""
+    stray: float = Field(default=1.0, gt=0.0)
+    """Distance from the path at which the game ends [m]."""
+
+
+class PartnerKinds(Section):
+    """Humans in training and in evaluation."""
+
+    training: tuple[PartnerKind, ...] = ("path", "follower", "leader", "stopping")
+    """Humans of training."""
+    held_out: tuple[PartnerKind, ...] = ("tugging", "lagging")
+    """Humans that only the evaluation plays."""
+
+    @model_validator(mode="after")
+    def _held_out(self) -> Self:
+        if both := set(self.training) & set(self.held_out):
+            raise ValueError(f"{', '.join(sorted(both))}: both in training and held out; name it once")
+        if not self.training:
+            raise ValueError(f"training: name at least one of {', '.join(BEHAVIOURS)}, agent")
+        return self
+
+
+class Skill(Section):
+    """The Markov game of a robot and a human who transport an object together."""
+
+    frequency: float = Field(default=5.0, gt=0.0)
+    """Decisions a second [Hz]; the control frequency is a whole multiple of it."""
+    tasks: Tasks = Tasks()
+    """Transport tasks by name."""
+    goal_known: float = Field(default=0.5, ge=0.0, le=1.0)
+    """Part of the games in which the robot knows the path; in the others only the human does."""
+    partners: PartnerKinds = PartnerKinds()
+    """Humans of training and evaluation."""
+    robot: RobotAgent = RobotAgent()
+    """The robot's nominal command and action."""
+    human: HumanAgent = HumanAgent()
+    """The human's action."""
+    pursuit: Pursuit = Pursuit()
+    """Motion of scripted agents along the path."""
+    finish: Finish = Finish()
+    """When a game ends."""
+    reward: GameReward = GameReward()
+    """The shared reward."""
+    learning: SkillLearning = SkillLearning()
+    """Multi-agent PPO of robot and human."""
+    eval: SkillEvaluation = SkillEvaluation()
+    """Games in which skills and rivals are compared."""

@@ -1,0 +1,113 @@
+"""The environments of one scene stepped by Drake."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices, Mask
+from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.simulation.scene import Scene
+from iowbc.recipe.simulation.simulation import Physics
+from iowbc.robot import rotations
+from iowbc.robot.description import Robot
+from iowbc.sim.drake.environment import Environment, Inputs, Places
+from iowbc.sim.period import Period
+from iowbc.sim.soles import Soles
+from iowbc.sim.timing import Timing
+from iowbc.sim.world import FEET, HANDS, THING, World
+
+
+class DrakeWorld(World):
+    """n environments of one scene. Drake takes the steps; MuJoCo holds the numbers and states, and computes what
+    follows from a state by kinematics alone."""
+
+    def __init__(
+        self, robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, settings: Drake
+    ) -> None:
+        super().__init__(robot, physics, scene, rows, timing)
+        self._settings = settings
+        self._steps = Timing(timing.period, settings.timestep, timing.longest_latency)
+        bodies, layout = np.arange(self.model.nbody), self.layout
+        self._places = Places(bodies[layout.feet], bodies[layout.hands], layout.object)
+        self._environments: list[Environment] = []
+        n = len(rows)
+        self._lag = np.zeros(n, np.intp)
+        """Physics steps by which the motors follow their targets late, (n,)."""
+        self._targets = np.zeros((n, self._steps.kept_targets + self._steps.substeps - 1, len(robot.joints)))
+        """Targets of the physics steps of the longest latency and of the last control period, the oldest first."""
+        self._memory.update(lag=self._lag, targets=self._targets)
+        self._past_forces, past_ground = np.zeros((n, 2, 1, 3)), np.zeros((n, 2, 1, 3))
+        self._past_ground = past_ground
+        self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
+        self._build(np.arange(n))
+
+    def _build(self, ids: Indices) -> None:
+        """Makes the plants of some environments from their models."""
+        self._environments += [None] * (len(self.rows) - len(self._environments))  # type: ignore[list-item]
+        for index in ids:
+            self._environments[index] = Environment(
+                self.batch.get_model(index),
+                self._settings,
+                self._places,
+                implicit=self.physics.pd == "implicit",
+                yaw_arm=self.scene.yaw_arm,
+            )
+
+    def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
+        """See `World`."""
+        super().reset(ids, joint_position, pitch, yaw, drawn)
+        self._lag[ids] = np.round(drawn["action_latency"] * self._steps.substeps)
+        self._targets[ids] = self.control[ids, None]
+        self._build(ids)
+
+    def restore(self, values: Mapping[str, Array]) -> None:
+        """See `World`."""
+        super().restore(values)
+        self._build(np.arange(len(self.rows)))
+
+    def _advance(self, given: Period, diverged: Mask) -> None:
+        substeps, targets = self._steps.substeps, self._targets
+        targets[:, :-substeps] = targets[:, substeps:]
+        targets[:, -substeps:] = self.control[:, None]
+        for index, environment in enumerate(self._environments):
+            last = targets.shape[1] - self._lag[index]
+            inputs = Inputs(
+                targets=targets[index, last - substeps : last],
+                torque_range=given.effort[index],
+                applied=self._applied[index],
+                holds=self._connected[index] > 0.5,
+                resistance=float(given.resistance[index]),
+            )
+            if not diverged[index]:
+                diverged[index] = not self._step_one(index, environment, inputs)
+
+    def _step_one(self, index: int, environment: Environment, inputs: Inputs) -> bool:
+        """Whether Drake found a solution in each step of the period."""
+        environment.set_state(self.qpos[index], self.qvel[index])
+        try:
+            forces = environment.advance(inputs)
+        except RuntimeError:
+            return False
+        self.qpos[index], self.qvel[index] = environment.state()
+        self._torque[index] = forces.torque
+        external = self._external[index]
+        external[FEET] = forces.feet[:, -1]
+        self._past_ground[index, :, 0] = _greatest(forces.feet[:, :, 3:])
+        if self.layout.object is not None:
+            external[HANDS, 3:] = forces.hands[:, -1]
+            self._past_forces[index, :, 0] = _greatest(forces.hands)
+            external[THING, 3:] = (
+                forces.object + inputs.applied[self.layout.object, :3] - forces.hands[:, -1].sum(axis=0)
+            )
+        return True
+
+    def _look(self) -> None:
+        super()._look()
+        feet, com = self._external[:, FEET], self._subtree_com[:, self.layout.base]
+        feet[..., :3] -= rotations.cross(np.broadcast_to(com[:, None], feet[..., 3:].shape), feet[..., 3:])
+
+
+def _greatest(forces: Array) -> Array:
+    """The greatest of the forces (2, substeps, 3) on each of a pair, (2, 3)."""
+    greatest: Array = forces[np.arange(2), np.vecdot(forces, forces).argmax(axis=1)]
+    return greatest

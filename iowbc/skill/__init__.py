@@ -1,0 +1,1 @@
+"""The Markov game of a robot and a human who transport an object, on top of a frozen controller."""

@@ -1,0 +1,80 @@
+"""Admission of transport tasks: a task is one where two are needed, and where they need to heed each other."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.skill.episodes import nominal, play_once
+from iowbc.skill.game import TransportGame
+from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
+from iowbc.skill.student import Student
+from iowbc.task.specification import Specification
+
+SOLVED, UNSOLVED = 0.8, 0.2
+"""Success of the reference pair, at least, and of a lone robot, at most: four of five trials."""
+PAIRS: dict[str, tuple[str, Rule]] = {
+    "reference": ("path", "lead"),
+    "lone robot": (ABSENT, "lead"),
+    "passive robot": ("path", "stand"),
+    "ignoring": (CLOCK, "clock"),
+}
+"""Scripted pairs: human and nominal command. The reference pair knows the path and heeds the object; the ignoring pair
+walks the path by the clock, each at its own pace."""
+
+
+@dataclass(frozen=True)
+class Admission:
+    """How scripted pairs fare at a task: means over trials by pair, in the order of `PAIRS`."""
+
+    task: str
+    success: dict[str, float]
+    reward: dict[str, float]
+    force: dict[str, float]
+    """90th percentile of the partner's force [N]."""
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why it is no task for two; empty where it is one."""
+        found = []
+        if self.success["reference"] < SOLVED:
+            found.append(f"the reference pair solves {self.success['reference']:.0%}, expected {SOLVED:.0%} or more")
+        for pair in ("lone robot", "passive robot"):
+            if self.success[pair] > UNSOLVED:
+                found.append(f"with a {pair} {self.success[pair]:.0%} succeed, expected {UNSOLVED:.0%} or less")
+        if self.reward["ignoring"] >= self.reward["reference"]:
+            earned = self.reward["ignoring"]
+            found.append(f"a pair that ignores each other earns {earned:.2f}, no less than the reference")
+        return tuple(found)
+
+
+def admissions(
+    specification: Specification,
+    student: Student,
+    *,
+    trials: int,
+    workers: int,
+    tasks: Sequence[str] = (),
+    interrupted: Callable[[], bool] = lambda: False,
+) -> list[Admission]:
+    """Plays every task, or those named, with each scripted pair; `trials` of each, with the same seeds."""
+    names = tuple(tasks) or specification.recipe.skill.tasks.names
+    plans = [
+        Plan(name, human, True, seed=seed, rule=rule)
+        for name in names
+        for human, rule in PAIRS.values()
+        for seed in range(trials)
+    ]
+    with TransportGame(specification, student, n=len(plans), workers=workers, plans=plans) as game:
+        figures = play_once(game, nominal(game), interrupted)
+
+    def means(name: str, own: Mask) -> dict[str, float]:
+        rows: Array = figures[name][own].astype(np.float64).reshape(len(PAIRS), trials).mean(axis=1)
+        return dict(zip(PAIRS, rows.tolist(), strict=True))
+
+    owners = figures["task"]
+    return [
+        Admission(name, *(means(figure, owners == name) for figure in ("success", "reward", "partner_force_p90")))
+        for name in names
+    ]

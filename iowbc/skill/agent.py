@@ -1,0 +1,74 @@
+"""A decentralised policy in training: a network with its exploration, normalisation and optimiser."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from iowbc.learning import checkpoint
+from iowbc.learning.checkpoint import Arrays, prefixed, under
+from iowbc.learning.networks import TeacherNetwork
+from iowbc.learning.normalization import Normalization
+from iowbc.learning.policy import HIDDEN_GAIN
+from iowbc.recipe.skill.learning import SkillLearning
+
+
+class Trained:
+    """A network that learns, with the running statistics of its inputs and its optimiser."""
+
+    def __init__(self, inputs: int, outputs: int, settings: SkillLearning, gain: float, rate: float) -> None:
+        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's step size."""
+        self.architecture: dict[str, Any] = {
+            "inputs": inputs,
+            "actions": outputs,
+            "hidden": list(settings.hidden),
+            "activation": settings.activation,
+            "clip": settings.normalization_clip,
+        }
+        self.network = TeacherNetwork(**self.architecture)
+        self.network.body.initialize(HIDDEN_GAIN, gain)
+        self.normalization = Normalization(inputs, settings.games, settings.gamma, None)
+        self.rate, self.gradient_norm = rate, settings.gradient_norm
+        self.log_std = nn.Parameter(torch.full((outputs,), float(np.log(settings.initial_std))))
+        """Of a policy; a value has no use for it."""
+        self.parameters = [*self.network.body.parameters(), self.log_std]
+        self.optimizer = torch.optim.Adam(self.parameters, lr=self.rate, eps=1e-5)
+
+    def prepared(self, inputs: NDArray[np.float32]) -> Tensor:
+        """Inputs (..., k), normalised."""
+        with torch.inference_mode():
+            return self.network.normalizer(torch.from_numpy(inputs))  # type: ignore[no-any-return]
+
+    def descend(self, loss: Tensor) -> None:
+        """One step of the optimiser."""
+        self.optimizer.param_groups[0]["lr"] = self.rate
+        self.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.parameters, self.gradient_norm)
+        self.optimizer.step()
+
+    def finished(self) -> TeacherNetwork:
+        """The network with its standard deviation in it."""
+        self.network.log_std.copy_(self.log_std.detach())
+        return self.network
+
+    def arrays(self) -> Arrays:
+        """Everything, for a checkpoint."""
+        return {
+            **prefixed("network", checkpoint.module_arrays(self.finished())),
+            **prefixed("optimizer", checkpoint.optimizer_arrays(self.optimizer)),
+            **prefixed("normalization", self.normalization.arrays()),
+            "rate": np.array([self.rate]),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `arrays`."""
+        checkpoint.restore_module(self.network, under("network", arrays))
+        with torch.no_grad():
+            self.log_std.copy_(self.network.log_std)
+        checkpoint.restore_optimizer(self.optimizer, under("optimizer", arrays))
+        self.normalization.restore(under("normalization", arrays))
+        self.rate = float(arrays["rate"][0])

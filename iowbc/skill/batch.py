@@ -1,0 +1,269 @@
+"""The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from iowbc import counter_random as random
+from iowbc.arrays import Array, Indices, Keys, Mask
+from iowbc.control.hand_forces import HandForces
+from iowbc.control.skill_observation import joined, object_yaw, robot_observation
+from iowbc.recipe.skill.task import TransportTask
+from iowbc.sim.shapes import measured as shape_of
+from iowbc.skill import observation as seen
+from iowbc.skill.draws import EpisodeDraws
+from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
+from iowbc.skill.human import Human
+from iowbc.skill.lower_layer import LowerLayer
+from iowbc.skill.nominal import NominalCommand
+from iowbc.skill.path import Paths
+from iowbc.skill.plan import CLOCK, KINDS, RULES, Plan
+from iowbc.skill.pursuit import Wanted, by_the_clock, pursue
+from iowbc.skill.reward import GameEnding, ending, potential, reward
+from iowbc.skill.situation import Origin, Situation, situation, turned
+from iowbc.skill.student import Student
+from iowbc.task.episodes import Episode
+from iowbc.task.specification import Specification
+from iowbc.task.vector.shared import Buffers
+
+FOREVER = 1e6
+"""Time limit of the lower layer's episodes [s]: the game ends them."""
+UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
+"""The human is the disturbance."""
+CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
+
+
+class GameBatch:
+    """n games. `reset` and `step` read the actions from the buffers and leave everything else there."""
+
+    def __init__(
+        self,
+        specification: Specification,
+        *,
+        tasks: Mapping[str, TransportTask],
+        games: Indices,
+        scenes: Sequence[str],
+        keys: Keys,
+        partners: Sequence[str],
+        plans: Sequence[Plan] | None,
+        block: int,
+        buffers: Buffers,
+    ) -> None:
+        """`games`: global numbers, (n,); `scenes`, `keys` and, where there are any, `plans` of each; `block`: see
+        `iowbc.rollouts.blocks`."""
+        recipe, self._skill = specification.recipe, specification.recipe.skill
+        self.n, self.buffers, self._games, self._keys = len(games), buffers, games, keys
+        self.lower = LowerLayer(
+            specification,
+            games,
+            [Episode(scene, int(key), FOREVER, UNDISTURBED) for scene, key in zip(scenes, keys, strict=True)],
+            block,
+        )
+        n, period, own = self.n, self.lower.period, list(tasks.values())
+        self._substeps = round(1.0 / (self._skill.frequency * period))
+        worlds = [getattr(recipe.simulation.scenes, scene) for scene in scenes]
+        self._pushing = np.array([world.kind == "push" for world in worlds])
+        self._corners = np.array([shape_of(world.object).high[:2] for world in worlds])[:, None] * CORNERS
+        self.paths = Paths([task.path for task in own])
+        self._limit = np.array([round(task.duration * self._skill.frequency) for task in own])
+        self.drawn = EpisodeDraws(own, list(tasks), scenes, partners, self._skill.goal_known, plans)
+        self._nominal = NominalCommand(self._skill, recipe.task.commands, self._pushing)
+        self._human = Human(self._skill, n, period)
+        self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n)
+        self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self._substeps)
+        self._sees_object = recipe.task.observation.observe_object and recipe.distill.observe_object
+        self.origin = Origin.blank(n)
+        self._episode, self._decisions, self._touched = np.zeros((3, n), np.int64)
+        self._total, self._potential = np.zeros((2, n))
+        self._felt = np.zeros((n, self._skill.robot.history, 2, 3))
+        """Estimated forces on the hands, the newest last [N]."""
+        self._wrist_error = np.zeros((n, 2, 3))
+        self._action = {"robot": np.zeros((n, ROBOT_ACTIONS)), "human": np.zeros((n, HUMAN_ACTIONS))}
+        self.now: Situation
+        """The games after the last control step."""
+        self.watch: Callable[[], None] = lambda: None
+        """Called after every control step."""
+
+    def take(self, student: Student) -> None:
+        """The student that controls from now on."""
+        self.lower.take(student)
+
+    def reset(self, seeds: Keys | None = None) -> None:
+        """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
+        from them."""
+        if seeds is not None:
+            self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
+        self.lower.rewind(self._keys)
+        self._episode[:] = 0
+        for name in ("reward", "terminated", "truncated"):
+            self.buffers[name][:] = 0
+        self._begin(np.arange(self.n))
+        self._observe("now")
+
+    def step(self) -> None:
+        """One decision of every game; those that end begin anew."""
+        lower, simulation = self.lower, self.lower.simulation
+        action = {name: self.buffers[f"action/{name}"].astype(np.float64).clip(-1.0, 1.0) for name in self._action}
+        jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
+        self._action = action
+        lower.wanted[:] = self._nominal.with_action(self._nominals, action["robot"])
+        self._human.intend(self._intentions(action["human"]))
+        costs = np.zeros((3, self.n))
+        for _ in range(self._substeps):
+            lower.human[:] = self._human.advance()
+            lower.control()
+            self._hands.add(simulation.target, simulation.measured.joint_position, simulation.measured.joint_velocity)
+            self.now = self._situation(self.now.covered)
+            costs += self._costs()
+            self.watch()
+        self._decisions += 1
+        self._feel()
+        self._judge(costs * lower.period, jerk)
+
+    def _judge(self, costs: Array, jerk: Array) -> None:
+        """Reward and endings of the decision just made; begins anew where a game has ended."""
+        lower, buffers, held = self.lower, self.buffers, ~self._pushing
+        touched = self._in_wall()
+        end = ending(
+            self._skill,
+            self.now,
+            held=held,
+            happened=(lower.fallen, lower.dropped, lower.diverged),
+            touched=touched,
+            late=self._decisions >= self._limit[self.drawn.task],
+        )
+        before, self._potential = self._potential, potential(self._skill, self.now, held)
+        buffers["reward"][:] = reward(self._skill, self._potential - before, end, costs, jerk, touched)
+        self._total += buffers["reward"]
+        self._touched += touched
+        buffers["terminated"][:], buffers["truncated"][:] = end.terminated, end.time_out
+        self._observe("now")
+        for name, _ in seen.sizes(self._skill):
+            buffers[f"final/{name}"][:] = buffers[f"now/{name}"]
+        which = np.flatnonzero(end.terminated | end.time_out)
+        if len(which):
+            self._write_figures(which, end)
+            self._begin(which)
+            self._observe("now")
+
+    def _begin(self, which: Indices) -> None:
+        """New episodes in some games, (k,)."""
+        lower = self.lower
+        self._episode[which] += 1
+        key = random.absorb(self._keys[which], self._episode[which])
+        lower.simulation.hold(self.drawn.draw(which, key), which)
+        lower.wanted[which] = self._nominal.standing()[which]
+        lower.start(which)
+        self.origin.set(which, lower.simulation, lower.moved)
+        covered = np.zeros(self.n) if len(which) == self.n else self.now.covered.copy()
+        covered[which] = 0.0
+        self.now = self._situation(covered)
+        self._potential[which] = potential(self._skill, self.now, ~self._pushing)[which]
+        self._human.start(which)
+        self._figures.start(which)
+        for values in (self._decisions, self._touched, self._total, self._felt, self._wrist_error):
+            values[which] = 0
+        for action in self._action.values():
+            action[which] = 0.0
+        self.buffers["human_acts"][:] = self.drawn.acts
+
+    def _situation(self, covered: Array) -> Situation:
+        lower = self.lower
+        return situation(lower.simulation, lower.moved, self.origin, self.paths, self.drawn.task, covered)
+
+    def _command(self) -> Array:
+        """Nominal commands, (n, 11)."""
+        yaw = object_yaw(self.lower.measured) * self._sees_object
+        nominal = self._nominal
+        by_rule = {
+            "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
+            "follow": nominal.following(self._felt[:, -1].sum(axis=1), yaw),
+            "clock": nominal.leading(self._by_the_clock(1.0), self.now),
+            "stand": nominal.standing(),
+        }
+        unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
+        self.buffers["privileged_action"][:] = nominal.action_of(by_rule["lead"], by_rule["follow"]) * unaware
+        command: Array = np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
+        return command
+
+    def _intentions(self, action: Array) -> Array:
+        """Intentions of the humans, (n, 5)."""
+        led = self._human.of_script(pursue(self._skill.pursuit, self.paths, self.now), self.now)
+        blind = self._human.of_script(self._by_the_clock(self.drawn.pace), self.now)
+        scripted = np.where((self.drawn.kind == KINDS.index(CLOCK))[:, None], blind, led)
+        acting = led + self._human.of_action(action, self.now)
+        return np.where(self.drawn.acts[:, None], acting, scripted)
+
+    def _by_the_clock(self, pace: Array | float) -> Wanted:
+        return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
+
+    def _costs(self) -> Array:
+        """Internal force [N], size of the human's power beyond its share [W] and tilt [rad], (3, n)."""
+        state, drawn = self.lower.simulation.state, self.lower.simulation.drawn
+        partner = state.partner_force
+        robot = -state.grip_force.sum(axis=1)
+        internal = internal_force(robot[:, :2], partner[:, :2])
+        velocity = state.handle_velocity[:, :2]
+        speed = np.linalg.norm(velocity, axis=1)
+        needed = drawn["partner_share"] * drawn["rolling_resistance"] * speed
+        power = np.abs(np.vecdot(partner[:, :2], velocity) - needed)
+        heading = self.paths.heading(self.drawn.task, self.now.covered) + self.origin.heading
+        along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        borne = [np.where(self._pushing, np.vecdot(f[:, :2], along), f[:, 2]) for f in (robot, robot + partner)]
+        loads = np.stack(borne, axis=1)
+        self._figures.add(self.now, internal, partner[:, :2], power, loads, self.lower.period)
+        return np.stack([internal, power, self.now.tilt])
+
+    def _in_wall(self) -> Mask:
+        """Games in which a corner of the object is in a wall, (n,)."""
+        task, now = self.drawn.task, self.now
+        touched = np.zeros(self.n, np.bool_)
+        for corner in range(len(CORNERS)):
+            at = now.position[:, :2] + turned(self._corners[:, corner], now.yaw)
+            place = self.paths.place(task, at, now.covered)
+            touched |= np.abs(place.lateral) > self.paths.half_width(task, place.covered)
+        return touched
+
+    def _feel(self) -> None:
+        """The robots' estimate of the forces on their hands."""
+        force, wrists = self._hands.read(self.lower.measured.projected_gravity)
+        self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
+        memory, references = self.lower.memory, self.lower.guidance.references
+        self._wrist_error = wrists - references.wrist_target(memory.posture, memory.command, self.lower.guidance.grasp)
+
+    def _observe(self, time: str) -> None:
+        """Writes what agents and critic see."""
+        lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
+        path = seen.waypoints(self.paths, now, ahead, now.heading)
+        robot = robot_observation(
+            *(lower.command, lower.measured, self._wrist_error, self._sees_object),
+            *(self._pushing, drawn.known, path, self._felt),
+        )
+        force = self.origin.turned(lower.simulation.state.partner_force)
+        felt = seen.felt_by_human(now, force, self._action["human"], seen.waypoints(self.paths, now, ahead, now.yaw))
+        left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
+        secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
+        human = joined(felt)
+        self._nominals = self._command()
+        self.buffers[f"{time}/robot"][:], self.buffers[f"{time}/human"][:] = robot, human
+        self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
+
+    def _write_figures(self, which: Indices, end: GameEnding) -> None:
+        """Figures of the episodes that ended, (k,)."""
+        drawn, simulation = self.drawn, self.lower.simulation
+        ends = ("success", "fallen", "dropped", "strayed", "diverged", "time_out")
+        values = self._figures.read(which, self.lower.period) | {name: getattr(end, name)[which] for name in ends}
+        values |= {
+            "touched": self._touched[which] / self._skill.frequency,
+            "covered": self.now.covered[which],
+            "reward": self._total[which],
+            "known": drawn.known[which],
+            "mass": simulation.drawn["object_mass"][which],
+            "share": simulation.drawn["partner_share"][which],
+            "task": drawn.task[which],
+            "partner": drawn.kind[which],
+            "environment": self._games[which],
+            "episode": self._episode[which],
+        }
+        self.buffers["figures"][which] = np.stack([values[name] for name in FIGURES], axis=1)

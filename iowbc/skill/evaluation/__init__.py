@@ -1,0 +1,1 @@
+"""Games of trained skills and of rivals, their tables and figure."""

@@ -1,0 +1,144 @@
+"""The games of `skill-eval`: every skill and rival plays the same episodes."""
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+
+from iowbc.arrays import Array
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.learning.networks import TeacherNetwork
+from iowbc.recipe.skill.skill import Skill
+from iowbc.skill.game import TransportGame
+from iowbc.skill.plan import Plan, Rule
+
+AGENT = "agent"
+"""Name of the learnt human among partners."""
+
+
+@dataclass(frozen=True)
+class Competitor:
+    """A skill, or a rival without one."""
+
+    label: str
+    training: str
+    """What tells trainings under one label apart."""
+    rule: Rule | None
+    robot: TeacherNetwork | None
+    """The trained policy; None acts as the rule says."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """An episode that every competitor plays."""
+
+    plan: Plan
+    load: float
+    episode: int
+
+
+def cases(skill: Skill, learnt_human: bool) -> list[Case]:
+    """All episodes of an evaluation. `learnt_human`: whether there is one to play with."""
+    asked, kinds = skill.eval, skill.partners
+    partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
+    tasks = {name: getattr(skill.tasks, name) for name in asked.tasks or skill.tasks.names}
+    found = []
+    for (name, task), known, partner, load, episode in itertools.product(
+        tasks.items(), asked.known, partners, asked.loads, range(asked.episodes)
+    ):
+        if partner == "follower" and not known:
+            continue  # who follows tells nobody where to go
+        low, high = task.mass
+        plan = Plan(name, partner, known, mass=low + load * (high - low), seed=asked.seed + episode)
+        found.append(Case(plan, load, episode))
+    return found
+
+
+class Evaluation:
+    """Plays competitors in batches of games; a batch that is finished is kept in `work`."""
+
+    def __init__(
+        self,
+        make: Callable[[Sequence[Plan]], TransportGame],
+        human: TeacherNetwork | None,
+        games: int,
+        work: Path,
+        interrupted: Callable[[], bool],
+    ) -> None:
+        """`human`: the learnt one, the same for every competitor; `games`: in a batch."""
+        self._make, self._human, self._games, self._work, self._interrupted = make, human, games, work, interrupted
+
+    def batches(self, competitor: Competitor, planned: Sequence[Case]) -> Iterator[pd.DataFrame]:
+        """Rows of the episodes, batch by batch, those of one length together.
+
+        Raises Interrupted where the job is asked to stop; finished batches are kept.
+        """
+        for number, begin in enumerate(range(0, len(planned), self._games)):
+            place = f"{competitor.label} {competitor.training} {number}".replace("/", "-").replace(" ", "_")
+            path = self._work / f"{place}.parquet"
+            if not path.is_file():
+                rows = self._played(competitor, planned[begin : begin + self._games])
+                partial = path.with_suffix(".part")
+                rows.to_parquet(partial, index=False)
+                partial.rename(path)
+            yield pd.read_parquet(path)
+
+    def _played(self, competitor: Competitor, planned: Sequence[Case]) -> pd.DataFrame:
+        """The first episode of a game of each case."""
+        plans = [replace(case.plan, rule=competitor.rule) for case in planned]
+        rows: dict[int, dict[str, Any]] = {}
+        with closing(self._make(plans)) as game:
+            _require_fitting(competitor, game.observation_sizes["robot"])
+            observed = game.reset()
+            while len(rows) < len(plans):
+                if self._interrupted():
+                    raise Interrupted("stopped between two decisions")
+                actions = {
+                    "robot": acted(competitor.robot, observed.observations["robot"], game.action_sizes["robot"]),
+                    "human": acted(self._human, observed.observations["human"], game.action_sizes["human"]),
+                }
+                outcome = game.step(actions)
+                for row in _rows(outcome.figures):
+                    rows.setdefault(int(row["environment"]), row)
+                observed = outcome.observed
+        return pd.DataFrame(
+            [
+                {
+                    "label": competitor.label,
+                    "training": competitor.training,
+                    "load": case.load,
+                    "episode": case.episode,
+                    **rows[number],
+                    "partner": case.plan.partner,
+                    "known": case.plan.known,
+                }
+                for number, case in enumerate(planned)
+            ]
+        )
+
+
+def _require_fitting(competitor: Competitor, size: int) -> None:
+    if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
+        raise StageFailed(
+            f"skill.eval.others.{competitor.label}: that skill observes {own} numbers, this game shows {size}; "
+            "train it with the same `skill` section and code"
+        )
+
+
+def acted(network: TeacherNetwork | None, observation: Array, size: int) -> Array:
+    """The mean action of a policy, (n, size), within its bounds; zero without one."""
+    if network is None:
+        return np.zeros((len(observation), size), np.float32)
+    with torch.inference_mode():
+        return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())
+
+
+def _rows(figures: Mapping[str, Array]) -> Iterator[dict[str, Any]]:
+    for values in zip(*figures.values(), strict=True):
+        yield dict(zip(figures, values, strict=True))

@@ -1,0 +1,180 @@
+"""Tables and figure of the skill layer's games: forces and the worst partner first, then success."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from iowbc.evaluation.report.statistics import RESAMPLES, interquartile_mean, percentile_interval
+from iowbc.results.picture import COLOURS
+from iowbc.results.table import ABSENT, Cell, Table, heads
+
+FORCE, SUCCESS = "partner_force_p90", "success"
+UNIT = ["task", "known", "partner", "load", "episode"]
+"""What makes an episode the same for every competitor."""
+COLUMNS = {
+    FORCE: ("Partner force p90 [N]", ".1f"),
+    "partner_work": ("Partner work [J]", ".1f"),
+    "internal_force": ("Internal force [N]", ".1f"),
+    "path_error": ("Path error [m]", ".3f"),
+    "path_error_max": ("largest [m]", ".3f"),
+    "tilt": ("Tilt [rad]", ".3f"),
+    "load_share": ("Load share", ".2f"),
+    "time": ("Time [s]", ".1f"),
+}
+"""Figures of an episode with their heads and forms, in the order in which tables show them."""
+SEEDS_OF_THE_BOOTSTRAP = 0
+
+Values = NDArray[np.float64]
+
+
+def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
+    """All tables. `games`: a row an episode; `held_out`: partners that training does not meet."""
+    who = np.where(games["partner"].isin(held_out), "held-out partners", "partners of training")
+    who = np.where(games["partner"] == "agent", "learnt human", who)
+    goal = np.where(games["known"], "both know the goal", "only the human knows")
+    by = {
+        "skill": (pd.Series(goal, games.index) + ", " + pd.Series(who, games.index), "goal and kind of partner"),
+        "skill_partners": (games["partner"] + ", " + pd.Series(goal, games.index), "partner"),
+        "skill_tasks": (games["task"] + ", " + pd.Series(goal, games.index), "task"),
+    }
+    if games["load"].nunique() > 1:
+        by["skill_loads"] = (games["load"].map("place {:g} in the task's range".format), "mass")
+    return [_table(name, games, group, told) for name, (group, told) in by.items()]
+
+
+def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", told: str) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    numbers = []
+    for title, within in games.groupby(group, sort=False):
+        first = str(games["label"].iloc[0])
+        for label, own in within.groupby("label", sort=False):
+            found = {"success": estimate(own, SUCCESS, whole=True), "worst": worst_partner(own)}
+            found |= {figure: estimate(own, figure) for figure in COLUMNS}
+            chance = None if label == first else improvement(within[within["label"] == first], own)
+            rows.append(
+                (
+                    str(title),
+                    str(label),
+                    str(own["training"].nunique()),
+                    str(len(own)),
+                    _cell(found[FORCE], ".1f"),
+                    f"{found['worst'][0]:.1f}",
+                    ABSENT if chance is None else _cell(chance, ".2f"),
+                    _cell(tuple(100.0 * value for value in found["success"]), ".0f"),
+                    *(_cell(found[figure], form) for figure, (_, form) in list(COLUMNS.items())[1:]),
+                    f"{int(own['fallen'].sum())} / {int(own['dropped'].sum())}",
+                )
+            )
+            numbers.append({"group": title, "label": label, "episodes": len(own)})
+            for figure, ends in (found | ({} if chance is None else {"P": chance})).items():
+                numbers[-1] |= dict(zip((figure, f"{figure}_low", f"{figure}_high"), ends, strict=True))
+    shown = [head for head, _ in COLUMNS.values()]
+    columns = heads(
+        *("Games", "Skill", "Trainings", "Episodes", shown[0], "Worst partner [N]", "P", "Success [%]"),
+        *shown[1:],
+        "Falls / drops",
+    )
+    caption = (
+        f"Games by {told}: success, and interquartile means over all episodes, with 95 % intervals by bootstrap over "
+        "trainings and episodes. Partner force: 90th percentile of the horizontal force of the human within an "
+        "episode; worst partner: the greatest such mean of one partner. P: probability that the first skill has the "
+        "smaller partner force in the same episode. Every skill plays the same episodes, in simulation."
+    )
+    return Table(name, caption, columns, rows, pd.DataFrame(numbers))
+
+
+def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> tuple[float, float, float]:
+    """Interquartile mean, or the mean where `whole`, with the ends of its interval."""
+    values = by_training(games, figure)
+    drawn = np.stack([values[trainings][:, units].ravel() for trainings, units in _resamples(*values.shape)])
+
+    def mean(rows: Values) -> Values:
+        return np.asarray(rows.mean(axis=-1)) if whole else interquartile_mean(rows)
+
+    return float(mean(values.ravel())), *percentile_interval(mean(drawn))
+
+
+def by_training(games: pd.DataFrame, figure: str) -> Values:
+    """A figure by training and episode, (trainings, episodes)."""
+    wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
+        index="training", columns=UNIT, values=figure
+    )
+    found: Values = wide.to_numpy(np.float64)
+    return found
+
+
+def worst_partner(games: pd.DataFrame) -> tuple[float, float, float]:
+    """The greatest interquartile mean of the force of one partner, with the ends of its interval."""
+    found = [estimate(own, FORCE) for _, own in games.groupby("partner")]
+    return max(found, key=lambda ends: ends[0])
+
+
+def improvement(first: pd.DataFrame, other: pd.DataFrame) -> tuple[float, float, float]:
+    """Probability that the first has the smaller force in the same episode, ties half, with its interval."""
+    own, theirs = by_training(first, FORCE), by_training(other, FORCE)
+    wins = (own[:, None] < theirs[None]) + 0.5 * (own[:, None] == theirs[None])
+    flat = wins.reshape(-1, wins.shape[-1])
+    drawn = np.array([flat[pairs][:, units].mean() for pairs, units in _resamples(*flat.shape)])
+    return float(wins.mean()), *percentile_interval(drawn)
+
+
+def _resamples(trainings: int, units: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Trainings and episodes of each resample, with replacement."""
+    generator = np.random.default_rng(SEEDS_OF_THE_BOOTSTRAP)
+    for _ in range(RESAMPLES):
+        yield generator.integers(trainings, size=trainings), generator.integers(units, size=units)
+
+
+def _cell(ends: tuple[float, ...], form: str) -> Cell:
+    value, low, high = (f"{end:{form}}" for end in ends)
+    return value if low == high else f"{value} ({low} to {high})"
+
+
+def headline(games: pd.DataFrame) -> dict[str, float]:
+    """Force, worst partner and success of each competitor, in games that only the human knows and in the others."""
+    found: dict[str, float] = {}
+    for (label, known), own in games.groupby(["label", "known"], sort=False):
+        name = f"{label}/{'known' if known else 'human_only'}".replace(" ", "_")
+        values: Mapping[str, float] = {
+            "partner_force_p90": float(interquartile_mean(own[FORCE].to_numpy(np.float64))),
+            "worst_partner": worst_partner(own)[0],
+            "success": float(own[SUCCESS].mean()),
+        }
+        found |= {f"{name}/{figure}": value for figure, value in values.items()}
+    return found
+
+
+def figure(games: pd.DataFrame) -> Figure:
+    """Force and success by partner, in games of both kinds."""
+    labels, partners = list(dict.fromkeys(games["label"])), list(dict.fromkeys(games["partner"]))
+    kinds = [known for known in (True, False) if known in set(games["known"])]
+    drawing = Figure(figsize=(11.0, 3.2 * len(kinds)), layout="constrained")
+    grid = drawing.subplots(len(kinds), 2, squeeze=False)
+    width = 0.8 / len(labels)
+    for axes, known in zip(grid, kinds, strict=True):
+        for panel, (name, title) in zip(
+            axes, ((FORCE, "partner force p90 [N]"), (SUCCESS, "success [share]")), strict=True
+        ):
+            for place, label in enumerate(labels):
+                own = games[(games["label"] == label) & (games["known"] == known)]
+                found = [estimate(own[own["partner"] == partner], name, name == SUCCESS) for partner in partners]
+                value, low, high = np.array(found).T
+                panel.bar(
+                    np.arange(len(partners)) + (place - (len(labels) - 1) / 2) * width,
+                    value,
+                    width,
+                    yerr=(value - low, high - value),
+                    color=COLOURS[place % len(COLOURS)],
+                    label=label,
+                    capsize=2,
+                )
+            panel.set_xticks(range(len(partners)), partners)
+            panel.set_title(
+                f"{title}, {'both know the goal' if known else 'only the human knows the goal'}", fontsize=9
+            )
+            panel.grid(alpha=0.3, axis="y")
+    grid[0][0].legend(fontsize=8)
+    return drawing

@@ -1,0 +1,69 @@
+"""Figures of an episode: sums and extremes over its control steps, read when it ends."""
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices
+from iowbc.skill.situation import Situation
+
+HIGH = 90.0
+"""Percentile of the partner's force."""
+TINY = 1e-9
+FIGURES = (
+    *("success", "time", "path_error", "path_error_max", "yaw_error", "height_error", "tilt", "internal_force"),
+    *("partner_force_mean", "partner_force_p90", "partner_work", "load_share", "fallen", "dropped", "touched"),
+    *("strayed", "diverged", "time_out", "covered", "reward", "known", "mass", "share"),
+    *("task", "partner", "environment", "episode"),
+)
+"""Figures of an episode: seconds, metres, radians, newtons, joules; the largest tilt, means of the internal force and
+of the size of yaw and height error, seconds in a wall; task and partner by number."""
+
+
+class EpisodeFigures:
+    """Running figures of n games."""
+
+    def __init__(self, n: int, longest: int) -> None:
+        """`longest`: control steps of the longest episode."""
+        self._force = np.zeros((n, longest), np.float32)
+        self._steps = np.zeros(n, np.int64)
+        self._sum, self._most = np.zeros((n, 7)), np.zeros((n, 2))
+
+    def start(self, which: Indices) -> None:
+        """Begins anew for some games, (k,)."""
+        for values in (self._steps, self._sum, self._most):
+            values[which] = 0
+
+    def add(self, now: Situation, internal: Array, partner: Array, power: Array, loads: Array, period: float) -> None:
+        """Takes in a control step: internal force (n,) [N], the partner's horizontal force (n, 2) [N], the size of its
+        power beyond its share (n,) [W], and what robot and both bear, (n, 2)."""
+        rows = np.arange(len(internal))
+        self._force[rows, self._steps.clip(None, self._force.shape[1] - 1)] = np.linalg.norm(partner, axis=1)
+        self._steps += 1
+        sizes = [now.lateral**2, np.abs(now.yaw_error), np.abs(now.height_error), internal, power * period, *loads.T]
+        self._sum += np.stack(sizes, axis=1)
+        np.maximum(self._most, np.stack([np.abs(now.lateral), now.tilt], axis=1), out=self._most)
+
+    def read(self, which: Indices, period: float) -> dict[str, Array]:
+        """Figures of some games, (k,), so far."""
+        steps = np.maximum(self._steps[which], 1)
+        square, yaw, height, internal, work, robot, both = self._sum[which].T
+        forces = [self._force[row, :count] for row, count in zip(which, steps, strict=True)]
+        return {
+            "time": steps * period,
+            "path_error": np.sqrt(square / steps),
+            "path_error_max": self._most[which, 0],
+            "yaw_error": yaw / steps,
+            "height_error": height / steps,
+            "tilt": self._most[which, 1],
+            "internal_force": internal / steps,
+            "partner_force_mean": np.array([force.mean() for force in forces]),
+            "partner_force_p90": np.array([np.percentile(force, HIGH) for force in forces]),
+            "partner_work": work,
+            "load_share": np.where(np.abs(both) > TINY, robot / np.where(np.abs(both) > TINY, both, 1.0), np.nan),
+        }
+
+
+def internal_force(robot: Array, partner: Array) -> Array:
+    """The part of two horizontal forces (n, 2) that cancels, ½ (|F_r| + |F_p| - |F_r + F_p|), (n,) [N]."""
+    sizes = [np.linalg.norm(force, axis=1) for force in (robot, partner, robot + partner)]
+    cancelled: Array = 0.5 * (sizes[0] + sizes[1] - sizes[2])
+    return cancelled

@@ -1,0 +1,181 @@
+"""The Markov game of a robot and a human who transport an object: n games at once, over worker processes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from iowbc.arrays import Array, Keys, Mask
+from iowbc.skill.batch import GameBatch
+from iowbc.skill.figures import FIGURES
+from iowbc.skill.observation import sizes
+from iowbc.skill.plan import KINDS, Plan
+from iowbc.skill.setup import GameSetup
+from iowbc.skill.student import Student
+from iowbc.task.specification import Specification
+from iowbc.task.vector.messages import MakeStep, Message, Reset
+from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
+
+PATIENCE = 60.0
+"""Time for a decision of all games before a worker counts as hung [s]."""
+COUNTED = ("success", "fallen", "dropped", "strayed", "diverged", "time_out", "known")
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What agents and critic see of n games."""
+
+    observations: Mapping[str, Array]
+    """Of "robot" and "human", (n, k) float32."""
+    state: Array
+    """What the centralised critic sees, (n, state_size) float32."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a decision of n games."""
+
+    observed: Observed
+    """After the next episode has begun where one ended."""
+    reward: Array
+    """Shared by both agents, (n,) float32."""
+    terminated: Mask
+    """(n,)."""
+    truncated: Mask
+    """Ended by the time limit, (n,)."""
+    final: Observed
+    """Before the next episode began."""
+    figures: Mapping[str, Array]
+    """Of the k episodes that ended, in the order of the games, by name, (k,); see `iowbc.skill.figures.FIGURES`. Task
+    and partner are names."""
+
+
+@dataclass(frozen=True)
+class TakeStudent:
+    """Message: the student that controls from now on."""
+
+    student: Student
+    changes: ClassVar[bool] = True
+
+    def carry_out(self, batch: Any) -> None:
+        """See `Message`."""
+        batch.take(self.student)
+
+
+@dataclass(frozen=True)
+class MeetAgent:
+    """Message: part of the drawn episodes whose human is that of the actions."""
+
+    share: float
+    changes: ClassVar[bool] = True
+
+    def carry_out(self, batch: Any) -> None:
+        """See `Message`."""
+        batch.drawn.agent_share = self.share
+
+
+class TransportGame:
+    """n games. What comes of them follows from seed and game, however many workers there are."""
+
+    agents = ("robot", "human")
+
+    def __init__(
+        self,
+        specification: Specification,
+        student: Student,
+        *,
+        n: int,
+        workers: int = 0,
+        seed: int = 0,
+        partners: Sequence[str] | None = None,
+        plans: Sequence[Plan] | None = None,
+    ) -> None:
+        """`workers`: processes; 0 plays in this one. `partners`: humans that are drawn, by default those of training.
+        `plans`: one a game, which are then not drawn. Raises UsageError for an unknown task or human, WorkerFailed
+        where a worker dies or hangs."""
+        skill = specification.recipe.skill
+        drawn = skill.partners.training if partners is None else partners
+        self.setup = GameSetup(specification, n, seed, tuple(drawn), None if plans is None else tuple(plans))
+        self.n, self.decision_rate = n, skill.frequency
+        found = dict(sizes(skill))
+        self.state_size = found.pop("state")
+        self.observation_sizes = found
+        self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
+        self._buffers = self._workers.buffers
+        self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
+        self._call(TakeStudent(student))
+
+    @property
+    def batch(self) -> GameBatch:
+        """The games themselves, where they are played in this process."""
+        if not isinstance(self._workers, InProcess):
+            raise AttributeError("the games live in worker processes; make the game with workers=0")
+        batch: GameBatch = self._workers.batch
+        return batch
+
+    @property
+    def human_acts(self) -> Mask:
+        """Games whose human is that of the actions, in the episodes now played, (n,)."""
+        return self._buffers["human_acts"].copy()
+
+    @property
+    def privileged_actions(self) -> Array:
+        """Actions with which the robots would do now what they do where they know the path, (n, 11): zero there."""
+        return self._buffers["privileged_action"].copy()
+
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
+        """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
+
+        `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
+        self._call(MeetAgent(agent_share))
+        groups = self._workers.groups
+        self._workers.ask([Reset(None if seeds is None else seeds[first:last]) for first, last in groups])
+        self._workers.answers()
+        return self._observed("now")
+
+    def step(self, actions: Mapping[str, Array]) -> Outcome:
+        """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
+        finite."""
+        for agent in self.agents:
+            buffer, given = self._buffers[f"action/{agent}"], np.asarray(actions[agent], np.float32)
+            if given.shape != buffer.shape or not np.isfinite(given).all():
+                text = f"shape {given.shape}" if given.shape != buffer.shape else "values that are not finite"
+                raise ValueError(f"actions of {agent} have {text}; expected finite ones of shape {buffer.shape}")
+            buffer[:] = given
+        self._call(MakeStep())
+        buffers = self._buffers
+        terminated, truncated = buffers["terminated"].copy(), buffers["truncated"].copy()
+        return Outcome(
+            observed=self._observed("now"),
+            reward=buffers["reward"].copy(),
+            terminated=terminated,
+            truncated=truncated,
+            final=self._observed("final"),
+            figures=self._figures(np.flatnonzero(terminated | truncated)),
+        )
+
+    def close(self) -> None:
+        """Ends the workers."""
+        self._workers.close()
+
+    def _observed(self, time: str) -> Observed:
+        rows = {name: self._buffers[f"{time}/{name}"].copy() for name in (*self.agents, "state")}
+        return Observed({agent: rows[agent] for agent in self.agents}, rows["state"])
+
+    def _figures(self, which: Array) -> dict[str, Array]:
+        values: dict[str, Array] = dict(zip(FIGURES, self._buffers["figures"][which].T, strict=True))
+        values |= {name: values[name] > 0.0 for name in COUNTED}
+        names = {"task": list(self.setup.tasks), "partner": list(KINDS)}
+        values |= {name: np.array(known, object)[values[name].astype(np.int64)] for name, known in names.items()}
+        return values | {name: values[name].astype(np.int64) for name in ("environment", "episode")}
+
+    def _call(self, message: Message) -> None:
+        self._workers.ask([message for _ in self._workers.groups])
+        self._workers.answers()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self.close()

@@ -1,0 +1,54 @@
+"""The human's intention: from the action of an agent, or scripted along the path."""
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.recipe.skill.skill import Skill
+from iowbc.skill.pursuit import Wanted
+from iowbc.skill.situation import Situation, turned, wrapped
+
+ACTIONS = ("v_x", "v_y", "v_z", "height", "yaw_rate")
+"""Actions of the human, each in [-1, 1], added to what a script intends: velocity of the handle in the frame of the
+object's yaw, offset of its height, yaw rate of the object."""
+
+
+class Human:
+    """Intentions of n humans: velocity of the handle (frame of the start), yaw rate, and height of the handle."""
+
+    def __init__(self, skill: Skill, n: int, period: float) -> None:
+        """`period`: of a control step [s]."""
+        self._settings, self._pursuit, self._period = skill.human, skill.pursuit, period
+        self._velocity, self._height = np.zeros((n, 4)), np.zeros((n, 2))
+        """Velocity in space and yaw rate; height led to by the velocity, and its offset."""
+        self._offset = np.zeros(n)
+
+    def start(self, which: Array) -> None:
+        """Forgets the past of some humans, (k,)."""
+        self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
+
+    def of_action(self, action: Array, now: Situation) -> Array:
+        """What actions (n, 5) add to the script's intentions, (n, 5): velocity in space [m/s], yaw rate [rad/s], offset
+        of the height [m]."""
+        s = self._settings
+        scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
+        return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)
+
+    def of_script(self, wanted: Wanted, now: Situation) -> Array:
+        """Intentions (n, 5) that move the object as wanted: the handle goes round its centre as it turns."""
+        rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.yaw)
+        arm = now.handle - now.position
+        rise = (wanted.height - now.position[:, 2]) * self._pursuit.vertical
+        limit = self._settings.vertical_velocity
+        columns = [wanted.velocity[:, 0] - rate * arm[:, 1], wanted.velocity[:, 1] + rate * arm[:, 0]]
+        return np.stack([*columns, rise.clip(-limit, limit), rate, np.zeros(len(rate))], axis=1)
+
+    def intend(self, intentions: Array) -> None:
+        """Takes over intentions (n, 5) until the next decision."""
+        self._velocity, self._offset = intentions[:, :4], intentions[:, 4]
+
+    def advance(self) -> Array:
+        """What the partner of the simulation is fed in the control step to come, (n, 4): see `Partner.steered`."""
+        step = self._settings.vertical_velocity * self._period
+        self._height[:, 0] += self._velocity[:, 2] * self._period
+        self._height[:, 1] += (self._offset - self._height[:, 1]).clip(-step, step)
+        return np.stack([*self._velocity[:, [0, 1, 3]].T, self._height.sum(axis=1)], axis=1)

@@ -1,0 +1,291 @@
+"""MAPPO and HAPPO on a game of two agents: decentralised policies, one value of the whole state."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from iowbc.learning import checkpoint
+from iowbc.learning.checkpoint import Arrays, prefixed, under
+from iowbc.learning.gaussian import divergence, entropy, log_density
+from iowbc.learning.policy import VALUE_GAIN
+from iowbc.learning.ppo import adapted, explained_variance
+from iowbc.learning.rollout import advantages
+from iowbc.recipe.skill.learning import SkillLearning
+from iowbc.skill.agent import Trained
+from iowbc.skill.game import Observed
+from iowbc.skill.markov_game import HUMAN, ROBOT, Game
+
+Array = NDArray[np.float32]
+
+
+IMITATION_BATCH = 1024
+"""Samples of a gradient step of the imitation, drawn from all so far."""
+
+
+class SkillTraining:
+    """A training of robot and human, one update at a time; see `iowbc.stages.training.Training`.
+
+    Both policies begin with an output of zero: the nominal command, and a cooperative human. The human's learns from
+    the episodes in which it acts; the others have scripted humans.
+    """
+
+    def __init__(self, settings: SkillLearning, game: Game, seed: int) -> None:
+        torch.manual_seed(seed)
+        self.settings, self.game, self.seed = settings, game, seed
+        self.steps, self.planned = 0, settings.steps
+        sizes = game.observation_sizes
+        rate = settings.learning_rate
+        self.agents = {
+            name: Trained(sizes[name], game.action_sizes[name], settings, 0.0, rate) for name in (ROBOT, HUMAN)
+        }
+        seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
+        self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
+        self._factor = torch.ones(0)
+        self.imitated = self._nothing_imitated()
+        """Observations and privileged actions of the robot while it imitates."""
+
+    def _nothing_imitated(self) -> dict[str, Tensor]:
+        sizes = {"observation": self.game.observation_sizes[ROBOT], "action": self.game.action_sizes[ROBOT]}
+        return {name: torch.zeros(0, size) for name, size in sizes.items()}
+
+    @property
+    def trained(self) -> dict[str, Trained]:
+        """All networks that learn, by name."""
+        return {**self.agents, "critic": self.critic}
+
+    @property
+    def agent_share(self) -> float:
+        """Part of the episodes in which the learnt human acts."""
+        alone = self.settings.algorithm == "ppo" or self.steps < self.settings.scripted_steps
+        return 0.0 if alone else self.settings.learnt_share
+
+    def update(self) -> dict[str, float]:
+        """One rollout of every game and its gradient steps; returns their figures."""
+        samples, figures = self._collect()
+        self.steps += self.game.n * self.settings.rollout
+        return figures | self._learn(samples)
+
+    def _judged(self, observed: Observed) -> Array:
+        """What the value network sees."""
+        return observed.observations[ROBOT] if self.settings.algorithm == "ppo" else observed.state
+
+    def _collect(self) -> tuple[dict[str, Tensor], dict[str, float]]:
+        """A rollout: samples by name, flattened, and figures of its episodes."""
+        settings, game = self.settings, self.game
+        if self.steps:
+            self._move()
+        self.critic.normalization.discounted[:] = 0.0
+        seeds = np.random.default_rng([self.seed, self.steps]).integers(2**63, size=game.n, dtype=np.uint64)
+        observed = game.reset(seeds, self.agent_share)
+        inputs: dict[str, list[Array]] = {name: [] for name in self.trained}
+        acted: dict[str, list[Array]] = {name: [] for name in self.agents}
+        learnt: list[NDArray[np.bool_]] = []
+        privileged: list[Array] = []
+        rewards, endings = [], []
+        cut: list[tuple[int, NDArray[np.int64], Array]] = []
+        episodes: list[dict[str, NDArray[Any]]] = []
+        for step in range(settings.rollout):
+            learnt.append(game.human_acts.copy())
+            privileged.append(game.privileged_actions)
+            actions = self._explored(observed)
+            for name in self.agents:
+                inputs[name].append(observed.observations[name])
+                acted[name].append(actions[name])
+            inputs["critic"].append(self._judged(observed))
+            outcome = game.step({name: np.clip(action, -1.0, 1.0) for name, action in actions.items()})
+            rewards.append(self.critic.normalization.reward(outcome.reward, outcome.terminated | outcome.truncated))
+            endings.append(outcome.terminated | outcome.truncated)
+            if (places := np.flatnonzero(outcome.truncated & ~outcome.terminated)).size:
+                cut.append((step, places, self._judged(outcome.final)[places]))
+            episodes.append({**outcome.figures, "learnt": learnt[-1][endings[-1]]})
+            observed = outcome.observed
+        rows = {name: np.stack(values) for name, values in inputs.items()}
+        if not self.steps:  # policies with an output of zero do not depend on it
+            self._take_in(rows)
+            self._move()
+        prepared = {name: each.prepared(rows[name]) for name, each in self.trained.items()}
+        reward, ended_at = np.stack(rewards), np.stack(endings)
+        for step, places, behind in cut:
+            reward[step, places] += settings.gamma * self._values(behind)
+        with torch.inference_mode():
+            value = self.critic.network.body(prepared["critic"])[..., 0].numpy()
+        last = self._values(self._judged(observed))
+        advantage = advantages(reward, ended_at, value, last, settings.gamma, settings.gae_lambda)
+        samples = {"advantage": torch.from_numpy(advantage), "target": torch.from_numpy(advantage + value)}
+        samples |= {"value": torch.from_numpy(value), "learnt": torch.from_numpy(np.stack(learnt))}
+        samples["robot/raw"] = torch.from_numpy(rows[ROBOT])
+        samples |= {"critic/input": prepared["critic"], "privileged": torch.from_numpy(np.stack(privileged))}
+        for name, agent in self.agents.items():
+            action = torch.from_numpy(np.stack(acted[name]))
+            with torch.inference_mode():
+                mean = agent.network.body(prepared[name])
+                density = log_density(action, mean, agent.log_std)
+            own = {"input": prepared[name], "action": action, "mean": mean, "log_density": density}
+            samples |= {f"{name}/{part}": values for part, values in own.items()}
+        if self.steps:
+            self._take_in(rows)
+        return {name: values.flatten(0, 1).clone() for name, values in samples.items()}, _of_episodes(episodes)
+
+    def _take_in(self, rows: Mapping[str, Array]) -> None:
+        """Take what networks saw, (T, n, k) each, into their statistics."""
+        for name, each in self.trained.items():
+            each.normalization.observe(rows[name].reshape(-1, rows[name].shape[-1]))
+
+    def _move(self) -> None:
+        """Let the networks' normalisers use their statistics."""
+        for each in self.trained.values():
+            each.normalization.move(each.network.normalizer)
+
+    def _explored(self, observed: Observed) -> dict[str, Array]:
+        """An action of each agent, drawn from its Gaussian."""
+        found = {}
+        with torch.inference_mode():
+            for name, agent in self.agents.items():
+                mean = agent.network(torch.from_numpy(observed.observations[name]))
+                found[name] = (mean + torch.randn_like(mean) * torch.exp(agent.log_std)).numpy()
+        return found
+
+    def _values(self, seen: Array) -> Array:
+        with torch.inference_mode():
+            return np.asarray(self.critic.network(torch.from_numpy(seen))[:, 0].numpy())
+
+    def _learn(self, samples: Mapping[str, Tensor]) -> dict[str, float]:
+        """Gradient steps on a rollout."""
+        explained = {"train/explained_variance": explained_variance(samples["value"], samples["target"])}
+        if self.steps <= self.settings.imitation_steps:
+            found = {"imitation_error": self._imitate(samples), "value_loss": self._fit(samples)}
+            found["imitation_scale"] = float(samples["privileged"].square().mean())
+            return explained | {f"train/{name}": value for name, value in found.items()}
+        self.imitated = self._nothing_imitated()
+        learning = [ROBOT, HUMAN] if bool(samples["learnt"].any()) else [ROBOT]
+        order = [learning[place] for place in torch.randperm(len(learning))]
+        self._factor = torch.ones(len(samples["target"]))
+        figures: dict[str, float] = {}
+        for group in [[name] for name in order] if self.settings.algorithm == "happo" else [order]:
+            figures |= self._improve(group, samples)
+        figures["train/value_loss"] = self._fit(samples)
+        return explained | figures
+
+    def _batches(self, count: int) -> list[Tensor]:
+        return [
+            places
+            for _ in range(self.settings.epochs)
+            for places in torch.randperm(count).chunk(self.settings.minibatches)
+        ]
+
+    def _improve(self, names: Sequence[str], samples: Mapping[str, Tensor]) -> dict[str, float]:
+        """Gradient steps of these policies side by side; the factor then holds what they changed."""
+        figures: dict[str, float] = {}
+        for name in names:
+            agent = self.agents[name]
+            acting = torch.ones_like(samples["learnt"]) if name == ROBOT else samples["learnt"]
+            places = torch.nonzero(acting)[:, 0]
+            own = {part: samples[f"{name}/{part}"][places] for part in ("input", "action", "mean", "log_density")}
+            advantage = samples["advantage"][places]
+            advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8) * self._factor[places]
+            before = agent.log_std.detach().clone()
+            shares = []
+            for batch in self._batches(len(places)):
+                loss, share = self._loss(agent, {part: value[batch] for part, value in own.items()}, advantage[batch])
+                agent.descend(loss)
+                with torch.no_grad():
+                    agent.log_std.clamp_(min=float(np.log(self.settings.std_floor)))
+                shares.append(share)
+            with torch.no_grad():
+                mean = agent.network.body(own["input"])
+                kl = float(divergence(own["mean"], before, mean, agent.log_std).mean())
+                if self.settings.algorithm == "happo":
+                    density = log_density(own["action"], mean, agent.log_std)
+                    self._factor[places] *= torch.exp(density - own["log_density"])
+            found = {"kl": kl, "clip_share": float(np.mean(shares)), "learning_rate": agent.rate}
+            found["std"] = float(torch.exp(agent.log_std.detach()).mean())
+            figures |= {f"{name}/{figure}": value for figure, value in found.items()}
+            agent.rate = adapted(agent.rate, kl, self.settings)
+        return figures
+
+    def _loss(self, agent: Trained, own: Mapping[str, Tensor], advantage: Tensor) -> tuple[Tensor, float]:
+        """PPO's clipped loss of a policy, and the share of samples that are clipped."""
+        clip = self.settings.clip
+        ratio = torch.exp(
+            log_density(own["action"], agent.network.body(own["input"]), agent.log_std) - own["log_density"]
+        )
+        loss = -torch.min(advantage * ratio, advantage * torch.clamp(ratio, 1.0 - clip, 1.0 + clip)).mean()
+        share = float(((ratio.detach() - 1.0).abs() > clip).float().mean())
+        return loss - self.settings.entropy * entropy(agent.log_std), share
+
+    def _fit(self, samples: Mapping[str, Tensor]) -> float:
+        """Gradient steps of the value; its mean squared error."""
+        losses = []
+        for batch in self._batches(len(samples["target"])):
+            value = self.critic.network.body(samples["critic/input"][batch])[:, 0]
+            loss = torch.nn.functional.mse_loss(value, samples["target"][batch])
+            self.critic.descend(loss)
+            losses.append(float(loss.detach()))
+        return float(np.mean(losses))
+
+    def _imitate(self, samples: Mapping[str, Tensor]) -> float:
+        """Gradient steps of the robot towards its privileged actions in all rollouts so far; the mean squared error in
+        the newest, before them."""
+        robot, settings = self.agents[ROBOT], self.settings
+        seen, wanted = self.imitated["observation"], self.imitated["action"]
+        with torch.inference_mode():
+            error = float(torch.nn.functional.mse_loss(samples[f"{ROBOT}/mean"], samples["privileged"]))
+        self.imitated = {
+            "observation": torch.cat([seen, samples[f"{ROBOT}/raw"]]),
+            "action": torch.cat([wanted, samples["privileged"]]),
+        }
+        robot.rate, before = settings.imitation_rate, robot.rate
+        for _ in range(settings.imitation_gradient_steps):
+            batch = torch.randint(len(self.imitated["action"]), (IMITATION_BATCH,))
+            action = robot.network(self.imitated["observation"][batch])
+            robot.descend(torch.nn.functional.mse_loss(action, self.imitated["action"][batch]))
+        robot.rate = before
+        return error
+
+    def golden_observations(self, decisions: int) -> Array:
+        """Observations of the robots over the first decisions of all games, with mean actions, (decisions x n, k)."""
+        observed, found = self.game.reset(), []
+        for _ in range(decisions):
+            found.append(observed.observations[ROBOT])
+            with torch.inference_mode():
+                actions = {
+                    name: agent.network(torch.from_numpy(observed.observations[name])).clamp(-1.0, 1.0).numpy()
+                    for name, agent in self.agents.items()
+                }
+            observed = self.game.step(actions).observed
+        return np.concatenate(found)
+
+    def arrays(self) -> Arrays:
+        """Everything that a resumed training needs, between two updates."""
+        networks = [prefixed(name, each.arrays()) for name, each in self.trained.items()]
+        whole: Arrays = {"steps": np.array([self.steps]), **prefixed("random", checkpoint.random_arrays())}
+        whole |= prefixed("imitated", {name: values.numpy() for name, values in self.imitated.items()})
+        for arrays in networks:
+            whole |= arrays
+        return whole
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Inverse of `arrays`, on a training made from the same recipe."""
+        for name, each in self.trained.items():
+            each.restore(under(name, arrays))
+        self.steps = int(arrays["steps"][0])
+        self.imitated = {name: torch.from_numpy(np.array(of)) for name, of in under("imitated", arrays).items()}
+        checkpoint.restore_random(under("random", arrays))
+
+
+def _of_episodes(ended: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, float]:
+    """Means over the episodes that ended, by who was the human."""
+    columns = {name: np.concatenate([np.asarray(each[name]) for each in ended]) for name in ended[0]}
+    columns = {name: values.astype(np.float64) for name, values in columns.items() if values.dtype.kind in "fib"}
+    learnt = columns.pop("learnt") > 0.0
+    kinds = {"scripted": ~learnt, "learnt": learnt}
+    return {
+        f"{kind}/{name}": float(values[of].mean())
+        for kind, of in kinds.items()
+        if of.any()
+        for name, values in columns.items()
+    }

@@ -1,0 +1,101 @@
+"""The lower layer of the game: environments with the frozen student at the control frequency."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices, Keys
+from iowbc.control.command import nominal_command
+from iowbc.rollouts.blocks import in_blocks
+from iowbc.rollouts.history import History
+from iowbc.skill.student import Student
+from iowbc.task.batch import Batch
+from iowbc.task.episodes import Episode
+from iowbc.task.judge import Judgement
+from iowbc.task.motion import Motion
+from iowbc.task.specification import Specification
+from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.shared import private_buffers
+
+
+class LowerLayer(Batch):
+    """n environments that a student controls. Commands and partners are steered; episodes begin when asked for."""
+
+    def __init__(
+        self, specification: Specification, environments: Indices, episodes: Sequence[Episode], block: int
+    ) -> None:
+        """`environments`: global numbers, (n,); `block`: see `iowbc.rollouts.blocks`."""
+        specification = _with_strength(specification)
+        setup = Setup(specification, len(environments), 0, tuple(episodes))
+        super().__init__(
+            specification,
+            environments=environments,
+            scenes=setup.scenes,
+            seed=0,
+            buffers=private_buffers(setup.buffer_fields(), setup.count),
+            episodes=episodes,
+        )
+        self.wanted = np.tile(nominal_command(specification.recipe.task.commands), (self.n, 1))
+        """The commands that robots approach, (n, 11)."""
+        self.guidance.commander.steer(self.wanted)
+        self.simulation.steered[:] = True
+        self.moved: Motion
+        """The motion after the last control step."""
+        self.fallen, self.dropped, self.diverged = np.zeros((3, self.n), np.bool_)
+        """What happened since the episode began, (n,)."""
+        self.human = np.zeros((self.n, 4))
+        """What humans want: velocity of the handle and yaw rate of the object in the frame of the start [m/s, rad/s]
+        and height of the handle [m], (n, 4)."""
+        self._block = block
+        self._starts = np.ones(self.n, np.bool_)
+
+    def take(self, student: Student) -> None:
+        """The student that controls from now on."""
+        self._student = student.policy
+        self._history = History(self.n, student.history, student.observation)
+
+    def rewind(self, seeds: Keys) -> None:
+        """Lets all that is random start anew from seeds (n,)."""
+        self._schedule.reseed(seeds)
+        self.simulation.reseed(self._schedule.key)
+        self.memory.episode[:] = 0
+
+    def start(self, which: Indices) -> None:
+        """Begins new episodes in some environments, (k,)."""
+        self.moved = self.begin(which)
+        self._observe(self.moved, which)
+        self._starts[which] = True
+        for happened in (self.fallen, self.dropped, self.diverged):
+            happened[which] = False
+
+    def control(self) -> None:
+        """One control step of every environment."""
+        rows = self.buffers["observation"][:, : self._history.frames.shape[2]]
+        seen = self._history.push(rows, self._starts)
+        self.buffers["action"][:] = in_blocks(self._student, self._block, seen)
+        self._starts[:] = False
+        self.step()
+
+    def record(self, judgement: Judgement, action: Array) -> None:
+        """Nobody reads the signals of a trial."""
+
+    def feed_partner(self, feed: Array) -> None:
+        """See `Batch`."""
+        feed[:] = self.human
+
+    def finish(self, judgement: Judgement) -> None:
+        """Notes what happened; the game decides when episodes end."""
+        self.moved, ending = judgement.motion, judgement.ending
+        self.fallen |= ending.fallen
+        self.dropped |= ending.dropped
+        self.diverged |= ending.diverged
+        self._observe(self.moved)
+
+
+def _with_strength(specification: Specification) -> Specification:
+    """The world with the human's strength."""
+    recipe = specification.recipe
+    partner = recipe.simulation.partner.model_copy(update={"strongest": recipe.skill.human.strongest})
+    simulation = recipe.simulation.model_copy(update={"partner": partner})
+    return replace(specification, recipe=recipe.model_copy(update={"simulation": simulation}))

@@ -1,0 +1,73 @@
+"""What robot, human and centralised critic observe of a game: parts by name, which are joined in order."""
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.control.skill_observation import FORCE, SENSED, TIME
+from iowbc.recipe.simulation.partner import BEHAVIOURS
+from iowbc.recipe.skill.skill import Skill
+from iowbc.sim.simulation import Simulation
+from iowbc.skill.path import Paths
+from iowbc.skill.situation import Situation, turned, wrapped
+from iowbc.task.motion import Motion
+
+DRAWN = {"partner_stiffness": 300.0, "partner_damping": 50.0, "partner_delay": 0.3, "partner_noise": 8.0}
+DRAWN |= {"partner_pace": 1.0, "partner_share": 1.0, "object_mass": 20.0, "object_ground_friction": 0.1}
+"""Quantities of the simulation that the critic sees, with their units."""
+FELT = 28
+"""Size of what the human observes."""
+HIDDEN = 13 + len(BEHAVIOURS) + len(DRAWN)
+
+
+def sizes(skill: Skill) -> tuple[tuple[str, int], ...]:
+    """Sizes of what "robot" and "human" observe, and of the "state" that the centralised critic sees: both, and what is
+    hidden from them."""
+    robot = SENSED + 6 * skill.robot.history
+    return ("robot", robot), ("human", FELT), ("state", robot + FELT + HIDDEN)
+
+
+def waypoints(paths: Paths, now: Situation, ahead: tuple[float, float], heading: Array) -> Array:
+    """The next points of the path from the object's centre in a frame with a heading (n,) [rad]: x, y, heading, height
+    from the object's, of each; and the way left. (n, 9)."""
+    columns = []
+    for distance in ahead:
+        way = now.covered + distance
+        point = paths.point(now.path, way) - now.position[:, :2]
+        columns += [turned(point, -heading), wrapped(paths.heading(now.path, way) - heading)[:, None]]
+        columns += [(paths.height(now.path, way) - now.position[:, 2])[:, None]]
+    return np.concatenate([*columns, now.left[:, None] / TIME], axis=1)
+
+
+def felt_by_human(now: Situation, force: Array, action: Array, ahead: Array) -> dict[str, Array]:
+    """What a human observes, in the frame of the object's yaw; `force` (n, 3) on the object in the frame of the start
+    [N], `action` (n, 5): its last one, `ahead` (n, 9): its waypoints."""
+    return {
+        "handle": turned(now.handle - now.position, -now.yaw),
+        "handle_velocity": turned(now.handle_velocity, -now.yaw),
+        "object_yaw_rate": now.yaw_rate,
+        "yaw_error": now.yaw_error,
+        "lateral": now.lateral,
+        "height_error": 10.0 * now.height_error,
+        "tilt": now.tilt,
+        "force": turned(force, -now.yaw) / FORCE,
+        "waypoints": ahead,
+        "action": action,
+    }
+
+
+def hidden(simulation: Simulation, moved: Motion, seconds_left: Array, acts: Array) -> dict[str, Array]:
+    """What neither agent observes and the critic does;
+    `acts`: whether the human of the actions plays, (n,)."""
+    drawn = simulation.drawn
+    behaviour = drawn["partner_behaviour"].astype(int)
+    return {
+        "acts": acts,
+        "behaviour": np.eye(len(BEHAVIOURS))[behaviour] * ~acts[:, None],
+        "drawn": np.stack([drawn[name] / unit for name, unit in DRAWN.items()], axis=1),
+        "base_velocity": moved.base_velocity,
+        "yaw_rate": moved.yaw_rate,
+        "hand_force": moved.hand_force / FORCE,
+        "external_force": moved.external_force / FORCE,
+        "pelvis_height": moved.pelvis_height,
+        "seconds_left": seconds_left / TIME,
+    }

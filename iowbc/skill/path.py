@@ -1,0 +1,107 @@
+"""Paths of transport tasks as points at equal distances, and where objects are on them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices
+from iowbc.recipe.skill.task import Stretch
+
+SPACING = 0.05
+"""Distance of the points of a path [m]: a tenth of the smallest object."""
+WINDOW = 10
+"""Points before and behind the last place among which the next one is sought: no object moves so far in a decision,
+and a path that comes near itself is not left for its other part."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Objects on their paths."""
+
+    covered: Array
+    """Way along the path, (n,) [m]."""
+    lateral: Array
+    """Distance from the path, positive to its left, (n,) [m]."""
+
+
+class Paths:
+    """The paths of some tasks, in the frame of the object's centre at the start, x along the robot's heading."""
+
+    def __init__(self, paths: Sequence[Sequence[Stretch]]) -> None:
+        built = [_points(path) for path in paths]
+        longest = max(len(rows) for rows in built)
+        rows = np.stack([np.pad(own, ((0, longest - len(own)), (0, 0)), mode="edge") for own in built])
+        self._last = np.array([len(own) - 1 for own in built])
+        self.points, self._heading, self._height, self._half_width = rows[..., :2], *np.moveaxis(rows[..., 2:], 2, 0)
+        """Points (paths, k, 2) [m]."""
+        self.length = np.array([sum(stretch.length for stretch in path) for path in paths])
+        """(paths,) [m]."""
+        self.walled = np.isfinite(self._half_width).any(axis=1)
+        """Paths with walls, (paths,)."""
+
+    def place(self, path: Indices, position: Array, around: Array) -> Place:
+        """Places of positions (n, 2) [m] near the way `around` (n,) [m] on paths (n,)."""
+        centre = np.round(around / SPACING).astype(np.int64)
+        near = (centre[:, None] + np.arange(-WINDOW, WINDOW + 1)).clip(0, self._last[path, None])
+        away = position[:, None] - self.points[path[:, None], near]
+        nearest = np.vecdot(away, away).argmin(axis=1)
+        rows = np.arange(len(path))
+        index, away = near[rows, nearest], away[rows, nearest]
+        cosine, sine = np.cos(self._heading[path, index]), np.sin(self._heading[path, index])
+        covered = index * SPACING + cosine * away[:, 0] + sine * away[:, 1]
+        return Place(covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0])
+
+    def heading(self, path: Indices, covered: Array) -> Array:
+        """The path's heading at a way along it, (n,) [rad]; beyond the end that of the end."""
+        return self._read(self._heading, path, covered)
+
+    def height(self, path: Indices, covered: Array) -> Array:
+        """Height of the object's centre above that at the start, (n,) [m]."""
+        return self._read(self._height, path, covered)
+
+    def half_width(self, path: Indices, covered: Array) -> Array:
+        """Distance of the walls from the path, (n,) [m]; infinite where there are none."""
+        index = np.round(covered / SPACING).astype(np.int64).clip(0, self._last[path])
+        width: Array = self._half_width[path, index]
+        return width
+
+    def outline(self, path: int) -> tuple[Array, Array]:
+        """Points of one path, (k, 2) [m], and of its walls on both sides, (2, k, 2), NaN where there are none."""
+        last = self._last[path] + 1
+        points, heading, half = self.points[path, :last], self._heading[path, :last], self._half_width[path, :last]
+        normal = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        away = np.where(np.isfinite(half), half, np.nan)[:, None] * normal
+        return points, np.stack([points + away, points - away])
+
+    def point(self, path: Indices, covered: Array) -> Array:
+        """Points at ways along paths, (n, 2) [m]."""
+        return np.stack([self._read(self.points[..., axis], path, covered) for axis in (0, 1)], axis=1)
+
+    def curvature(self, path: Indices, covered: Array) -> Array:
+        """Change of heading by way, (n,) [rad/m]."""
+        change: Array = self.heading(path, covered + SPACING) - self.heading(path, covered)
+        return change / SPACING
+
+    def _read(self, values: Array, path: Indices, covered: Array) -> Array:
+        last = self._last[path]
+        at = (covered / SPACING).clip(0.0, last)
+        low = np.minimum(at.astype(np.int64), last - 1)
+        before, behind = values[path, low], values[path, low + 1]
+        read: Array = before + (at - low) * (behind - before)
+        return read
+
+
+def _points(path: Sequence[Stretch]) -> Array:
+    """x, y, heading, height and half width at equal distances, (k, 5)."""
+    ends = np.cumsum([0.0, *(stretch.length for stretch in path)])
+    count = max(2, round(ends[-1] / SPACING) + 1)
+    way = np.arange(count) * SPACING
+    heading = np.interp(way, ends, np.cumsum([0.0, *(stretch.turn for stretch in path)]))
+    height = np.interp(way, ends, np.cumsum([0.0, *(stretch.rise for stretch in path)]))
+    middle = 0.5 * (heading[1:] + heading[:-1])
+    steps = SPACING * np.stack([np.cos(middle), np.sin(middle)], axis=1)
+    points = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    owner = np.searchsorted(ends, way, side="right").clip(1, len(path)) - 1
+    half = np.array([np.inf if stretch.width is None else 0.5 * stretch.width for stretch in path])[owner]
+    return np.column_stack([points, heading, height, half])

@@ -1,0 +1,70 @@
+"""Endings and the shared reward of the games."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.recipe.skill.skill import Skill
+from iowbc.skill.situation import Situation
+
+
+@dataclass(frozen=True)
+class GameEnding:
+    """Why games end with a decision, each (n,)."""
+
+    success: Mask
+    fallen: Mask
+    dropped: Mask
+    touched: Mask
+    """An object's corner was in a wall, which ends the game by recipe."""
+    strayed: Mask
+    diverged: Mask
+    time_out: Mask
+
+    @property
+    def failed(self) -> Mask:
+        """Ended by what costs; a simulation that diverged is nobody's fault."""
+        return self.fallen | self.dropped | self.touched | self.strayed
+
+    @property
+    def terminated(self) -> Mask:
+        """Ended otherwise than by time."""
+        return self.success | self.failed | self.diverged
+
+
+def ending(
+    skill: Skill, now: Situation, *, held: Mask, happened: tuple[Mask, Mask, Mask], touched: Mask, late: Mask
+) -> GameEnding:
+    """Endings of games: `held`: with an object in the hands; `happened`: falls, drops and divergence; `touched`: walls;
+    `late`: past the time limit; (n,) each."""
+    finish = skill.finish
+    fallen, dropped, diverged = happened
+    reached = (now.left < finish.distance) & (np.abs(now.lateral) < finish.lateral)
+    reached &= (np.abs(now.yaw_error) < finish.yaw) & (~held | (np.abs(now.height_error) < finish.height))
+    sound = ~(fallen | dropped | diverged)
+    walls = touched & sound & (finish.walls == "end")
+    strayed = (np.abs(now.lateral) > finish.stray) & sound & ~walls
+    success = reached & sound & ~walls & ~strayed
+    over = ~sound | walls | strayed | success
+    fell, lost = fallen & ~diverged, dropped & ~(fallen | diverged)
+    return GameEnding(success, fell, lost, walls, strayed, diverged, late & ~over)
+
+
+def potential(skill: Skill, now: Situation, held: Mask) -> Array:
+    """Φ = progress · way - path |e| - yaw |ψ| - height |z|, (n,)."""
+    weights = skill.reward
+    value: Array = weights.progress * now.covered - weights.path * np.abs(now.lateral)
+    value -= weights.yaw * np.abs(now.yaw_error) + weights.height * held * np.abs(now.height_error)
+    return value
+
+
+def reward(skill: Skill, gained: Array, end: GameEnding, costs: Array, jerk: Array, touched: Mask) -> Array:
+    """Shared reward of a decision, (n,): `gained`: difference of the potential; `costs` (3, n): integrals of internal
+    force [N·s], of the size of the human's power [J] and of the object's tilt [rad·s]; `jerk`: mean squared change of
+    the robot's action."""
+    weights, seconds = skill.reward, 1.0 / skill.frequency
+    value: Array = gained + weights.success * end.success - weights.failure * end.failed
+    value -= weights.internal_force * costs[0] + weights.partner_work * costs[1] + weights.tilt * costs[2]
+    value -= weights.jerk * jerk + seconds * (weights.time + weights.touch * touched)
+    return np.where(end.diverged, 0.0, value)

@@ -1,0 +1,119 @@
+"""What a process needs to know to build its part of the games."""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from iowbc import counter_random as random
+from iowbc.arrays import Keys
+from iowbc.errors import UsageError, require_known
+from iowbc.recipe.skill.skill import Skill
+from iowbc.recipe.skill.task import TransportTask
+from iowbc.rollouts.blocks import block_size
+from iowbc.skill.batch import GameBatch
+from iowbc.skill.figures import FIGURES
+from iowbc.skill.observation import sizes
+from iowbc.skill.plan import KINDS, Plan
+from iowbc.task.scenes import scene_of
+from iowbc.task.specification import Specification
+from iowbc.task.vector.shared import Buffers, Fields
+
+
+@dataclass(frozen=True)
+class GameSetup:
+    """All games of a `TransportGame`."""
+
+    specification: Specification
+    count: int
+    """Number of games."""
+    seed: int
+    partners: tuple[str, ...]
+    """Humans that are drawn for the episodes of games without a plan."""
+    plans: tuple[Plan, ...] | None = None
+    """One a game; without, tasks and humans are drawn."""
+
+    def __post_init__(self) -> None:
+        """Raises UsageError where the recipe has no such task or there is no such human."""
+        if self.count < 1 or (self.plans is not None and len(self.plans) != self.count):
+            found = "no games" if self.plans is None else f"{len(self.plans)} plans for {self.count} games"
+            raise UsageError(f"{found}: give each of one or more games its plan")
+        for kind in (*self.partners, *(plan.partner for plan in self.plans or ())):
+            require_known(kind, "human", KINDS)
+        for plan in self.plans or ():
+            require_known(plan.task, "transport task", self.skill.tasks.names)
+
+    @property
+    def skill(self) -> Skill:
+        """The recipe's section."""
+        return self.specification.recipe.skill
+
+    @cached_property
+    def tasks(self) -> dict[str, TransportTask]:
+        """Transport tasks by name."""
+        return {name: getattr(self.skill.tasks, name) for name in self.skill.tasks.names}
+
+    @cached_property
+    def scenes(self) -> list[str]:
+        """Name of each game's scene."""
+        if self.plans is not None:
+            return [self.tasks[plan.task].scene for plan in self.plans]
+        weights: dict[str, float] = {}
+        for task in self.tasks.values():
+            weights[task.scene] = weights.get(task.scene, 0.0) + task.weight
+        return scene_of(self.count, weights.items())
+
+    def keys(self, first: int, last: int) -> Keys:
+        """Keys of all that is random in some games, (k,)."""
+        key = random.environment_key(self.seed, np.arange(first, last))
+        for row, plan in enumerate(self.plans[first:last] if self.plans is not None else ()):
+            if plan.seed is not None:
+                key[row] = random.environment_key(plan.seed, np.zeros(1, np.int64))[0]
+        return key
+
+    def buffer_fields(self) -> Fields:
+        """What passes between the games and the learner."""
+        seen = {f"{time}/{name}": ((size,), "float32") for time in ("now", "final") for name, size in sizes(self.skill)}
+        return {
+            **seen,
+            "action/robot": ((11,), "float32"),
+            "action/human": ((5,), "float32"),
+            "privileged_action": ((11,), "float32"),
+            "reward": ((), "float32"),
+            "terminated": ((), "bool"),
+            "truncated": ((), "bool"),
+            "human_acts": ((), "bool"),
+            "figures": ((len(FIGURES),), "float64"),
+            "counters": ((1,), "float64"),
+        }
+
+    def batch(self, first: int, last: int, buffers: Buffers) -> GameBatch:
+        """The games from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
+        return GameBatch(
+            self.specification,
+            tasks=self.tasks,
+            games=np.arange(first, last),
+            scenes=self.scenes[first:last],
+            keys=self.keys(first, last),
+            partners=self.partners,
+            plans=None if self.plans is None else self.plans[first:last],
+            block=block_size(self.count),
+            buffers=buffers,
+        )
+
+    def as_json(self) -> str:
+        """Text from which `from_json` makes the same setup."""
+        values = {"specification": self.specification.as_json(), "count": self.count, "seed": self.seed}
+        plans = None if self.plans is None else [asdict(plan) for plan in self.plans]
+        return json.dumps(values | {"partners": self.partners, "plans": plans})
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Inverse of `as_json`."""
+        values = json.loads(text)
+        plans = values.pop("plans")
+        values["specification"] = Specification.from_json(values["specification"])
+        values["partners"] = tuple(values["partners"])
+        return cls(**values, plans=None if plans is None else tuple(Plan(**plan) for plan in plans))

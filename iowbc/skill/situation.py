@@ -1,0 +1,114 @@
+"""The state of the games as robot, human and reward see it: objects on their paths, in the frame of the start."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Indices
+from iowbc.robot import rotations
+from iowbc.sim.simulation import Simulation
+from iowbc.skill.path import Paths
+from iowbc.task.motion import Motion
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Frames in which paths lie: the object's centre and the robot's heading at the start."""
+
+    position: Array
+    """(n, 3) [m]."""
+    heading: Array
+    """(n,) [rad]."""
+
+    @classmethod
+    def blank(cls, n: int) -> "Origin":
+        """All zero."""
+        return cls(np.zeros((n, 3)), np.zeros(n))
+
+    def set(self, which: Indices, simulation: Simulation, moved: Motion) -> None:
+        """Puts the frames of some environments, (k,), where object and robot are."""
+        self.position[which] = simulation.state.object_position[which]
+        self.heading[which] = moved.heading[which]
+
+    def turned(self, vectors: Array) -> Array:
+        """World vectors (n, 3) or planar ones (n, 2) in these frames."""
+        return turned(vectors, -self.heading)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """n games at one time. Positions and vectors in the frame of the start."""
+
+    path: Indices
+    """Numbers of the paths, (n,)."""
+    position: Array
+    """Of the object's centre, (n, 3) [m]."""
+    velocity: Array
+    """Of the object's centre, (n, 3) [m/s]."""
+    yaw: Array
+    """Of the object, (n,) [rad]."""
+    yaw_rate: Array
+    """Of the object, (n,) [rad/s]."""
+    tilt: Array
+    """Of the object from upright, (n,) [rad]."""
+    handle: Array
+    """Far handle, (n, 3) [m]."""
+    handle_velocity: Array
+    """(n, 3) [m/s]."""
+    heading: Array
+    """Of the robot, (n,) [rad]."""
+    base: Array
+    """The pelvis, (n, 3) [m]."""
+    covered: Array
+    """Way of the object along its path, (n,) [m]."""
+    lateral: Array
+    """Distance of the object from its path, positive to the left, (n,) [m]."""
+    yaw_error: Array
+    """Yaw of the object less the path's heading, (n,) [rad]."""
+    height_error: Array
+    """Height of the object less the path's, (n,) [m]."""
+    left: Array
+    """Way to the end of the path, (n,) [m]."""
+
+
+def situation(
+    simulation: Simulation, moved: Motion, origin: Origin, paths: Paths, path: Indices, covered: Array
+) -> Situation:
+    """The games after a control step; `covered` (n,): way along the paths at an earlier time [m]."""
+    state = simulation.state
+    position = origin.turned(state.object_position - origin.position)
+    axes = [rotations.rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2]]
+    forward, up = axes
+    yaw = wrapped(np.arctan2(forward[:, 1], forward[:, 0]) - origin.heading)
+    place = paths.place(path, position[:, :2], covered)
+    return Situation(
+        path=path,
+        position=position,
+        velocity=origin.turned(state.object_linear_velocity),
+        yaw=yaw,
+        yaw_rate=state.object_angular_velocity[:, 2].copy(),
+        tilt=np.arccos(up[:, 2].clip(-1.0, 1.0)),
+        handle=origin.turned(simulation.handle_position - origin.position),
+        handle_velocity=origin.turned(state.handle_velocity),
+        heading=wrapped(moved.heading - origin.heading),
+        base=origin.turned(state.base_position - origin.position),
+        covered=place.covered,
+        lateral=place.lateral,
+        yaw_error=wrapped(yaw - paths.heading(path, place.covered)),
+        height_error=position[:, 2] - paths.height(path, place.covered),
+        left=paths.length[path] - place.covered,
+    )
+
+
+def turned(vectors: Array, angle: Array) -> Array:
+    """Vectors (n, 2 or 3) turned about the vertical by angles (n,) [rad]."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    result = vectors.copy()
+    result[:, 0] = cosine * vectors[:, 0] - sine * vectors[:, 1]
+    result[:, 1] = sine * vectors[:, 0] + cosine * vectors[:, 1]
+    return result
+
+
+def wrapped(angle: Array) -> Array:
+    """Angles (n,) in [-π, π) [rad]."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -1,0 +1,124 @@
+"""Stage `skill-eval`: trained skills and rivals play the same games; tables and a figure compare them."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from iowbc.pipeline.stage import Borrowed, Job, Presentation, Stage
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
+from iowbc.stages.skill import GAME
+
+if TYPE_CHECKING:
+    from iowbc.skill.evaluation.games import Competitor
+
+RIVALS = {
+    "nominal": "nominal",
+    "lead": "scripted leader",
+    "follow": "admittance follower",
+    "clock": "by the clock",
+    "stand": "standing",
+}
+"""Labels of the rules that play without a skill."""
+
+
+def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
+    """No student below, nothing to compare, or names of unknown tasks."""
+    asked = recipe.skill.eval
+    if not leaves_student(recipe):
+        yield "stages", "names skill-eval, and no stage of the recipe trains a student to act below; add `distill`"
+    if "skill" not in recipe.stages and "agent" in asked.partners:
+        yield "skill.eval.partners", "agent: no stage of the recipe trains a human; add `skill` to its stages"
+    for name in asked.tasks:
+        if name not in recipe.skill.tasks.names:
+            yield "skill.eval.tasks", f"no task {name!r}; valid: {', '.join(recipe.skill.tasks.names)}"
+
+
+def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
+    """Skills that other recipes train."""
+    return {
+        f"{label}/{place}": Borrowed(f"skill.eval.others.{label}", named, "skill")
+        for label, several in recipe.skill.eval.others.items()
+        for place, named in enumerate(several)
+    }
+
+
+def run(job: Job) -> None:
+    """Play all games; leave `games.parquet`, tables, a figure and a summary."""
+    import pandas as pd
+    import torch
+
+    from iowbc.learning.storage import read_teacher
+    from iowbc.results.picture import write_figure
+    from iowbc.results.table import write_table
+    from iowbc.skill.evaluation.games import Evaluation, cases
+    from iowbc.skill.evaluation.tables import figure, headline, tables
+    from iowbc.skill.game import TransportGame
+    from iowbc.skill.student import load_student
+    from iowbc.task.specification import Specification
+
+    torch.set_num_threads(1)  # the result must not depend on the machine's cores
+    recipe, skill = job.recipe, job.recipe.skill
+    world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
+    student = load_student(job.inputs[policy_stage(recipe)])
+    human = read_teacher(job.inputs["skill"], "human") if "skill" in job.inputs else None
+    evaluation = Evaluation(
+        lambda plans: TransportGame(world, student, n=len(plans), workers=job.workers, seed=0, plans=plans),
+        human,
+        skill.eval.games,
+        job.work,
+        job.interrupted,
+    )
+    planned, competing = cases(skill, human is not None), _competitors(job)
+    rows: list[pd.DataFrame] = []
+    done = 0
+    for competitor in competing:
+        for batch in evaluation.batches(competitor, planned):
+            rows.append(batch)
+            done += len(batch)
+            job.report.progress(done, len(planned) * len(competing), f"{competitor.label} {competitor.training}")
+    games = pd.concat(rows, ignore_index=True)
+    games.to_parquet(job.out / "games.parquet", index=False)
+    for table in tables(games, skill.partners.held_out):
+        write_table(table, job.out / "tables")
+    write_figure(figure(games), job.out / "figures" / "skill_partners.png")
+    metrics = headline(games)
+    job.report.metrics(metrics, 0)
+    job.summarize(metrics | {"games": float(len(games))})
+
+
+def _competitors(job: Job) -> "list[Competitor]":
+    """This recipe's skill, those of others, and rivals."""
+    from iowbc.learning.storage import read_teacher
+    from iowbc.skill.evaluation.games import Competitor
+
+    asked = job.recipe.skill.eval
+    folders = {(asked.label, "own"): job.inputs["skill"]} if "skill" in job.inputs else {}
+    for name in borrows(job.recipe):
+        label, place = name.rsplit("/", 1)
+        folders[label, place] = job.inputs[name]
+    trained = [
+        Competitor(label, training, None, read_teacher(folder, "robot"))
+        for (label, training), folder in folders.items()
+    ]
+    return trained + [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]
+
+
+STAGE = Stage(
+    name="skill-eval",
+    version=1,
+    slice=("rg.height", "simulation", "task", *GAME, "skill.partners.held_out", "skill.eval"),
+    reads=lambda recipe: (
+        *generator_stage(recipe),
+        policy_stage(recipe),
+        *(("skill",) if "skill" in recipe.stages else ()),
+    ),
+    run=run,
+    problems=problems,
+    results=("games.parquet",),
+    borrows=borrows,
+    presentation=Presentation(
+        headline=("games", "*/human_only/partner_force_p90", "*/human_only/success"),
+        columns=("games",),
+        pictures=("skill_partners.png",),
+    ),
+)

@@ -1,0 +1,1 @@
+"""A simulated robot on the bus of the real one."""

@@ -1,0 +1,45 @@
+"""The process of a simulated robot: low-level states out, commands in, in real time or in step with the commands."""
+
+import time
+from collections.abc import Callable
+
+from iowbc.onboard import messages
+from iowbc.onboard.bus import Bus
+from iowbc.onboard.process import PATIENCE, PERIOD
+from iowbc.twin.robot import Twin
+
+BATTERY_PERIODS = 250
+"""Periods of the bus between two states of the battery."""
+
+
+def serve(
+    bus: Bus,
+    twin: Twin,
+    going: Callable[[], bool],
+    *,
+    lockstep: bool,
+    each: Callable[[Twin], None] = lambda _: None,
+    answer: Callable[[], None] = lambda: None,
+) -> None:
+    """Simulates the robot while `going`; `each` is called after every period, `answer` in it.
+
+    In lock step, a state waits for the command that answers it as long as commands come.
+    """
+    due, following = time.monotonic(), False
+    while going():
+        if twin.periods % BATTERY_PERIODS == 0:
+            bus.publish(twin.battery)
+        bus.publish(twin.state)
+        answer()
+        if lockstep and following:
+            following = bus.wait(messages.LOW_COMMAND, PATIENCE)
+            due = time.monotonic()
+        else:
+            due = max(due + PERIOD, time.monotonic() - PATIENCE)
+            time.sleep(max(0.0, due - time.monotonic()))
+        commands = bus.take(messages.LOW_COMMAND)
+        following = following or bool(commands)
+        for command in commands:
+            twin.command(command)
+        twin.step()
+        each(twin)

@@ -1,0 +1,179 @@
+"""A robot in MuJoCo that is driven by low-level commands alone, as the real one is.
+
+The world is the recipe's own, with its objects, sensors, delays and motor limits, at 1 kHz and with explicit PD control
+by the gains of each command.
+"""
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.control.sensors import Measured
+from iowbc.onboard import messages
+from iowbc.onboard.checks import MODEL
+from iowbc.onboard.machine import FREQUENCY
+from iowbc.onboard.messages import Record
+from iowbc.recipe.simulation.simulation import SimulationSettings
+from iowbc.robot import rotations
+from iowbc.robot.description import GRAVITY, Robot
+from iowbc.sim.simulation import Simulation
+from iowbc.twin.support import HOOK, Support
+
+TIMESTEP = 0.001
+"""Physics step [s], and period of the motors' PD control."""
+
+
+SILENCE = 0.1
+"""Time without commands after which the motors brake [s]; an assumption, for the drives' behaviour is not public."""
+CHARGE, WARM = 90, 35
+"""Battery [%] and motor temperature [°C] of a twin."""
+LYING_HEIGHT, LYING_TILT = 0.35, 1.2
+"""Pelvis height [m] below which, and tilt [rad] beyond which, the robot has fallen."""
+LATENCIES = ("action_latency", "sensor_latency", "object_latency")
+
+
+def at_bus_rate(recipe: SimulationSettings, control_frequency: float) -> SimulationSettings:
+    """The same world with a period of the bus in place of one of the policy; latencies keep their time."""
+    periods = round(FREQUENCY / control_frequency)
+    drawn = recipe.randomization
+    delays = {
+        name: (kind := getattr(drawn, name)).model_copy(
+            update={end: periods * getattr(kind, end) for end in ("low", "high", "nominal")}
+        )
+        for name in LATENCIES
+    }
+    randomization = drawn.model_copy(update={**delays, "longest_latency": periods * drawn.longest_latency})
+    physics = recipe.physics.model_copy(update={"timestep": TIMESTEP, "pd": "explicit"})
+    return recipe.model_copy(update={"physics": physics, "randomization": randomization})
+
+
+class Twin:
+    """A simulated robot: low-level commands in, low-level states out, a period of the bus at a time."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        recipe: SimulationSettings,
+        control_frequency: float,
+        scene: str,
+        seed: int,
+        posture: Array,
+        support: Support,
+        fixed: dict[str, float],
+    ) -> None:
+        """`recipe` of the world; `posture` at the start, (joints,) [rad]; `fixed`: quantities that are not drawn."""
+        self.robot, self.support = robot, support
+        self._kd = robot.kd
+        held = {name: np.array([value]) for name, value in fixed.items()}
+        self.simulation = Simulation(
+            robot,
+            at_bus_rate(recipe, control_frequency),
+            envs=np.zeros(1, np.int64),
+            seed=seed,
+            scenes=(scene,),
+            fixed=held,
+            control_frequency=FREQUENCY,
+        )
+        world = self.simulation.worlds[0]
+        self._gain, self._bias = world.batch.expand("actuator_gainprm"), world.batch.expand("actuator_biasprm")
+        self._pull, self._centre, self._origin, self._frame = (
+            world.batch.bind(name)[0, world.layout.torso] for name in ("xfrc_applied", "xipos", "xpos", "xmat")
+        )
+        self.simulation.reset(np.zeros(1, np.int64), posture[None])
+        self._start = self._hook = self._hook_position()
+        self._object = self.simulation.state.object_position[0].copy()
+        self.periods = 0
+        self._silent = 0
+        self._command = messages.empty(messages.LOW_COMMAND)
+        self.rejected = 0
+        """Commands with a wrong checksum."""
+
+    def command(self, message: Record) -> None:
+        """Takes in a command; one with a wrong checksum is passed over, as by the robot."""
+        if messages.checksum(message) != message["crc"]:
+            self.rejected += 1
+            return
+        self._command, self._silent = message, 0
+
+    def step(self) -> None:
+        """A period of the bus."""
+        motors = self._command["motor_cmd"][: len(self.robot.joints)]
+        enabled = motors["mode"] == 1
+        kp, kd = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd"))
+        if self._silent > SILENCE * FREQUENCY and kp.any():
+            kp, kd = 0.0 * kp, self._kd
+        feed = np.where(enabled, motors["tau"] + kd * motors["dq"], 0.0)
+        self._drive(kp, kd, motors["q"] + feed / np.where(kp > 0.0, kp, np.inf))
+        self.periods += 1
+        self._silent += 1
+        self.support.advance(1.0 / FREQUENCY, bool((kp >= 0.99 * self.robot.kp).all()))
+        if self.support.rigid:
+            self.simulation.pause()
+            return
+        if self.support.just_released:
+            self.simulation.clock[:] = 0
+        before, self._hook = self._hook, self._hook_position()
+        force = self.support.force(self._hook - self._start, FREQUENCY * (self._hook - before))
+        self._pull[:] = *force, *rotations.cross(self._hook - self._centre, force)
+        self.simulation.step()
+
+    def _hook_position(self) -> Array:
+        place: Array = self._origin + self._frame.reshape(3, 3) @ HOOK
+        return place
+
+    def _drive(self, kp: Array, kd: Array, target: Array) -> None:
+        """Gains of this period, times what the motors' own differ by, and targets without numbers as none."""
+        drawn, simulation = self.simulation.drawn, self.simulation
+        kp, kd = kp * drawn["kp_scale"][0], kd * drawn["kd_scale"][0]
+        self._gain[0, :, 0], self._bias[0, :, 1], self._bias[0, :, 2] = kp, -kp, -kd
+        simulation.target[0] = np.where(np.isfinite(target), target, simulation.target[0])
+
+    @property
+    def state(self) -> Record:
+        """The state that the robot sends."""
+        time = round(1e3 * self.periods / FREQUENCY)
+        return low_state(time, Measured.of(self.simulation.measured), self.simulation.state.joint_torque[0])
+
+    @property
+    def battery(self) -> Record:
+        """The battery state that the robot sends."""
+        message = messages.empty(messages.BATTERY_STATE)
+        message["soc"] = CHARGE
+        return message
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the robot lies."""
+        state = self.simulation.state
+        low = state.base_position[0, 2] < LYING_HEIGHT
+        return bool(low or state.base_rotation[0, 2, 2] < np.cos(LYING_TILT))
+
+    @property
+    def verdict(self) -> str:
+        """What became of robot and object."""
+        state, time = self.simulation.state, self.periods / FREQUENCY
+        way = float(np.linalg.norm(state.base_position[0, :2]))
+        parts = [f"{time:.1f} s", "fallen" if self.fallen else "upright", f"pelvis {way:.2f} m from its start"]
+        if state.has_object[0]:
+            moved = float(np.linalg.norm(state.object_position[0, :2] - self._object[:2]))
+            hands = int(state.grasped[0].sum())
+            parts.append(f"object {moved:.2f} m from its start, {hands} hands at it")
+        return ", ".join(parts)
+
+
+def low_state(tick: int, seen: Measured, torque: Array) -> Record:
+    """The state message of what sensors deliver, a row; `tick` [ms]; estimated torques (joints,) [N·m].
+
+    It has an orientation for gravity and heading, so that noise in the length of gravity is lost.
+    """
+    message = messages.empty(messages.LOW_STATE)
+    message["mode_machine"], message["tick"] = MODEL, tick
+    motors, imu = message["motor_state"][: len(torque)], message["imu_state"]
+    motors["mode"], motors["temperature"], motors["tau_est"] = 1, WARM, torque
+    motors["q"], motors["dq"] = seen.joint_position[0], seen.joint_velocity[0]
+    gravity, yaw = seen.projected_gravity[0], seen.heading[0, 0]
+    roll = np.arctan2(-gravity[1], -gravity[2])
+    pitch = np.arctan2(gravity[0], np.hypot(gravity[1], gravity[2]))
+    imu["quaternion"], imu["rpy"] = rotations.from_euler(roll, pitch, yaw), (roll, pitch, yaw)
+    imu["gyroscope"], imu["accelerometer"] = seen.base_angular_velocity[0], -GRAVITY * gravity
+    message["crc"] = messages.checksum(message)
+    return message

@@ -1,0 +1,59 @@
+"""What holds a robot until it stands by itself: an elastic band, or a fixture that holds robot and object still."""
+
+from typing import Literal
+
+import numpy as np
+
+from iowbc.arrays import Array
+
+STIFFNESS, DAMPING = 2000.0, 200.0
+"""Of the band along it [N/m], [N·s/m]; it stretches by 0.16 m under a G1."""
+SWAY = 30.0
+"""Damping across the taut band [N·s/m]; air and bearings damp a hanging robot."""
+HOOK = np.array([0.0, 0.0, 0.35])
+"""Where the robot hangs, torso's frame [m]: between its shoulders."""
+LENGTH = 1.0
+"""Length of the band between that place of a standing robot and its upper end [m]."""
+STRETCHED = {"hanging": 0.2, "lowered": 0.12, "slack": -0.2}
+"""Stretch of the band with the robot at the height of standing [m]: at first its feet hang 4 cm above the ground;
+lowered, the band bears three quarters of its weight and keeps it upright."""
+LOWERING, SLACKENING = 2.0, 3.0
+"""Time to lower the robot, and to slacken the band before it is unhooked [s]."""
+
+
+class Support:
+    """Holds at first, is lowered once the joints have their full gains, and lets go `release` seconds after that."""
+
+    def __init__(self, kind: Literal["band", "fixture", "none"], release: float) -> None:
+        self.kind, self._release = kind, release
+        self._time = 0.0
+        self.just_released = False
+
+    def advance(self, period: float, stiff: bool) -> None:
+        """A period [s]; `stiff`: the joints have their full gains. Once released, it stays so."""
+        before = self._time
+        self._time += period if stiff or before >= self._release else 0.0
+        self.just_released = self.kind == "fixture" and before < self._release <= self._time
+
+    @property
+    def rigid(self) -> bool:
+        """Whether nothing moves."""
+        return self.kind == "fixture" and self._time < self._release
+
+    def force(self, away: Array, velocity: Array) -> Array:
+        """Force on the hook, world frame, (3,) [N]; `away` from where it began (3,) [m], `velocity` (3,) [m/s]."""
+        release = max(LOWERING, self._release)
+        times = (0.0, LOWERING, release, release + SLACKENING)
+        if self.kind != "band" or self._time > times[-1]:
+            return np.zeros(3)
+        hanging, lowered, slack = STRETCHED.values()
+        stretched = np.interp(self._time, times, (hanging, lowered, lowered, slack))
+        along = np.array([0.0, 0.0, LENGTH]) - away
+        distance = float(np.linalg.norm(along))
+        along = along / distance
+        speed = float(along @ velocity)
+        tension = STIFFNESS * (distance - LENGTH + stretched) - DAMPING * speed
+        if tension <= 0.0:
+            return np.zeros(3)
+        force: Array = tension * along - SWAY * (velocity - speed * along)
+        return force

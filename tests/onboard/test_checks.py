@@ -1,0 +1,75 @@
+"""Checks before a robot moves."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from still import Still
+
+from iowbc.onboard import messages
+from iowbc.onboard.checks import Listened, checks
+from iowbc.onboard.limits import LIMITS
+from iowbc.onboard.messages import Record
+
+
+def heard(still: Still, change: Callable[[Record], None] = lambda state: None) -> Listened:
+    states = []
+    for _ in range(45):
+        still.turns += 1
+        states.append(still.state())
+        change(states[-1])
+    battery = messages.empty(messages.BATTERY_STATE)
+    battery["soc"] = 80
+    return Listened(states, 0.1, battery, 0, "")
+
+
+def failed(still: Still, listened: Listened) -> list[str]:
+    return [check.name for check in checks(still.controller, listened, still.standing, LIMITS) if not check.passed]
+
+
+def test_a_robot_in_order_passes_every_check(still: Still) -> None:
+    assert failed(still, heard(still)) == []
+
+
+@pytest.mark.parametrize(
+    ("other", "name"),
+    [
+        ({"states": []}, "states"),
+        ({"seconds": 0.5}, "states"),
+        ({"others": 3}, "publishers"),
+        ({"mode": "ai"}, "mode"),
+        ({"mode": None}, "mode"),
+        ({"battery": None}, "battery"),
+    ],
+)
+def test_what_the_bus_carried_is_checked(still: Still, other: dict[str, Any], name: str) -> None:
+    assert failed(still, replace(heard(still), **other)) == [name]
+
+
+def test_a_low_battery_is_refused(still: Still) -> None:
+    listened = heard(still)
+    assert listened.battery is not None
+    listened.battery["soc"] = 10
+    assert failed(still, listened) == ["battery"]
+
+
+@pytest.mark.parametrize(("field", "value", "name"), [("mode_machine", 2, "model"), ("mode_pr", 1, "ankles")])
+def test_another_model_is_refused(still: Still, field: str, value: int, name: str) -> None:
+    def change(state: Record) -> None:
+        state[field] = value
+
+    assert failed(still, heard(still, change)) == [name]
+
+
+def test_a_hot_motor_is_refused(still: Still) -> None:
+    def change(state: Record) -> None:
+        state["motor_state"]["temperature"][7] = 95
+
+    assert failed(still, heard(still, change)) == ["temperature"]
+
+
+def test_a_joint_beyond_its_limit_is_refused(still: Still) -> None:
+    still.posture = still.posture.copy()
+    still.posture[3] = -0.4
+    assert "joints" in failed(still, heard(still))

@@ -1,0 +1,96 @@
+"""Commands of the remote and of UDP."""
+
+import json
+import socket
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+from iowbc.deploy.contract import read_contract
+from iowbc.errors import UsageError
+from iowbc.onboard import messages
+from iowbc.onboard.machine import State
+from iowbc.onboard.messages import Record
+from iowbc.onboard.operators import BUTTONS, Ranges, Remote, Udp, operator
+
+
+@pytest.fixture
+def ranges(blind: Path) -> Ranges:
+    return Ranges(read_contract(blind))
+
+
+def remote(*pressed: str, left: tuple[float, float] = (0.0, 0.0), right: float = 0.0) -> Record:
+    state = messages.empty(messages.LOW_STATE)
+    bits = sum(1 << BUTTONS.index(name) for name in pressed)
+    data = struct.pack("<2xHfffff16x", bits, left[0], right, 0.0, 0.0, left[1])
+    state["wireless_remote"] = np.frombuffer(data, np.uint8)
+    return state
+
+
+def test_sticks_command_the_velocities_of_training(ranges: Ranges) -> None:
+    source = Remote(ranges)
+    full = source.wanted(0.0, remote(left=(0.0, 1.0), right=-1.0)).command
+    assert full[0] == ranges.velocity[1, 0]
+    assert full[YAW_RATE] == ranges.velocity[1, 2]
+    back = source.wanted(0.0, remote(left=(1.0, -1.0))).command
+    assert (back[0], back[1]) == (ranges.velocity[0, 0], ranges.velocity[0, 1])
+    assert not source.wanted(0.0, remote(left=(0.05, 0.05))).command[:3].any()
+
+
+def test_arrows_move_height_and_pitch_at_their_rates(ranges: Ranges) -> None:
+    source, before = Remote(ranges), ranges.standing
+    for turn in range(51):
+        command = source.wanted(0.02 * turn, remote("down", "right")).command
+    assert command[HEIGHT] == pytest.approx(before[HEIGHT] - 0.1)
+    assert command[PITCH] == pytest.approx(before[PITCH] + 0.3)
+
+
+def test_a_button_asks_once_and_damping_as_long_as_it_is_held(ranges: Ranges) -> None:
+    source = Remote(ranges)
+    assert [source.wanted(0.0, remote("A")).request for _ in range(3)] == [State.RUN, None, None]
+    assert [source.wanted(0.0, remote("B", "A")).request for _ in range(2)] == [State.DAMPING, State.DAMPING]
+
+
+@pytest.fixture
+def source(ranges: Ranges) -> Iterator[Udp]:
+    made = Udp(ranges, 0)
+    yield made
+    made.close()
+
+
+def send(source: Udp, *datagrams: bytes) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for data in datagrams:
+            sender.sendto(data, ("127.0.0.1", source.port))
+
+
+def test_datagrams_are_clipped_to_training_and_keep_their_time(ranges: Ranges, source: Udp) -> None:
+    send(source, json.dumps({"velocity": [9.0, 0.1], "height": 0.6, "request": "stand"}).encode())
+    wanted = source.wanted(3.0, None)
+    assert (wanted.command[0], wanted.command[HEIGHT], wanted.request) == (ranges.velocity[1, 0], 0.6, State.STAND)
+    later = source.wanted(4.0, None)
+    assert (later.at, later.request) == (3.0, None)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\xff", b"[1]", b'{"velocity": ["a", 1]}', b'{"speed": 1}', b'{"request": "fly"}', b"[" * 8000]
+)
+def test_a_datagram_that_cannot_be_read_changes_nothing(source: Udp, data: bytes) -> None:
+    send(source, b'{"velocity": [0.2, 0.0]}', data)
+    assert source.wanted(1.0, None).command[0] == 0.2
+    assert source.refused
+
+
+def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:
+    send(source, b'{"request": "damping"}', b'{"request": "run"}')
+    assert source.wanted(0.0, None).request is State.DAMPING
+
+
+@pytest.mark.parametrize("kind", ["joystick", "udp", "udp:x", "udp:70000"])
+def test_an_unknown_source_is_refused(blind: Path, kind: str) -> None:
+    with pytest.raises(UsageError, match="valid: remote, keyboard, udp:PORT"):
+        operator(kind, read_contract(blind))

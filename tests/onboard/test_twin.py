@@ -1,0 +1,73 @@
+"""The simulated robot: what it does with commands, and without."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iowbc.deploy.controller import Controller
+from iowbc.evaluation.exported import exported_world
+from iowbc.onboard import messages
+from iowbc.onboard.messages import Record
+from iowbc.onboard.operators import Ranges
+from iowbc.twin.robot import SILENCE, Twin
+from iowbc.twin.support import Support
+
+pytestmark = pytest.mark.integration
+
+
+@pytest.fixture
+def twin(blind: Path, controller: Controller) -> Twin:
+    posture = controller.settled_posture(Ranges(controller.contract).standing)[0]
+    simulation = exported_world(blind).recipe.simulation
+    fixed = {"impulse_scale": 0.0, "push_scale": 0.0}
+    return Twin(controller.robot, simulation, 50.0, "free", 0, posture, Support("band", 100.0), fixed)
+
+
+def holding(twin: Twin) -> Record:
+    """Full gains about the posture of now."""
+    command = messages.empty(messages.LOW_COMMAND)
+    motors = command["motor_cmd"][:29]
+    motors["mode"], motors["q"] = 1, twin.simulation.state.joint_position[0]
+    motors["kp"], motors["kd"] = twin.robot.kp, twin.robot.kd
+    command["crc"] = messages.checksum(command)
+    return command
+
+
+def test_the_band_holds_a_robot_whose_joints_only_hold_their_posture(twin: Twin) -> None:
+    command = holding(twin)
+    for _ in range(1500):
+        twin.command(command)
+        twin.step()
+    assert not twin.fallen
+    error = twin.simulation.state.joint_position[0] - command["motor_cmd"]["q"][:29]
+    assert np.abs(error).max() < 0.3
+
+
+def test_a_command_with_a_wrong_checksum_is_passed_over(twin: Twin) -> None:
+    command = holding(twin)
+    command["crc"] += 1
+    twin.command(command)
+    twin.step()
+    assert twin.rejected == 1
+    assert not twin.simulation.state.joint_torque.any()
+
+
+def test_motors_brake_once_commands_stay_away(twin: Twin) -> None:
+    twin.command(holding(twin))
+    for _ in range(round(SILENCE * 500) + 5):
+        twin.step()
+    twin.simulation.target[0] += 1.0
+    twin.step()
+    limit = 1.2 * twin.robot.kd * (np.abs(twin.simulation.state.joint_velocity[0]) + 0.5) + 1.0
+    assert (np.abs(twin.simulation.state.joint_torque[0]) <= limit).all()
+
+
+def test_the_state_tells_what_the_sensors_deliver(twin: Twin) -> None:
+    for _ in range(20):
+        twin.step()
+    state, seen = twin.state, twin.simulation.measured
+    assert state["tick"] == 40
+    assert state["crc"] == messages.checksum(state)
+    np.testing.assert_allclose(state["motor_state"]["q"][:29], seen.joint_position[0], atol=1e-6)
+    np.testing.assert_allclose(state["imu_state"]["gyroscope"], seen.base_angular_velocity[0], atol=1e-6)

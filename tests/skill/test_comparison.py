@@ -1,0 +1,102 @@
+"""The games of `skill-eval`, and what its tables make of them."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from iowbc.errors import Interrupted, StageFailed
+from iowbc.learning.networks import TeacherNetwork
+from iowbc.results.table import markdown
+from iowbc.skill.evaluation.games import Case, Competitor, Evaluation, cases
+from iowbc.skill.evaluation.tables import COLUMNS, estimate, figure, headline, improvement, tables, worst_partner
+from iowbc.skill.plan import Plan
+
+
+def games(forces: dict[str, dict[str, float]], trainings: int = 2, episodes: int = 6) -> pd.DataFrame:
+    """Made-up episodes; `forces`: partner force by label and partner, to which the episode's number is added."""
+    rows = []
+    for label, partners in forces.items():
+        for (partner, force), known, training, episode in itertools.product(
+            partners.items(), (True, False), range(trainings), range(episodes)
+        ):
+            told = {"label": label, "training": str(training), "task": "lift_straight", "load": 0.5}
+            told |= {"known": known, "partner": partner, "episode": episode, "fallen": False, "dropped": False}
+            told |= dict.fromkeys(COLUMNS, 1.0) | {"success": episode > 0, "partner_force_p90": force + episode}
+            rows.append(told)
+    return pd.DataFrame(rows)
+
+
+FORCES = {"MAPPO": {"path": 10.0, "tugging": 20.0}, "follower": {"path": 20.0, "tugging": 50.0}}
+
+
+def test_the_interquartile_mean_leaves_out_the_extremes() -> None:
+    own = games({"MAPPO": {"path": 0.0}}, trainings=1, episodes=8).query("known")
+    own["partner_force_p90"] = [1e6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -1e6]
+    value, low, high = estimate(own, "partner_force_p90")
+    assert value == pytest.approx(3.5)
+    assert low <= value <= high
+
+
+def test_the_worst_partner_is_the_one_with_most_force() -> None:
+    assert worst_partner(games({"MAPPO": FORCES["MAPPO"]}).query("known"))[0] == pytest.approx(22.5)
+
+
+def test_who_has_the_smaller_force_in_every_episode_improves_with_certainty() -> None:
+    made = games(FORCES).query("known and partner == 'tugging'")
+    first, other = (made[made["label"] == label] for label in FORCES)
+    assert improvement(first, other) == (1.0, 1.0, 1.0)
+    assert improvement(first, first)[0] == pytest.approx(0.5)
+
+
+def test_tables_tell_held_out_partners_and_unknown_goals_apart() -> None:
+    found = {table.name: table for table in tables(games(FORCES), ("tugging",))}
+    assert list(found) == ["skill", "skill_partners", "skill_tasks"]
+    groups = dict.fromkeys(found["skill"].numbers["group"])
+    assert list(groups) == [
+        "both know the goal, partners of training",
+        "only the human knows, partners of training",
+        "both know the goal, held-out partners",
+        "only the human knows, held-out partners",
+    ]
+    assert "| MAPPO | 2 | 12 | 12.5 (" in markdown(found["skill"])
+    assert headline(games(FORCES))["follower/human_only/worst_partner"] == pytest.approx(52.5)
+    assert len(figure(games(FORCES)).axes) == 4
+
+
+def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -> None:  # type: ignore[no-untyped-def]
+    skill = make().setup.skill
+    planned = cases(skill, learnt_human=True)
+    kinds = (*skill.partners.training, *skill.partners.held_out, "agent")
+    assert len(planned) == len(skill.tasks.names) * (2 * len(kinds) - 1) * skill.eval.episodes
+    assert not [case for case in planned if case.plan.partner == "follower" and not case.plan.known]
+    assert {case.plan.mass for case in planned if case.plan.task == "lift_straight"} == {13.5}
+
+
+def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    planned = [Case(Plan("lift_straight", kind, False, mass=12.0, seed=3), 0.5, 0) for kind in ("path", "agent")]
+    stop = False
+
+    def evaluation() -> Evaluation:
+        return Evaluation(lambda plans: make(len(plans), plans=plans), None, 1, tmp_path, lambda: stop)
+
+    torch.manual_seed(0)
+    size = make(1).observation_sizes["robot"]
+    robot = TeacherNetwork(size, 11, [8], "elu", 5.0)
+    own, rival = Competitor("MAPPO", "own", None, robot), Competitor("follower", "", "follow", None)
+    played = {one.label: pd.concat(evaluation().batches(one, planned)) for one in (own, rival)}
+    for rows in played.values():
+        assert rows["partner"].tolist() == ["path", "agent"]
+        np.testing.assert_allclose(rows["mass"], 12.0)
+    assert not np.allclose(played["MAPPO"]["partner_force_p90"], played["follower"]["partner_force_p90"])
+    stop = True
+    again = pd.concat(evaluation().batches(own, planned))
+    pd.testing.assert_frame_equal(again, played["MAPPO"])
+    with pytest.raises(Interrupted):
+        list(evaluation().batches(Competitor("other", "", "lead", None), planned))
+    stop = False
+    with pytest.raises(StageFailed, match=f"observes 3 numbers, this game shows {size}"):
+        list(evaluation().batches(Competitor("x", "", None, TeacherNetwork(3, 11, [8], "elu", 5.0)), planned))
