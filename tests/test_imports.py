@@ -31,11 +31,12 @@ MAY_IMPORT = {
     "sim": SHARED,
     "reference": WORLD | {"results"},
     "model_based": SHARED | {"reference"},
+    "adapters": SHARED | {"task"},
     "rollouts": {"arrays"},
     "learning": SHARED | {"rollouts"},
     "twin": WORLD | {"onboard"},
     "task": WORLD | {"rollouts"},
-    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "results"},
+    "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters", "results"},
     "skill": WORLD | {"task", "rollouts", "learning", "evaluation", "results"},
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
@@ -47,7 +48,7 @@ MAY_IMPORT = {
     | {"skill", "results"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
-    | {"live", "web", "stages", "results", "onboard", "twin"},
+    | {"live", "web", "stages", "results", "onboard", "twin", "adapters"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""

@@ -48,9 +48,9 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_there_are_five_and_the_site_lists_them() -> None:
+def test_there_are_six_and_the_site_lists_them() -> None:
     listed = (ROOT / "mkdocs.yml").read_text()
-    assert len(TUTORIALS) == 5
+    assert len(TUTORIALS) == 6
     assert all(page in listed for page in TUTORIALS)
     assert all(path.name in listed for path in DOCS.glob("*.md"))
 

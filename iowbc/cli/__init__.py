@@ -11,7 +11,14 @@ import typer
 
 from iowbc.cli.driving import robot, robot_sim
 from iowbc.cli.listing import compare, diff, gc, list_, report, show, status, ui
-from iowbc.cli.measuring import bench_control, bench_engines, bench_reference, bench_simulation, bench_training
+from iowbc.cli.measuring import (
+    bench_carry,
+    bench_control,
+    bench_engines,
+    bench_reference,
+    bench_simulation,
+    bench_training,
+)
 from iowbc.cli.playing import export, play
 from iowbc.cli.preparing import doctor, init, schema
 from iowbc.cli.running import plan, publish, run, sweep
@@ -45,6 +52,7 @@ BENCHMARKS: dict[str, Callable[..., None]] = {
     "train": bench_training,
     "rg": bench_reference,
     "control": bench_control,
+    "carry": bench_carry,
     "engines": bench_engines,
 }
 
@@ -56,7 +64,9 @@ app = typer.Typer(
     context_settings={"max_content_width": 120},
 )
 bench = typer.Typer(
-    help="Measure the speed of this machine, and compare physics engines.", no_args_is_help=True, rich_markup_mode=None
+    help="Measure the speed of this machine, physics engines, or a public controller.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
 )
 app.add_typer(bench, name="bench")
 

@@ -1,6 +1,7 @@
-"""`bench sim`, `bench train`, `bench rg`, `bench control`: the speed of this machine; `bench engines`: two engines."""
+"""The benchmarks: of this machine, `bench engines` of two engines, `bench carry` of a public controller."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal
 
 import typer
 
@@ -58,6 +59,27 @@ def bench_control(
     from iowbc.commands.bench import control
 
     control(what, steps)
+
+
+def bench_carry(
+    policy: Annotated[
+        str, typer.Argument(help="Controller: a file, a folder, or PACKAGE:PATH of an installed package.")
+    ],
+    adapter: Annotated[
+        str,
+        typer.Option(help="Its adapter: a Python file, `holosoma` or `deploy`.", metavar="FILE"),
+    ],
+    arms: Annotated[
+        Literal["measured", "default"], typer.Option(help="How it observes the arms: as they are, or at its default.")
+    ] = "measured",
+    posture: Annotated[bool, typer.Option("--posture", help="Also give it commanded height and torso pitch.")] = False,
+    workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
+    out: Annotated[Path, typer.Option(help="Page to write.", metavar="FILE")] = Path("carry.md"),
+) -> None:
+    """Measure a controller that others trained in a fixed suite of lifts and pushes, and write a page of results."""
+    from iowbc.commands.bench_carry import carry
+
+    carry(policy, adapter, arms=arms, posture=posture, workers=workers, out=out)
 
 
 def bench_engines(

@@ -19,6 +19,7 @@ from iowbc.pipeline.store.links import named_folder
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.results.table import Table, drawn, read_tables
+from iowbc.stages.eval import acting_stage
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
@@ -156,5 +157,5 @@ def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | No
         raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")
     table = pd.read_parquet(artifact.folder / TRIALS) if trials is None else trials
     world = evaluated_world(world_of(artifact.recipe, input_of(store, artifact, "rg-fit")))
-    policy = None if world.recipe.eval.policy == "model" else policy_of(store, artifact).folder
+    policy = policy_of(store, artifact).folder if acting_stage(world.recipe) else None
     return Actor(world, evaluated_policy(world, policy), table)

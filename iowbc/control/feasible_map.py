@@ -11,6 +11,8 @@ from iowbc.arrays import Array, Constants
 
 FEASIBLE = "feasible.npz"
 """File beside a fitted generator: where its postures hold, to which the controller clamps its commands."""
+UPRIGHT = 1e-6
+"""Pitch on both sides of an upright torso [rad]; a map has some width."""
 Run = tuple[int, int]
 """First and last place of a row of feasible heights."""
 
@@ -40,6 +42,12 @@ class FeasibleMap(Constants):
         kept = np.append(self.pitch[self.pitch < pitch], pitch)
         low, high = np.interp(kept, self.pitch, self.low), np.interp(kept, self.pitch, self.high)
         return FeasibleMap(kept, low, high)
+
+    @classmethod
+    def single(cls, height: float) -> "FeasibleMap":
+        """The map of an upright torso at one height [m]."""
+        pitch = np.array([-UPRIGHT, UPRIGHT])
+        return cls(pitch, np.full(2, height), np.full(2, height))
 
     def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
         """Whether commands are inside, shape (n,)."""

@@ -40,6 +40,10 @@ class ReferenceLayer(Constants):
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
             self.feasible = FeasibleMap.load(rg / FEASIBLE).up_to(references.largest_pitch)
+        if references.upright:
+            from iowbc.control.feasible_map import FeasibleMap
+
+            self.feasible = FeasibleMap.single(robot.default_height)
         self._start, self._ahead = references.arms, references.lean * np.eye(3)[0]
         self._gravity = ArmGravity(robot) if references.arms.gravity else None
         self._compliance = 1.0 / robot.kp[robot.interaction]

@@ -139,7 +139,7 @@ def _described(folder: Path, source: Path, entries: Mapping[str, Any]) -> Robot:
             )
     support = _support(entries["support"], joints, source)
     rows = [_row(entries["joints"], name, source) for name in joints]
-    unused = set(entries["joints"]) - {_kind(name) for name in joints}
+    unused = set(entries["joints"]) - {kind_of(name) for name in joints}
     if unused:
         raise ValueError(f"{source}: joints: no joint of {mjcf.name} is of kind {', '.join(sorted(unused))}")
     default = np.array([_default(row, name) for row, name in zip(rows, joints, strict=True)])
@@ -193,20 +193,20 @@ def _described(folder: Path, source: Path, entries: Mapping[str, Any]) -> Robot:
     )
 
 
-def _kind(joint: str) -> str:
-    """The name of the joint without its side and ending: `left_hip_pitch_joint` is a `hip_pitch`."""
+def kind_of(joint: str) -> str:
+    """Name of the row of a joint, without its side and ending: `left_hip_pitch_joint` is a `hip_pitch`."""
     return joint.removeprefix("left_").removeprefix("right_").removesuffix("_joint")
 
 
 def _row(rows: Mapping[str, Mapping[str, Any]], joint: str, source: Path) -> Mapping[str, Any]:
-    row = rows.get(_kind(joint))
+    row = rows.get(kind_of(joint))
     if row is None:
-        raise ValueError(f"{source}: joints: no row {_kind(joint)!r} for {joint}; rows: {', '.join(rows)}")
+        raise ValueError(f"{source}: joints: no row {kind_of(joint)!r} for {joint}; rows: {', '.join(rows)}")
     unknown = set(row) - ROW_KEYS
     absent = {"kp", "kd", "velocity", "default"} - set(row)
     if unknown or absent:
         raise ValueError(
-            f"{source}: joints.{_kind(joint)}: unknown {sorted(unknown)}, missing {sorted(absent)}; "
+            f"{source}: joints.{kind_of(joint)}: unknown {sorted(unknown)}, missing {sorted(absent)}; "
             f"a row has {', '.join(sorted(ROW_KEYS))}"
         )
     return row

@@ -29,17 +29,19 @@ FORCES = ("handle_force_p95", "hand_force_p95")
 
 
 def acting_stage(recipe: Recipe) -> tuple[str, ...]:
-    """The stage whose artifact holds the policy to evaluate; none for the quadratic program."""
-    stages = {"student": (policy_stage(recipe),), "teacher": ("teacher",), "model": ()}
-    return stages[recipe.eval.policy]
+    """The stage whose artifact holds the policy to evaluate; none for what this project did not train."""
+    stages = {"student": (policy_stage(recipe),), "teacher": ("teacher",)}
+    return stages.get(recipe.eval.policy, ())
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    """A student that no stage leaves."""
+    """A student that no stage leaves, and what a controller that this project did not train lacks."""
     if recipe.eval.policy == "student" and not leaves_student(recipe):
         text = "asks for the student, and no stage of the recipe trains one: add `distill` to its stages, or evaluate "
         yield "eval.policy", f"{text}the teacher with --set eval.policy=teacher"
-    if recipe.eval.policy == "model" and recipe.eval.probe is not None:
+    if (recipe.eval.policy == "public") != (recipe.eval.public is not None):
+        yield "eval.public", "belongs to eval.policy 'public', which needs it"
+    if recipe.eval.policy in ("model", "public") and recipe.eval.probe is not None:
         yield "eval.probe", "reads what a trained policy knows of its load: leave it out, or evaluate the student"
 
 

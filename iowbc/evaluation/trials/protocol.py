@@ -33,11 +33,16 @@ from iowbc.task.vector.setup import shares
 def evaluated_world(specification: Specification) -> Specification:
     """Where the trials of a recipe take place: in the world that `eval.simulation` pins, or else in the training's,
     and in the engine of `eval.engine`.
-    Where the policy does not see s_priv, that has no part that is in a user's file."""
+    Where the policy does not see s_priv, that has no part that is in a user's file. The robot of a public controller
+    has its gains and default posture. Raises StageFailed where such a controller cannot be used."""
     recipe = specification.recipe
     world = specification if recipe.eval.policy == "teacher" else specification.deployed
     if recipe.eval.simulation is not None:
         world = replace(world, recipe=world.recipe.model_copy(update={"simulation": recipe.eval.simulation}))
+    if recipe.eval.public is not None:
+        from iowbc.adapters.source import adapted_robot
+
+        world = replace(world, robot=adapted_robot(recipe.eval.public, load_robot(world.robot), recipe.task))
     if recipe.eval.engine == "drake":
         world = replace(world, drake=recipe.eval.drake)
     return replace(world, recipe=_with_trial_scenes(world.recipe)) if recipe.eval.scenes else world

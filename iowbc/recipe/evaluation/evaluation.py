@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.evaluation.model_based import ModelBased
+from iowbc.recipe.evaluation.public import PublicController
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
 from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
@@ -109,11 +110,13 @@ SceneName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 class Evaluation(Section):
     """Trials of the trained policy."""
 
-    policy: Literal["student", "teacher", "model"] = "student"
-    """The acting policy: the deployable student, the teacher with its privileged observation, or the quadratic program
-    of `model`, which nothing is trained for."""
+    policy: Literal["student", "teacher", "model", "public"] = "student"
+    """The acting policy: the deployable student, the teacher with its privileged observation, the quadratic program of
+    `model`, which nothing is trained for, or the controller of `public`, which others trained."""
     model: ModelBased = Field(default=ModelBased(), json_schema_extra=LATER)
     """The model-based rival: tasks and limits of its quadratic program."""
+    public: PublicController | None = Field(default=None, json_schema_extra=LATER)
+    """A controller that others trained, for the policy `public`."""
     label: str = Field(default="IO-WBC", min_length=1, max_length=200, json_schema_extra=COSMETIC)
     """Name of the variant in tables and figures; the paper's are IO-WBC, WBC, w/o RG, w/o Distill."""
     trials: int = Field(default=5, ge=1, le=10_000)

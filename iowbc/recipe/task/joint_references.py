@@ -128,6 +128,9 @@ class References(Section):
     largest_pitch: float | None = Field(default=None, gt=0.0, le=1.6, json_schema_extra=LATER)
     """Torso pitch at which commands are clamped, before the feasible map ends [rad]. The map holds what has a support
     posture in equilibrium; a policy may hold less. Empty clamps to the map alone."""
+    upright: bool = Field(default=False, json_schema_extra=LATER)
+    """Whether the references leave out commanded height and pitch: for a controller that takes velocities alone, whose
+    arms would else reach to where its torso does not go."""
     arms: ArmReference = ArmReference()
     """Arm references."""
     gait: GaitPrior = GaitPrior()

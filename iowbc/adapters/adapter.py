@@ -1,0 +1,170 @@
+"""The description of a controller that others trained: joints, gains, observation, action and network."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.errors import StageFailed
+from iowbc.robot.description import Robot
+
+VELOCITIES = ("v_x", "v_y", "yaw_rate")
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Command and measurements of n robots, a row each. Joints are those of the adapter, in its order."""
+
+    velocity: Array
+    """Commanded v_x, v_y [m/s] and yaw rate [rad/s], heading frame, kept to the adapter's ranges, (n, 3)."""
+    height: Array
+    """Commanded height of the pelvis, (n, 1) [m]."""
+    pitch: Array
+    """Commanded torso pitch, (n, 1) [rad]."""
+    walking: Mask
+    """Whether the commanded velocity asks for steps, (n,)."""
+    walked: Array
+    """Time since it began to, (n, 1) [s]; 0 in standing."""
+    gravity: Array
+    """Direction of gravity in the base frame, (n, 3)."""
+    angular_velocity: Array
+    """Of the base, base frame, (n, 3) [rad/s]."""
+    joint_position: Array
+    """(n, joints) [rad]."""
+    joint_deviation: Array
+    """From the adapter's default posture, (n, joints) [rad]."""
+    joint_velocity: Array
+    """(n, joints) [rad/s]."""
+    action: Array
+    """Output of the network in the step before, zero at first, (n, acted)."""
+
+
+Term = Callable[[Seen], Array]
+"""A part of the observation, (n, size)."""
+
+
+def scaled(name: str, factor: float | Array = 1.0) -> Term:
+    """The part of the observation that is a field of `Seen` times a factor."""
+    return lambda seen: getattr(seen, name) * factor
+
+
+@dataclass(frozen=True)
+class Adapter:
+    """A controller as its own configuration describes it. The arms hold the grasp by this project's kinematics."""
+
+    joints: tuple[str, ...]
+    """Joints that it observes, in its order."""
+    default: Array
+    """Posture to which observation and action refer, (joints,) [rad]."""
+    kp: Array
+    """Position gains, (joints,) [N·m/rad]."""
+    kd: Array
+    """Velocity gains, (joints,) [N·m·s/rad]."""
+    acted: tuple[str, ...]
+    """Joints of its action, in its order: legs and waist at least. Targets of arm joints are not followed."""
+    scale: Array
+    """Radians of joint target for each unit of action, (acted,)."""
+    frequency: float
+    """Rate at which it acts [Hz]."""
+    terms: tuple[Term, ...]
+    """Parts of its observation, in order."""
+    network: Callable[[Array], Array]
+    """Action (1, acted) from an observation (1, size), float32."""
+    history: int = 1
+    """Observations that it sees, the last one included; the first fills the history."""
+    by_term: bool = True
+    """Whether all past values of a part stand together, oldest first, rather than all parts of a past observation."""
+    ranges: Mapping[str, tuple[float, float]] | None = None
+    """Ranges of the commanded v_x, v_y [m/s] and yaw_rate [rad/s]; empty bounds none."""
+    standing: float = 0.01
+    """Commanded planar speed [m/s] and yaw rate [rad/s] up to which the robot stands."""
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and greatest commanded velocities, (3,) each."""
+        known = self.ranges or {}
+        low, high = zip(*(known.get(name, (-np.inf, np.inf)) for name in VELOCITIES), strict=True)
+        return np.array(low), np.array(high)
+
+    def observed(self, past: tuple[Array, ...]) -> Array:
+        """The network's input (n, size) from the last values of each part, (n, history, size of the part) each."""
+        rows = len(past[0])
+        if self.by_term:
+            return np.concatenate([values.reshape(rows, -1) for values in past], axis=1)
+        return np.concatenate(past, axis=2).reshape(rows, -1)
+
+
+def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str) -> None:
+    """Holds an adapter against a robot and the rate of control [Hz], and its network against its observation.
+
+    Raises StageFailed with the field, what it is and what would be valid.
+    """
+    problems = [
+        *_naming(adapter, robot),
+        *(
+            f"{name}: has shape {np.shape(values)}, expected {(len(names),)} finite numbers"
+            for name, values, names in (
+                ("default", adapter.default, adapter.joints),
+                ("kp", adapter.kp, adapter.joints),
+                ("kd", adapter.kd, adapter.joints),
+                ("scale", adapter.scale, adapter.acted),
+            )
+            if np.shape(values) != (len(names),) or not np.isfinite(values).all()
+        ),
+    ]
+    if adapter.frequency != frequency:
+        text = f"frequency: is {adapter.frequency:g} Hz, the trials run at {frequency:g} Hz"
+        problems.append(f"{text}; set task.control_frequency to it")
+    if adapter.history < 1:
+        problems.append(f"history: is {adapter.history}, expected at least the present observation")
+    unknown = sorted(set(adapter.ranges or ()) - set(VELOCITIES))
+    if unknown:
+        problems.append(f"ranges: {', '.join(unknown)}: no such velocity; valid: {', '.join(VELOCITIES)}")
+    if problems:
+        raise StageFailed(f"{where}: does not fit the robot {robot.name}: {'; '.join(problems)}")
+    _require_answer(adapter, where)
+
+
+def _naming(adapter: Adapter, robot: Robot) -> list[str]:
+    """Problems of the names of joints."""
+    support = [robot.joints[index] for index in robot.support]
+    found = []
+    for field, names, known in (("joints", adapter.joints, robot.joints), ("acted", adapter.acted, adapter.joints)):
+        unknown = [name for name in names if name not in known]
+        if unknown or len(set(names)) != len(names):
+            found.append(f"{field}: unknown or repeated {unknown or 'names'}; valid: {', '.join(known)}")
+    missing = [name for name in support if name not in adapter.acted]
+    return [*found, f"acted: lacks {', '.join(missing)}"] if missing else found
+
+
+def _require_answer(adapter: Adapter, where: str) -> None:
+    """One step of a robot that stands in the default posture."""
+    try:
+        parts = [np.asarray(term(standing(adapter)), np.float64)[:, None] for term in adapter.terms]
+        past = tuple(np.repeat(values, adapter.history, 1) for values in parts)
+        observation = adapter.observed(past).astype(np.float32)
+        answer = np.asarray(adapter.network(observation))
+    except Exception as error:
+        raise StageFailed(f"{where}: cannot make a step: {type(error).__name__}: {error}") from error
+    if answer.shape != (1, len(adapter.acted)) or not np.isfinite(answer).all():
+        text = f"its network gives shape {answer.shape} for an observation of {observation.shape[1]} numbers"
+        raise StageFailed(f"{where}: {text}; expected {(1, len(adapter.acted))} finite numbers, one a joint of `acted`")
+
+
+def standing(adapter: Adapter) -> Seen:
+    """What a robot sees that stands upright in the adapter's default posture."""
+    zero = np.zeros((1, 1))
+    still = np.zeros((1, len(adapter.joints)))
+    return Seen(
+        velocity=np.zeros((1, 3)),
+        height=zero,
+        pitch=zero,
+        walking=np.zeros(1, np.bool_),
+        walked=zero,
+        gravity=np.array([[0.0, 0.0, -1.0]]),
+        angular_velocity=np.zeros((1, 3)),
+        joint_position=still + adapter.default,
+        joint_deviation=still,
+        joint_velocity=still,
+        action=np.zeros((1, len(adapter.acted))),
+    )

@@ -1,0 +1,74 @@
+"""The walkers of the package `holosoma-inference` (Apache-2.0): 29 joints, a gait clock of two phases.
+
+Joints, gains and ranges are in the metadata of the ONNX file, the other numbers in the package's configuration of
+locomotion with the G1.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from iowbc.adapters.adapter import Adapter, Seen, scaled
+from iowbc.adapters.networks import metadata, network
+from iowbc.arrays import Array
+from iowbc.errors import StageFailed
+
+DEFAULT = {
+    "hip_pitch": -0.312,
+    "knee": 0.669,
+    "ankle_pitch": -0.363,
+    "shoulder_pitch": 0.2,
+    "left_shoulder_roll": 0.2,
+    "right_shoulder_roll": -0.2,
+    "elbow": 0.6,
+}
+"""Joints of the default posture that are not at zero, on both sides where none is named [rad]."""
+ACTION_SCALE = 0.25
+FREQUENCY = 50.0
+GAIT_PERIOD = 1.0
+RANGES = {"v_x": "lin_vel_x", "v_y": "lin_vel_y", "yaw_rate": "ang_vel_yaw"}
+"""Names of the ranges in the metadata."""
+LARGEST_ACTION = 100.0
+
+
+def adapter(policy: Path) -> Adapter:
+    """The adapter of an ONNX file of the package. Raises StageFailed where its metadata lacks something."""
+    said, run = metadata(policy), network(policy)
+    missing = [name for name in ("dof_names", "kp", "kd", "command_ranges") if name not in said]
+    if missing:
+        raise StageFailed(f"{policy}: its metadata lacks {', '.join(missing)}, which walkers of holosoma have")
+    joints = tuple(said["dof_names"])
+    return Adapter(
+        joints=joints,
+        default=np.array([_default(name) for name in joints]),
+        kp=np.array(said["kp"]),
+        kd=np.array(said["kd"]),
+        acted=joints,
+        scale=np.full(len(joints), ACTION_SCALE),
+        frequency=FREQUENCY,
+        terms=(
+            scaled("action"),
+            scaled("angular_velocity", 0.25),
+            lambda seen: seen.velocity[:, 2:],
+            lambda seen: seen.velocity[:, :2],
+            lambda seen: np.cos(feet_phase(seen)),
+            scaled("joint_deviation"),
+            scaled("joint_velocity", 0.05),
+            scaled("gravity"),
+            lambda seen: np.sin(feet_phase(seen)),
+        ),
+        network=lambda observation: run(observation).clip(-LARGEST_ACTION, LARGEST_ACTION),
+        ranges={own: tuple(said["command_ranges"][name]) for own, name in RANGES.items()},
+    )
+
+
+def feet_phase(seen: Seen) -> Array:
+    """Phases of the left and right foot, (n, 2) [rad]: half a period apart in walking, both π in standing."""
+    phase = 2.0 * np.pi * seen.walked / GAIT_PERIOD + np.array([0.0, np.pi])
+    return np.where(seen.walking[:, None], (phase + np.pi) % (2.0 * np.pi) - np.pi, np.pi)
+
+
+def _default(joint: str) -> float:
+    """Of a joint in the default posture [rad]."""
+    name = joint.removesuffix("_joint")
+    return DEFAULT.get(name, DEFAULT.get(name.removeprefix("left_").removeprefix("right_"), 0.0))

@@ -1,0 +1,67 @@
+"""Networks of others: ONNX on onnxruntime, TorchScript on torch, one thread each."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.errors import StageFailed
+
+TORCHSCRIPT = (".pt", ".pth", ".jit", ".ts")
+"""Endings of files that hold TorchScript; pickled weights are not read."""
+
+
+def network(path: Path) -> Callable[..., Array]:
+    """The function of a network: its first output from its inputs, float32 arrays. Raises StageFailed."""
+    try:
+        if path.suffix == ".onnx":
+            return _onnx(path)
+        if path.suffix in TORCHSCRIPT:
+            return _torchscript(path)
+    except Exception as error:
+        raise StageFailed(f"{path}: cannot be read as a network: {error}") from error
+    raise StageFailed(f"{path}: is no network; give a file that ends in {', '.join(('.onnx', *TORCHSCRIPT))}")
+
+
+def metadata(path: Path) -> Mapping[str, Any]:
+    """Metadata of an ONNX file, values that are JSON decoded. Raises StageFailed."""
+    try:
+        said = _session(path).get_modelmeta().custom_metadata_map
+        return {name: json.loads(value) for name, value in said.items()}
+    except Exception as error:
+        raise StageFailed(f"{path}: its metadata cannot be read: {error}") from error
+
+
+def _session(path: Path) -> Any:
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+
+
+def _onnx(path: Path) -> Callable[..., Array]:
+    session = _session(path)
+    names = [one.name for one in session.get_inputs()]
+
+    def run(*inputs: Array) -> Array:
+        return np.asarray(session.run(None, dict(zip(names, inputs, strict=True)))[0])
+
+    return run
+
+
+def _torchscript(path: Path) -> Callable[..., Array]:
+    import torch
+
+    torch.set_num_threads(1)  # the result must not depend on the machine's cores
+    load: Any = torch.jit.load
+    module = load(str(path), map_location="cpu").eval()
+
+    def run(*inputs: Array) -> Array:
+        with torch.inference_mode():
+            return np.asarray(module(*(torch.from_numpy(np.ascontiguousarray(one)) for one in inputs)).numpy())
+
+    return run

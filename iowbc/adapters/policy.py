@@ -1,0 +1,111 @@
+"""A public controller as a policy of the trials: its observation from s_t, its joint targets as the residual action."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iowbc.adapters.adapter import Adapter, Seen
+from iowbc.arrays import Array
+from iowbc.control.action import action_scale
+from iowbc.control.command import HEIGHT, PITCH, VELOCITY, YAW_RATE
+from iowbc.control.observation import observation_layout
+from iowbc.errors import StageFailed
+from iowbc.recipe.evaluation.public import PublicController
+from iowbc.recipe.task.task import Task
+from iowbc.robot.description import Robot
+
+
+class AdaptedPolicy:
+    """Acts in n environments, each on its own: the same action whichever others there are.
+
+    The sensors are those of the learnt policies, with their noise and latency. With q_d the adapter's default posture,
+    the target of a joint is q_d + scale · output, so that the action is (target - θ_S_ref) / own scale.
+    """
+
+    def __init__(self, controller: PublicController, adapter: Adapter, robot: Robot, task: Task) -> None:
+        self.adapter, self._robot = adapter, robot
+        self._places = observation_layout(robot, task.observation.observe_object).slices
+        self._joints = [robot.joints.index(name) for name in adapter.joints]
+        support = [robot.joints[index] for index in robot.support]
+        self._acted = [adapter.acted.index(name) for name in support]
+        self._arms = [place for place, name in enumerate(adapter.joints) if name not in support]
+        self._default = adapter.default[[adapter.joints.index(name) for name in support]]
+        self._own, self._scale = adapter.scale[self._acted], action_scale(robot, task.action)
+        self._arms_hidden = controller.arms == "default"
+        self._heading_gain = controller.heading_gain
+        self._period = 1.0 / task.control_frequency
+        self._bounds = adapter.bounds()
+        self._blank(0)
+
+    def _blank(self, n: int) -> None:
+        self._starts, self._walking = np.ones(n, np.bool_), np.zeros(n, np.bool_)
+        self._walked, self._output = np.zeros((n, 1)), np.zeros((n, len(self.adapter.acted)))
+        self._past: tuple[Array, ...] = ()
+
+    def reset(self, which: NDArray[np.bool_]) -> None:
+        """Forget the past of the marked environments, shape (n,)."""
+        if self._starts.shape != which.shape:
+            self._blank(len(which))
+        self._starts |= which
+
+    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Residual action, shape (n, A), from s_t, shape (n, S). Rows of zeros, which no trial fills, stay zero.
+
+        Raises StageFailed where the network's output is not finite.
+        """
+        del privileged
+        rows = observation.astype(np.float64)
+        seen = self._seen({name: rows[:, place] for name, place in self._places.items()})
+        self._remember(seen)
+        filled = np.asarray(rows.any(axis=1))
+        inputs = self.adapter.observed(self._past).astype(np.float32)
+        for index in np.flatnonzero(filled):
+            self._output[index] = self.adapter.network(inputs[index : index + 1])[0]
+        if not np.isfinite(self._output).all():
+            raise StageFailed("eval.public: its network's output is not finite; compare its inputs with training's")
+        self._starts[filled] = False
+        target = self._default + self._own * self._output[:, self._acted]
+        reference = rows[:, self._places["support_reference"]]
+        action: NDArray[np.float32] = ((target - reference) / self._scale * filled[:, None]).astype(np.float32)
+        return action
+
+    def _seen(self, parts: dict[str, Array]) -> Seen:
+        robot, command = self._robot, parts["command"]
+        position = parts["joint_position"].copy()
+        position[:, robot.support] += parts["support_reference"]
+        position[:, robot.interaction] += parts["arm_reference"]
+        position, rates = position[:, self._joints], parts["joint_velocity"][:, self._joints]
+        if self._arms_hidden:
+            position[:, self._arms], rates[:, self._arms] = self.adapter.default[self._arms], 0.0
+        velocity = command[:, VELOCITY].copy()
+        asked = np.abs(velocity).max(axis=1) > self.adapter.standing
+        velocity[:, YAW_RATE] -= self._heading_gain * parts["heading_error"][:, 0] * asked
+        velocity = velocity.clip(*self._bounds)
+        speed = np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), np.abs(velocity[:, YAW_RATE]))
+        walking = speed > self.adapter.standing
+        went_on = walking & self._walking & ~self._starts
+        self._walked = np.where(went_on[:, None], self._walked + self._period, 0.0)
+        self._walking = walking
+        self._output[self._starts] = 0.0
+        return Seen(
+            velocity=velocity,
+            height=command[:, HEIGHT, None],
+            pitch=command[:, PITCH, None],
+            walking=walking,
+            walked=self._walked,
+            gravity=parts["projected_gravity"],
+            angular_velocity=parts["base_angular_velocity"],
+            joint_position=position,
+            joint_deviation=position - self.adapter.default,
+            joint_velocity=rates,
+            action=self._output.copy(),
+        )
+
+    def _remember(self, seen: Seen) -> None:
+        """Put the newest observation at the end of the history; the first of an episode fills it."""
+        newest = [np.asarray(term(seen), np.float64)[:, None] for term in self.adapter.terms]
+        if not self._past:
+            self._past = tuple(np.repeat(values, self.adapter.history, 1) for values in newest)
+        self._past = tuple(
+            np.where(self._starts[:, None, None], values, np.concatenate([past[:, 1:], values], 1))
+            for past, values in zip(self._past, newest, strict=True)
+        )

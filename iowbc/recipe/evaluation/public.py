@@ -1,0 +1,36 @@
+"""A controller that others trained: its file, and the adapter that describes it."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from iowbc.recipe.beside import ModuleFile
+from iowbc.recipe.section import COSMETIC, Section
+
+
+class PublicController(Section):
+    """A public controller. The recipe holds its digest, and nothing of its content."""
+
+    adapter: Literal["holosoma", "deploy", "own"]
+    """Description of its observation, action, gains and frequency: of the walkers of `holosoma`, of a folder with a
+    network and the `deploy.yaml` of Isaac Lab exports, or one's own `module`."""
+    module: ModuleFile | None = None
+    """Python file with a function `adapter(policy)`, which takes the controller's path and returns an
+    `iowbc.adapters.adapter.Adapter`; for the adapter `own` alone."""
+    policy: str = Field(min_length=1, json_schema_extra=COSMETIC)
+    """Its file or folder: a path from the working folder, or PACKAGE:PATH for a file of an installed package."""
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    """SHA-256 of the file; of a folder that of its sorted lines `DIGEST  NAME`, as `sha256sum` prints them."""
+    arms: Literal["measured", "default"] = "measured"
+    """How it observes the arms, which this project moves: as they are, or at rest in its default posture. A walker that
+    moves arms of its own may take a grasp for a disturbance; which of the two is better is tried on trials of the
+    development split."""
+    heading_gain: float = Field(default=0.5, ge=0.0)
+    """Commanded yaw rate against each radian of heading error [1/s]: such a controller follows rates and drifts, where
+    learnt policies of this project observe the error. Velocity tasks of Isaac Lab train with 0.5."""
+
+    @model_validator(mode="after")
+    def _module_where_it_is_read(self) -> Self:
+        if (self.adapter == "own") != (self.module is not None):
+            raise ValueError("module: belongs to the adapter 'own', which needs it")
+        return self

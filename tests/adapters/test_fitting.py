@@ -1,0 +1,69 @@
+"""An adapter is held against the robot, and the robot takes its gains and posture, before anything is played."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iowbc.adapters.adapter import Adapter, require_fitting, scaled
+from iowbc.adapters.robot import robot_of
+from iowbc.errors import StageFailed
+from iowbc.robot.description import Robot, load_robot
+
+pytestmark = pytest.mark.unit
+
+
+@pytest.fixture
+def adapter(robot: Robot) -> Adapter:
+    joints = robot.joints
+    return Adapter(
+        joints=joints,
+        default=robot.default_position,
+        kp=np.full(len(joints), 40.0),
+        kd=np.full(len(joints), 2.5),
+        acted=tuple(joints[index] for index in robot.support),
+        scale=np.full(len(robot.support), 0.25),
+        frequency=50.0,
+        terms=(scaled("gravity"), scaled("joint_velocity", 0.05)),
+        network=lambda observation: observation[:, :15],
+    )
+
+
+def test_a_fitting_adapter_passes(robot: Robot, adapter: Adapter) -> None:
+    require_fitting(adapter, robot, 50.0, "eval.public")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"joints": ("left_elbow",)}, "joints: unknown or repeated .'left_elbow'.; valid: left_hip_pitch_joint"),
+        ({"acted": ("left_knee_joint",), "scale": np.ones(1)}, "acted: lacks left_hip_pitch_joint"),
+        ({"kp": np.ones(3)}, r"kp: has shape \(3,\), expected \(29,\) finite numbers"),
+        ({"default": np.full(29, np.nan)}, "default: has shape"),
+        ({"frequency": 100.0}, "is 100 Hz, the trials run at 50 Hz; set task.control_frequency"),
+        ({"history": 0}, "history: is 0"),
+        ({"ranges": {"yaw": (-1.0, 1.0)}}, "ranges: yaw: no such velocity; valid: v_x, v_y, yaw_rate"),
+        ({"network": lambda observation: observation}, r"gives shape \(1, 32\) for an observation of 32 numbers"),
+        ({"network": lambda observation: observation[:, 40]}, "cannot make a step: IndexError"),
+    ],
+)
+def test_what_does_not_fit_is_named(robot: Robot, adapter: Adapter, changes: dict[str, object], message: str) -> None:
+    with pytest.raises(StageFailed, match=message):
+        require_fitting(replace(adapter, **changes), robot, 50.0, "eval.public")
+
+
+def test_legs_and_waist_take_the_controllers_gains_and_the_arms_keep_theirs(robot: Robot, adapter: Adapter) -> None:
+    posture = np.where(["knee" in name for name in robot.joints], 0.5, robot.default_position)
+    made = load_robot(robot_of(replace(adapter, default=posture), robot, "eval.public"))
+    for index in robot.support:
+        assert (made.kp[index], made.kd[index]) == (40.0, 2.5)
+    np.testing.assert_array_equal(made.kp[robot.interaction], robot.kp[robot.interaction])
+    np.testing.assert_array_equal(made.default_position, posture)
+    np.testing.assert_array_equal(made.effort, robot.effort)
+
+
+def test_sides_that_differ_are_refused(robot: Robot, adapter: Adapter) -> None:
+    kp = adapter.kp.copy()
+    kp[robot.joints.index("right_knee_joint")] = 41.0
+    with pytest.raises(StageFailed, match="right_knee_joint differs from the other side"):
+        robot_of(replace(adapter, kp=kp), robot, "eval.public")
