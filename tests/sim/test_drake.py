@@ -11,7 +11,7 @@ from iowbc.errors import UsageError
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.recipe import Recipe as WholeRecipe
 from iowbc.recipe.section import deciding
-from iowbc.recipe.simulation.simulation import Simulation as Recipe
+from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.sim.simulation import Simulation
 
 EXPERIMENTS = ("free_fall", "arm_pendulum", "step_responses", "static_load", "crate_threshold", "swinging_box")
