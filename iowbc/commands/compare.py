@@ -258,7 +258,8 @@ def _steps_of(run: "Run", stage: str) -> int | None:
     if stage not in run.recipe.get("stages", ()):
         return None
     made: Any = run.artifacts[stage].recipe if stage in run.artifacts else run.recipe
-    for part in STAGES[stage].counts[0].split("."):
+    (counted, *_) = STAGES[stage].counts or (f"{stage}.steps",)
+    for part in counted.split("."):
         made = made[part]
     return int(made)
 

@@ -13,10 +13,10 @@ from network_watch import watched
 from ray_processes import HEALTH, below, holds_an_actor, kill, kill_a_node, nodes
 
 from iowbc import open_artifact
-from iowbc.recipe.recipe import PIPELINE
+from iowbc.recipe.recipe import CONTROLLER
 
 UNTRACKED = ("--set", "execution.track=false")
-SWEPT = PIPELINE[: PIPELINE.index("distill") + 1]
+SWEPT = CONTROLLER[: CONTROLLER.index("distill") + 1]
 """Stages of the sweep: all that learn."""
 POINTS = 3
 PATIENCE = 600.0
@@ -38,13 +38,13 @@ def smoke(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_the_smoke_recipe_runs_in_an_empty_folder_and_is_cached_afterwards(smoke: Path) -> None:
-    for stage in PIPELINE:
+    for stage in CONTROLLER:
         assert open_artifact(f"smoke/{stage}", smoke / "runs").metrics
     exported = open_artifact("smoke/export", smoke / "runs").folder
     assert {"step.onnx", "settle.onnx", "contract.json", "golden.npz"} <= {path.name for path in exported.iterdir()}
     words = [sys.executable, "-m", "iowbc", "run", "smoke", *UNTRACKED]
     again = subprocess.run(words, cwd=smoke, capture_output=True, text=True, check=True)
-    assert again.stdout.count(": cached") == len(PIPELINE)
+    assert again.stdout.count(": cached") == len(CONTROLLER)
 
 
 @pytest.mark.slow
