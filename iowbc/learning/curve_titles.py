@@ -30,6 +30,8 @@ TITLES = {
     "train/value_loss": "loss of the value",
     "train/clip_share": "samples clipped [share]",
     "train/learning_rate": "learning rate",
+    "train/imitation_error": "difference from the robot that knows the path",
+    "train/imitation_scale": "departure of the robot that knows the path",
     "train/std": "standard deviation of the action",
     "train/explained_variance": "variance explained by the value [share]",
     "steps_per_second": "environment steps a second [1/s]",
@@ -43,6 +45,8 @@ TITLES = {
 }
 """By the name under which a figure is recorded."""
 FAMILIES = {
+    "robot/": "{} of the robot's skill",
+    "human/": "{} of the human's policy",
     "scripted/": "{}, scripted humans",
     "learnt/": "{}, learnt human",
     "level/": "level of {}",
