@@ -49,7 +49,11 @@ def has_bfloat16() -> bool:
 
 
 def reduced(precision: Precision) -> AbstractContextManager[None]:
-    """A context in which layers multiply in bfloat16, where the recipe and the processor say so."""
+    """A context in which layers multiply in bfloat16, where the recipe and the processor say so.
+
+    Without torch's cache of converted weights: all threads share it and any of them empties it, so that a layer that is
+    used twice would sometimes sum its gradients in bfloat16.
+    """
     wanted = precision == "bfloat16" or (precision == "auto" and has_bfloat16())
-    context: AbstractContextManager[None] = torch.autocast("cpu", torch.bfloat16, enabled=wanted)
+    context: AbstractContextManager[None] = torch.autocast("cpu", torch.bfloat16, enabled=wanted, cache_enabled=False)
     return context

@@ -6,7 +6,7 @@ import pytest
 import torch
 from point_masses import MIRRORS, PointMasses
 
-from iowbc.learning.computing import SideBySide
+from iowbc.learning.computing import SideBySide, reduced
 from iowbc.learning.teacher import TeacherTraining
 from iowbc.recipe.teacher import Teacher
 
@@ -35,3 +35,21 @@ def test_what_is_learnt_does_not_depend_on_the_cores() -> None:
     one, two = learnt(1), learnt(2)
     for name, value in one.items():
         np.testing.assert_array_equal(two[name], value, err_msg=name)
+
+
+def test_threads_round_as_one_does_where_a_layer_is_used_twice() -> None:
+    layers = torch.nn.ModuleList(torch.nn.Linear(64, 64) for _ in range(4))
+    rows = torch.randn(256, 64, generator=torch.Generator().manual_seed(0))
+
+    def gradient(part: torch.Tensor) -> torch.Tensor:
+        with reduced("bfloat16"):
+            ahead, image = part, part.flip(1)
+            for layer in layers:
+                ahead, image = torch.tanh(layer(ahead)), torch.tanh(layer(image))
+        found = torch.autograd.grad((ahead + image).float().square().mean(), list(layers.parameters()))
+        return torch.cat([each.flatten() for each in found])
+
+    alone, together = SideBySide(4, 1), SideBySide(4, 4)
+    expected = torch.stack(alone(gradient, rows))
+    for _ in range(50):
+        torch.testing.assert_close(torch.stack(together(gradient, rows)), expected, rtol=0.0, atol=0.0)
