@@ -29,11 +29,14 @@ class Sweep:
     def __init__(self, workplace: Workplace) -> None:
         self.workplace = workplace
         self.gate = workplace.folder / "gate"
+        self.behaviour: dict[str, Any] = {
+            "teacher": {"gate": str(self.gate), "pause": 0.05},
+            "rg-dataset": {"pieces": 4},
+        }
         self.commands: list[Command] = []
 
     def start(self, address: str) -> Command:
-        behaviour: dict[str, Any] = {"teacher": {"gate": str(self.gate), "pause": 0.05}, "rg-dataset": {"pieces": 4}}
-        self.commands.append(self.workplace.start(*WORDS, *RAY, address, behaviour=behaviour, **HEALTH))
+        self.commands.append(self.workplace.start(*WORDS, *RAY, address, behaviour=self.behaviour, **HEALTH))
         return self.commands[-1]
 
     def log(self, seed: int) -> str:
@@ -86,7 +89,11 @@ def test_ctrl_c_leaves_checkpoints_and_no_process(sweep: Sweep) -> None:
 
 
 @pytest.mark.timeout(900)
-def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(sweep: Sweep, tmp_path: Path) -> None:
+def test_a_dead_node_costs_nothing_that_is_finished_and_changes_nothing(
+    sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for variable, value in {**HEALTH, "FAKE_BEHAVIOUR": json.dumps(sweep.behaviour)}.items():
+        monkeypatch.setenv(variable, value)  # for stages on the nodes, which are not the sweep's own
     with local_nodes([1, 1]) as address:
         command = sweep.start(address)
         sweep.wait("teacher: runs on", 2)
