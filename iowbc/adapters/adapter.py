@@ -152,7 +152,7 @@ def _require_answer(adapter: Adapter, where: str) -> None:
 
 
 def standing(adapter: Adapter) -> Seen:
-    """What a robot sees that stands upright in the adapter's default posture."""
+    """Measurements of a robot that stands upright in the adapter's default posture."""
     zero = np.zeros((1, 1))
     still = np.zeros((1, len(adapter.joints)))
     return Seen(

@@ -37,13 +37,13 @@ class Agreement:
     engines: Sequence[float]
     """In MuJoCo and in Drake; where it is a distance of the two, zero and that."""
     law: float = np.nan
-    """What a formula says; NaN where there is none."""
+    """Value by a formula; NaN where there is none."""
     tolerance: float = np.inf
     """Difference of the engines that is expected at most."""
 
     @property
     def agrees(self) -> bool:
-        """Whether the engines differ by no more than the tolerance."""
+        """True where the engines differ by no more than the tolerance."""
         return bool(abs(self.engines[0] - self.engines[1]) <= self.tolerance)
 
 
@@ -223,7 +223,7 @@ def _edit(simulation: Simulation, **changes: tuple[int, float]) -> None:
 def _run(
     simulation: Simulation, periods: int, seen: Callable[[SimulationState], Array] = lambda state: state.joint_position
 ) -> Array:
-    """What is seen after each control period."""
+    """Observed values after each control period."""
     trace = []
     for _ in range(periods):
         simulation.step()

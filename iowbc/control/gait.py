@@ -22,7 +22,7 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
 
 
 def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
-    """Whether the base is felt to tip over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
+    """True where the base is felt to tip over; `pelvis_pitch` of the reference posture (n,) [rad], result (n,).
 
     Pitch and roll of the measured gravity, less the reference's, and their rates by the gyroscope.
     """

@@ -112,7 +112,7 @@ class ReferenceLayer(Constants):
         return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping)
 
     def wants_steps(self, measured: Measured, support: Array, command: Array) -> Mask:
-        """Whether the gait clock has a reason to run, (n,): a commanded velocity, or a fall to be caught."""
+        """True where the gait clock has a reason to run, (n,): a commanded velocity, or a fall to be caught."""
         moving, recovery = wants_to_move(command, self._settings), self._settings.recovery
         if recovery is None:
             return moving

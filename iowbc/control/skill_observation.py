@@ -1,11 +1,11 @@
-"""What a robot observes at each decision of the skill layer, from its sensors alone."""
+"""Observation of the robot at each decision of the skill layer, from its sensors alone."""
 
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
+from iowbc.control.sensors import Measured
 from iowbc.robot import rotations
 
 FORCE = 50.0
@@ -22,26 +22,9 @@ YAW = 3
 """Place of the yaw in the part of the object."""
 
 
-class Sensed(Protocol):
-    """Measurements of n robots, as `iowbc.control.sensors.Measured` has them."""
-
-    @property
-    def projected_gravity(self) -> Array: ...
-    @property
-    def base_angular_velocity(self) -> Array: ...
-    @property
-    def object_position(self) -> Array | None: ...
-    @property
-    def object_quaternion(self) -> Array | None: ...
-    @property
-    def object_linear_velocity(self) -> Array | None: ...
-    @property
-    def object_angular_velocity(self) -> Array | None: ...
-
-
 def robot_observation(
     command: Array,
-    measured: Sensed,
+    measured: Measured,
     wrist_error: Array,
     sees_object: bool,
     pushing: Mask,
@@ -66,9 +49,9 @@ def joined(parts: Mapping[str, Array]) -> Array:
     return np.concatenate(columns, axis=1).astype(np.float32)
 
 
-def sensed(command: Array, measured: Sensed, wrist_error: Array, sees_object: bool) -> dict[str, Array]:
-    """What a robot senses, heading frame: `command` (n, 11), `wrist_error` (n, 2, 3) [m]; without `sees_object` the
-    object's part is zero."""
+def sensed(command: Array, measured: Measured, wrist_error: Array, sees_object: bool) -> dict[str, Array]:
+    """Measurements of the robot, heading frame: `command` (n, 11), `wrist_error` (n, 2, 3) [m]; the object's part
+    is zero without `sees_object`."""
     parts = {
         "command": command,
         "gravity": measured.projected_gravity,
@@ -78,7 +61,7 @@ def sensed(command: Array, measured: Sensed, wrist_error: Array, sees_object: bo
     return parts | {"object": of_object(measured) if sees_object else np.zeros((len(command), OBJECT))}
 
 
-def of_object(measured: Sensed) -> Array:
+def of_object(measured: Measured) -> Array:
     """Measured object in the heading frame, (n, OBJECT): its place from the base, yaw, upward axis, velocity and yaw
     rate relative to the base. Raises ValueError where there is no measurement of it."""
     quaternion = _given(measured, "object_quaternion")
@@ -90,13 +73,13 @@ def of_object(measured: Sensed) -> Array:
     return np.concatenate([place, yaw[:, None], up[:, :2], velocity, rates[:, 2:]], axis=1)
 
 
-def object_yaw(measured: Sensed) -> Array:
+def object_yaw(measured: Measured) -> Array:
     """Measured yaw of the object in the heading frame, (n,) [rad]."""
     yaw: Array = of_object(measured)[:, YAW]
     return yaw
 
 
-def _given(measured: Sensed, name: str) -> Array:
+def _given(measured: Measured, name: str) -> Array:
     value: Array | None = getattr(measured, name)
     if value is None:
         raise ValueError(f"{name}: this skill observes the object; measure it")

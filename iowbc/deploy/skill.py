@@ -45,7 +45,7 @@ class Skill:
         self._pushing: Mask = np.full(n, pushing)
         self._rule = SkillCommand(contract.robot, contract.commands, self._pushing)
         self.observation = np.zeros((n, contract.observation), np.float32)
-        """What the skill last saw, (n, size)."""
+        """Last observation of the skill, (n, size)."""
         self.reset()
 
     @classmethod

@@ -19,7 +19,7 @@ FILES = (GRAPH, GOLDEN)
 
 
 class SkillContract(Section):
-    """What `skill_contract.json` says."""
+    """Content of `skill_contract.json`."""
 
     format: Literal[1] = 1
     """Raised when a reader of the old format would misread the new one."""
@@ -28,7 +28,7 @@ class SkillContract(Section):
     observation: int = Field(ge=1)
     """Size of the observation: see `iowbc.control.skill_observation.robot_observation`."""
     sees_object: bool
-    """Whether the robot measures the object's pose."""
+    """True where the robot measures the object's pose."""
     robot: RobotAgent
     """Admittance, scales of the action, and length of the history of forces."""
     commands: Commands

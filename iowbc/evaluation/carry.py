@@ -62,6 +62,6 @@ def suite_table(trials: pd.DataFrame) -> Table:
 
 
 def falls_early(trials: pd.DataFrame) -> bool:
-    """Whether it falls at once without an object, which points to its adapter."""
+    """True where it falls at once without an object, which points to its adapter."""
     alone = trials.loc[(trials["mass"] == 0) & ~trials["survived"], "seconds"]
     return len(alone) == int((trials["mass"] == 0).sum()) > 0 and bool(np.mean(alone) < EARLY)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from iowbc.control.references import ReferenceLayer
-from iowbc.control.sensors import Measured
 from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
 from iowbc.errors import ContractBroken
@@ -58,8 +57,7 @@ class ExportedPolicy:
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         del observation, privileged
         batch = self.environment.batch
-        measured = Measured.of(batch.measured)
-        targets = self.controller.step(measured, batch.command)
+        targets = self.controller.step(batch.measured, batch.command)
         expected = batch.targets(targets.action)
         passed = np.abs(expected - targets.position)[~targets.held]
         self.largest_difference = max(self.largest_difference, float(passed.max(initial=0.0)))

@@ -14,7 +14,7 @@ class Bus(Protocol):
         """Sends a message of any kind."""
 
     def take(self, kind: np.dtype[np.void]) -> list[Record]:
-        """What others have sent of a kind since the last call, oldest first."""
+        """Messages of a kind from others since the last call, oldest first."""
 
     def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
         """Waits until there is something to take; False where nothing came in time."""

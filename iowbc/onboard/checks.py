@@ -33,7 +33,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Listened:
-    """What the bus carried while the robot was listened to."""
+    """Messages on the bus while the robot was listened to."""
 
     states: Sequence[Record]
     seconds: float

@@ -21,7 +21,7 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class Run:
-    """What a robot did in Run, at the rate of the policy; first axis: T control steps."""
+    """Motion of a robot in Run, at the rate of the policy; first axis: T control steps."""
 
     time: Array
     """From the log's beginning, (T,) [s]."""

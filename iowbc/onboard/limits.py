@@ -20,7 +20,7 @@ class Limits(Section):
     tilt: float = Field(default=1.0, gt=0.0)
     """Largest angle between pelvis and vertical [rad]; deep bows lean by 0.6, and beyond 1 it falls."""
     position_margin: float = Field(default=0.1, ge=0.0)
-    """How far a joint may be measured beyond its limits [rad]: encoder bias and elastic stops."""
+    """Largest measured distance of a joint beyond its limits [rad]: encoder bias and elastic stops."""
     speed: float = Field(default=1.0, gt=0.0)
     """Highest joint speed as a multiple of the motor's no-load speed."""
     torque: float = Field(default=1.2, gt=0.0)

@@ -97,7 +97,7 @@ class Turn:
 
 
 def read_about(path: Path) -> dict[str, str]:
-    """What the log says of the program that wrote it. Raises Damaged."""
+    """Header of the log, by the program that wrote it. Raises Damaged."""
     with path.open("rb") as file:
         try:
             about = [entry.metadata for entry in NonSeekingReader(file).iter_metadata() if entry.name == ABOUT]

@@ -42,7 +42,7 @@ BEFORE = {State.STAND: (State.DAMPING,), State.RUN: (State.STAND,)}
 
 @dataclass(frozen=True)
 class Wanted:
-    """What an operator asks for."""
+    """Request of an operator."""
 
     command: Array
     """C, (11,)."""
@@ -58,7 +58,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a turn of the loop is given."""
+    """Inputs of a turn of the loop."""
 
     now: float
     """Monotonic clock [s]."""
@@ -82,7 +82,7 @@ class Machine:
         self.sensors = Sensors(self._joints)
         self.state = State.ZERO_TORQUE
         self.events: list[str] = []
-        """What happened in the last turn: states entered and why, and requests refused and why."""
+        """Events of the last turn: states entered and requests refused, with the reason."""
         self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
         self._turns = round(FREQUENCY / contract.control_frequency)
         """Turns of the loop for each step of the policy."""

@@ -1,4 +1,4 @@
-"""Where commands come from: the wireless remote, the keyboard, or JSON over UDP."""
+"""Sources of commands: the wireless remote, the keyboard, or JSON over UDP."""
 
 import contextlib
 import json
@@ -30,11 +30,11 @@ REQUESTS = {"B": State.DAMPING, "select": State.ZERO_TORQUE, "start": State.DAMP
 DEAD = 0.1
 """Part of a stick's way that counts as its middle."""
 HEIGHT_RATE, PITCH_RATE = 0.1, 0.3
-"""How fast the remote's arrows change height [m/s] and torso pitch [rad/s]."""
+"""Rates at which the remote's arrows change height [m/s] and torso pitch [rad/s]."""
 KEYS = {" ": State.DAMPING, "0": State.ZERO_TORQUE, "1": State.DAMPING, "2": State.STAND, "3": State.RUN}
 STEPS = {"i": (0, 0.1), "k": (0, -0.1), "j": (1, 0.05), "l": (1, -0.05), "u": (YAW_RATE, 0.1), "o": (YAW_RATE, -0.1)}
 STEPS |= {"r": (HEIGHT, 0.02), "f": (HEIGHT, -0.02), "t": (PITCH, 0.1), "g": (PITCH, -0.1)}
-"""What a key adds to an entry of the command [m/s, rad/s, m, rad]."""
+"""Step of a key on an entry of the command [m/s, rad/s, m, rad]."""
 LARGEST_DATAGRAM = 8192
 
 
@@ -42,7 +42,7 @@ class Operator(Protocol):
     """A source of commands."""
 
     def wanted(self, now: float, state: Record | None) -> Wanted:
-        """What is asked for at `now` [s]; `state`: the robot's newest one."""
+        """Request at `now` [s]; `state`: the robot's newest one."""
 
 
 class Ranges:
@@ -167,7 +167,7 @@ class Udp:
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
         self.refused = ""
-        """What is wrong with the last datagram that could not be read."""
+        """Fault of the last datagram that could not be read."""
         self._wanted = Wanted(ranges.standing, -np.inf)
 
     def wanted(self, now: float, state: Record | None) -> Wanted:

@@ -35,7 +35,7 @@ class Clock(Protocol):
     """When the turns of the loop take place."""
 
     late: float
-    """How late the last turn began [s]."""
+    """Delay of the beginning of the last turn [s]."""
 
     def turn(self, bus: Bus) -> tuple[float, tuple[Record, ...]]:
         """Waits for the next turn; its time [s], and the states that have arrived."""
@@ -76,12 +76,12 @@ class LockStep:
 
 @dataclass(frozen=True)
 class Times:
-    """How regular the loop was."""
+    """Regularity of the loop."""
 
     late: np.ndarray
-    """How late each turn began [s]."""
+    """Delay of the beginning of each turn [s]."""
     busy: np.ndarray
-    """How long each turn took [s]."""
+    """Duration of each turn [s]."""
 
     def __str__(self) -> str:
         if not len(self.late):
@@ -95,7 +95,7 @@ class Times:
 
 
 def listen(bus: Bus, seconds: float) -> Listened:
-    """What the bus carries for some time [s], from the first state on."""
+    """Messages on the bus for some time [s], from the first state on."""
     states: list[Record] = []
     battery: Record | None = None
     others = 0

@@ -12,7 +12,7 @@ from iowbc.onboard.machine import Machine
 
 @dataclass(frozen=True)
 class Replayed:
-    """How a replay ended."""
+    """Result of a replay."""
 
     turns: int
     different: int
@@ -21,7 +21,7 @@ class Replayed:
 
 
 def export_digest(controller: Controller) -> str:
-    """What names the exported programs in a log: the digests of their files."""
+    """Names of the exported programs in a log: the digests of their files."""
     return ",".join(f"{name}:{value}" for name, value in sorted(controller.contract.files.items()))
 
 

@@ -63,7 +63,7 @@ class Sensors:
         self.at = -np.inf
         """When the newest state arrived [s]."""
         self.late = 0.0
-        """How much later than usual it arrived, by the robot's clock [s]."""
+        """Excess of its delay over the usual one, by the robot's clock [s]."""
         self.refused = 0
         """States that were repeated, or older than one before."""
         self._least, self._least_at = np.inf, 0.0
@@ -86,7 +86,7 @@ class Sensors:
             self._least_at, self.late = now, offset - self._least
 
     def _repeated(self, state: Record) -> bool:
-        """Whether a state is no newer than the last, or has its very values: sensors have noise."""
+        """True for a state that is no newer than the last, or has its very values: sensors have noise."""
         last = self.state
         if last is None:
             return False

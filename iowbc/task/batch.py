@@ -10,11 +10,11 @@ from iowbc.arrays import Array, Indices, as_slice
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
+from iowbc.control.sensors import Measured
 from iowbc.robot.description import load_robot
 from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, roll
 from iowbc.sim.simulation import Simulation
-from iowbc.sim.state import MeasuredState
 from iowbc.task.endings import Ending
 from iowbc.task.episodes import Episode
 from iowbc.task.guidance import Guidance
@@ -103,9 +103,9 @@ class Batch:
         return self.memory.command
 
     @property
-    def measured(self) -> MeasuredState:
-        """What the sensors delivered last."""
-        return self.simulation.measured
+    def measured(self) -> Measured:
+        """The measurements delivered last."""
+        return self.observer.measured
 
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]."""
@@ -149,7 +149,7 @@ class Batch:
         )
         self.record(judgement, action)
         memory.earlier_action[:], memory.action[:] = memory.action, action
-        self.guidance.advance(memory, self._schedule.episode_key, self.observer.measured)
+        self.guidance.advance(memory, self._schedule.episode_key, self.measured)
         self.finish(judgement)
 
     def record(self, judgement: Judgement, action: Array) -> None:

@@ -1,4 +1,4 @@
-"""How Drake integrates the trials that it plays."""
+"""Integration of trials by Drake."""
 
 from typing import Literal
 
@@ -8,7 +8,7 @@ from iowbc.recipe.section import Section
 
 
 class Drake(Section):
-    """How Drake integrates; masses, gains, friction and all that is drawn are those of `simulation`."""
+    """Integration by Drake; masses, gains, friction and all that is drawn are those of `simulation`."""
 
     timestep: float = Field(default=0.004, gt=0.0, le=0.02)
     """Physics step [s]; a whole number of them makes a control period. Trials at 2 ms end alike."""
