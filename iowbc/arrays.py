@@ -2,7 +2,7 @@
 
 import copy
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -32,6 +32,11 @@ def namespace(array: Any) -> Any:
     Both know `concatenate`, `stack`, `where`, `swapaxes` and the elementwise functions by these names.
     """
     return np if isinstance(array, np.ndarray | np.generic) else sys.modules["torch"]
+
+
+def stacked(parts: Sequence[Any]) -> Any:
+    """Arrays or tensors of one shape along a new first axis; of few rows, NumPy's own `stack` takes twice the time."""
+    return np.array(parts) if isinstance(parts[0], np.ndarray) else sys.modules["torch"].stack(parts)
 
 
 class Constants:

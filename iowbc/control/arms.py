@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants, namespace
+from iowbc.arrays import Array, Constants, namespace, stacked
 from iowbc.control.chain import Chain, Frame, jacobian, rotated, rotated_back, turned
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
@@ -132,8 +132,8 @@ def _solved(columns: Array, damping: Array, wanted: Array) -> Array:
     first, second, third = yy * zz - yz * yz, yz * zx - xy * zz, xy * yz - yy * zx
     a, b, c = wanted
     middle, corner, last = zz * xx - zx * zx, xy * zx - yz * xx, xx * yy - xy * xy
-    solved: Array = namespace(wanted).stack(
-        [first * a + second * b + third * c, second * a + middle * b + corner * c, third * a + corner * b + last * c], 0
+    solved: Array = stacked(
+        [first * a + second * b + third * c, second * a + middle * b + corner * c, third * a + corner * b + last * c]
     )
     inverse: Array = solved / (xx * first + xy * second + zx * third)
     return inverse

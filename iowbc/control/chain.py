@@ -21,7 +21,7 @@ from typing import Self
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants, namespace
+from iowbc.arrays import Array, Constants, namespace, stacked
 from iowbc.robot import rotations
 from iowbc.robot.mjcf import Body
 
@@ -54,15 +54,13 @@ def rotated(rotation: Rotation, vector: Array) -> Array:
 
 def rotated_back(rotation: Rotation, vector: Array) -> Array:
     """Rᵀ v, shapes as in `rotated`."""
-    turned: Array = namespace(vector).stack([(column * vector).sum(0) for column in rotation], 0)
+    turned: Array = stacked([(column * vector).sum(0) for column in rotation])
     return turned
 
 
 def crossed(a: Array, b: Array) -> Array:
     """a × b of vectors (3, ...)."""
-    product: Array = namespace(b).stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], 0
-    )
+    product: Array = stacked([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
     return product
 
 
@@ -92,9 +90,9 @@ def entries(vectors: Array) -> Entries:
 
 def jacobian(frames: Sequence[Frame], point: Array) -> Array:
     """Motion of points (3, chains, n) [m] with each hinge, a_j × (p - o_j), (3, hinges, chains, n)."""
+    axes, origins = stacked([frame.axis for frame in frames]), stacked([frame.origin for frame in frames])
     xp = namespace(point)
-    axes, origins = (xp.stack([getattr(frame, name) for frame in frames], 1) for name in ("axis", "origin"))
-    return crossed(axes, point[:, None] - origins)
+    return crossed(xp.swapaxes(axes, 0, 1), point[:, None] - xp.swapaxes(origins, 0, 1))
 
 
 class Chain(Constants):
