@@ -45,7 +45,8 @@ class Grip:
         most = 2.0 * self._grasp.torsion * slip_force * holding
         reach = most / np.maximum(stiffness, TINY)
         self.angle.clip(-reach, reach, out=self.angle)
-        damping = np.minimum(self._grasp.swing_damping * inertia, stable)
+        lag = 0.5 * self._period * stiffness  # a held torque lags half a period and would drive what it should damp
+        damping = np.minimum(self._grasp.swing_damping * inertia + lag, stable)
         size = (stiffness * self.angle + damping * rate).clip(-most, most)
         torque: Array = axis * -size[:, None]
         return torque

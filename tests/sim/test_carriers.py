@@ -79,6 +79,21 @@ def test_palms_damp_what_turns_against_them_and_not_what_turns_with_them(start, 
     assert abs(against) < 2.0 * 0.02 * 140.0, "below the torque at which the palms slip"
 
 
+@pytest.mark.parametrize("mass", [0.05, 0.2, 1.0])
+def test_a_light_object_comes_to_rest_between_the_palms(start, by_hands, hold_base, mass):
+    hold_base()
+    simulation = start(by_hands, ["lift"], object_mass=mass)
+    run(simulation, 50)
+    grip = simulation.world_of(0)[0]._grip
+    grip.angle[:] += 0.05
+    turning = []
+    for _ in range(200):
+        run(simulation, 1)
+        turning.append(abs(grip.rate[0]))
+    assert max(turning[:50]) > 0.05, "it was turned"
+    assert max(turning[-50:]) < 0.05 * max(turning[:50])
+
+
 def test_palms_slip_at_their_torque_and_not_below(start, by_hands, hold_base, monkeypatch):
     hold_base()
     simulation = start(by_hands, ["lift"], object_mass=4.0, surface_friction=1.0)

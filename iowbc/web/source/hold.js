@@ -74,7 +74,8 @@ export class Hold {
     const most = settings.torsion * settings.slip_force * (this.connected[0] + this.connected[1]);
     const reach = most / Math.max(stiffness, TINY);
     this.angle = v.clip(this.angle, -reach, reach);
-    const damping = Math.min(settings.swing_damping * inertia, stable);
+    const lag = 0.5 * scene.period * stiffness;
+    const damping = Math.min(settings.swing_damping * inertia + lag, stable);
     const torque = v.scale(axis, -v.clip(stiffness * this.angle + damping * rate, -most, most));
     const add = (body, moment) => moment.forEach((value, i) => (data.xfrc_applied[6 * body + 3 + i] += value));
     add(object, torque);
