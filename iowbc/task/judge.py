@@ -103,6 +103,7 @@ class Judge:
             earlier_action=memory.earlier_action,
             swing_profile=gait.swing_height(foot_phase, self._task.references.gait),
             stepping=memory.stepping,
+            commanded=gait.wants_to_move(memory.command, self._task.references.gait),
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),
             pushed=state.has_object & ~self._holding,

@@ -140,6 +140,11 @@ def test_contact_timing_counts_from_minus_one_to_one() -> None:
     assert gait.contact_timing(contact, expected).tolist() == [1.0, 0.0, -1.0]
 
 
+def test_steps_count_against_the_robot_where_no_velocity_is_commanded() -> None:
+    clock = SimpleNamespace(stepping=np.array([True, True, False]), commanded=np.array([True, False, False]))
+    assert TERMS["gait.recovery"](clock).tolist() == [False, True, False]
+
+
 def test_a_foot_on_its_swing_profile_scores_one_and_a_standing_foot_nothing() -> None:
     height, profile = np.array([[0.08, 0.0]]), np.array([[0.08, 0.0]])
     one, none = np.array([[True, False]]), np.array([[False, False]])

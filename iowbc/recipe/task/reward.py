@@ -106,7 +106,10 @@ class GaitConstraint(Section):
     touchdown_height: float = Field(default=0.02, gt=0.0, json_schema_extra=LATER)
     """Height of a sole at which `touchdown` counts 37 % [m]."""
     standing: float = -1.0
-    """Weight of the number of feet off the ground while the command is to stand."""
+    """Weight of the number of feet off the ground while the clock rests."""
+    recovery: float = Field(default=0.0, json_schema_extra=LATER)
+    """Weight of steps while no velocity is commanded. Without a cost the terms of the swinging foot, 1 a second, pay
+    for stepping in place, and a robot with `references.gait.recovery` never stands still."""
     foot_distance: float = -5.0
     """Weight of the squared lack of lateral distance between the feet [m²]."""
     smallest_foot_distance: float = Field(default=0.16, ge=0.0)

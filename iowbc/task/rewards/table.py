@@ -54,6 +54,8 @@ class Step:
     """Height at which the gait prior has the soles, (n, 2) [m]."""
     stepping: Mask
     """Whether the gait clock runs, (n,)."""
+    commanded: Mask
+    """Whether a velocity is commanded, (n,)."""
     stance: Mask
     """Feet that should be on the ground, (n, 2)."""
     held: Mask
@@ -111,6 +113,7 @@ TERMS: dict[str, Term] = {
         s.state.foot_position[:, :, 2], s.state.foot_velocity[:, :, 2], s.recipe.gait.touchdown_height
     ),
     "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
+    "gait.recovery": lambda s: s.stepping & ~s.commanded,
     "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
     "yielding.force": lambda s: s.unyielded_force,
     "alive": lambda s: np.ones(len(s.command)),
