@@ -224,7 +224,7 @@ def test_a_term_without_weight_is_not_computed_unless_it_says_how_well_the_robot
     )
     RewardFunction(recipe, 0.02, terms)(SimpleNamespace(command=np.zeros((1, 11))), np.array([False]), np.ones(1))  # type: ignore[arg-type]
     idle = {"alive", "sync.support_reference", "sync.lateral_reference", "object.beside", "yielding.force"}
-    idle |= {"smooth.action_curvature", "smooth.effort", "gait.touchdown"}
+    idle |= {"smooth.action_curvature", "smooth.effort", "gait.touchdown", "gait.recovery"}
     assert set(TERMS) - set(called) == idle
 
 
