@@ -149,12 +149,13 @@ def headline(games: pd.DataFrame) -> dict[str, float]:
 
 def figure(games: pd.DataFrame) -> Figure:
     """Force and success by partner, in games of both kinds."""
-    labels, partners = list(dict.fromkeys(games["label"])), list(dict.fromkeys(games["partner"]))
+    labels = list(dict.fromkeys(games["label"]))
     kinds = [known for known in (True, False) if known in set(games["known"])]
     drawing = Figure(figsize=(11.0, 3.2 * len(kinds)), layout="constrained")
     grid = drawing.subplots(len(kinds), 2, squeeze=False)
     width = 0.8 / len(labels)
     for axes, known in zip(grid, kinds, strict=True):
+        partners = list(dict.fromkeys(games[games["known"] == known]["partner"]))
         for panel, (name, title) in zip(
             axes, ((FORCE, "partner force p90 [N]"), (SUCCESS, "success [share]")), strict=True
         ):
@@ -176,5 +177,6 @@ def figure(games: pd.DataFrame) -> Figure:
                 f"{title}, {'both know the goal' if known else 'only the human knows the goal'}", fontsize=9
             )
             panel.grid(alpha=0.3, axis="y")
-    grid[0][0].legend(fontsize=8)
+    handles, names = grid[0][0].get_legend_handles_labels()
+    drawing.legend(handles, names, fontsize=8, ncols=len(names), loc="outside lower center", frameon=False)
     return drawing
