@@ -39,7 +39,7 @@ Planned = Mapping[str, Sequence[PlannedStage]]
 
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a study a table of what would run of each recipe."""
-    asked = [prepared(one, request, registry)[0] for one in recipes(request)]
+    asked = [prepared(one, request, registry) for one in recipes(request)]
     each = [one for planner in asked for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
     for one in each:  # a recipe may be asked for, and be what another one begins from

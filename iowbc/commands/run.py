@@ -50,12 +50,12 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
         ):
             if cluster is not None and manner != "quiet":
                 console.print(cluster.text, highlight=False)
-            for planner, robot in ready:
+            for planner in ready:
                 order = in_order(planner)
                 for one in order:
                     if (len(ready) > 1 or len(order) > 1) and manner != "quiet":
                         console.print(f"{one.loaded.recipe.name}:", highlight=False)
-                    ending = run_recipe(one, robot, request, console, stop, manner, cluster=cluster)
+                    ending = run_recipe(one, request, console, stop, manner, cluster=cluster)
                     if ending.code != DONE:
                         return ending.code
     except KeyboardInterrupt:
@@ -105,7 +105,6 @@ def engine(options: Options, execution: Execution) -> "Iterator[Cluster | None]"
 
 def run_recipe(
     planner: Planner,
-    robot: Path,
     request: Request,
     console: Console,
     stop: StopRequest,
@@ -131,7 +130,6 @@ def run_recipe(
             display = _display(loaded, console, lambda: stop.text, manner)
             runner = Runner(
                 planner,
-                robot,
                 display,
                 tracker,
                 stop,

@@ -66,7 +66,6 @@ class ReadyPoint:
 
     point: Point
     planner: Planner
-    robot: Path
     request: Request
 
 
@@ -79,7 +78,7 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
     points = []
     for point in found.points:
         request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
-        points.append(ReadyPoint(point, *prepared(point.loaded, request, registry), request))
+        points.append(ReadyPoint(point, prepared(point.loaded, request, registry), request))
     return found, points
 
 
@@ -184,7 +183,6 @@ def _task(
     def run(console: Console) -> RunEnding:
         return run_recipe(
             one.planner,
-            one.robot,
             one.request,
             console,
             stop,

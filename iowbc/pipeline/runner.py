@@ -4,7 +4,6 @@ import contextlib
 import time
 import traceback
 from collections.abc import Callable
-from pathlib import Path
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
@@ -38,7 +37,6 @@ class Runner:
     def __init__(
         self,
         planner: Planner,
-        robot: Path,
         display: Display,
         tracker: Tracker | None,
         interrupted: Callable[[], bool],
@@ -56,7 +54,6 @@ class Runner:
         self.loaded = planner.loaded
         self.store = planner.store
         self.options = planner.options
-        self.robot = robot
         self.display = display
         self.tracker = tracker
         self.interrupted = interrupted
@@ -187,7 +184,7 @@ class Runner:
         job = Job(
             recipe=self.loaded.recipe,
             key=key,
-            robot=self.robot,
+            robot=self.planner.robot,
             inputs={name: artifact.folder for name, artifact in self._inputs(stage).items()},
             out=workspace.out,
             work=workspace.scratch,

@@ -1,7 +1,6 @@
 """Folders of everything that runs leave behind."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,94 +8,39 @@ from iowbc.errors import RecipeError
 from iowbc.recipe.reading.document import plain, read_document
 
 
-@dataclass(frozen=True)
 class Runs:
     """The folder `runs/` and its parts."""
 
-    root: Path
-
-    @property
-    def store(self) -> Path:
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.store = root / "store"
         """Finished artifacts, `<stage>/<key>/`."""
-        return self.root / "store"
-
-    @property
-    def published(self) -> Path:
+        self.published = root / "published"
         """Artifacts that came with the repository, `<stage>/<key>/`; only `iowbc publish` writes there."""
-        return self.root / "published"
-
-    @property
-    def work(self) -> Path:
+        self.work = root / "work"
         """Scratch and checkpoints of stages that are not finished, `<key>/`."""
-        return self.root / "work"
-
-    @property
-    def damaged(self) -> Path:
+        self.damaged = root / "damaged"
         """Artifacts that were found damaged and set aside."""
-        return self.root / "damaged"
-
-    @property
-    def locks(self) -> Path:
+        self.locks = root / "locks"
         """One lock file a key, with its holder's name in it."""
-        return self.root / "locks"
-
-    @property
-    def recipes(self) -> Path:
+        self.recipes = root / "recipes"
         """Artifacts that each recipe used last, `<name>.json`."""
-        return self.root / "recipes"
-
-    @property
-    def tracking(self) -> Path:
+        self.tracking = root / "tracking"
         """Journals of what MLflow is told, until it has taken it."""
-        return self.root / "tracking"
-
-    @property
-    def parts(self) -> tuple[Path, ...]:
-        """All of these folders."""
-        return (
-            self.store,
-            self.published,
-            self.work,
-            self.damaged,
-            self.locks,
-            self.recipes,
-            self.tracking,
-            self.tracked_files,
-            self.compared,
-            self.reports,
-            self.sweeps,
-            self.npm,
-        )
-
-    @property
-    def sweeps(self) -> Path:
+        self.sweeps = root / "sweeps"
         """Points and results of each sweep, `<name>/`."""
-        return self.root / "sweeps"
-
-    @property
-    def compared(self) -> Path:
+        self.compared = root / "compare"
         """Tables, figures and films over several runs; those of a study in `<name>/`."""
-        return self.root / "compare"
-
-    @property
-    def reports(self) -> Path:
+        self.reports = root / "report"
         """HTML pages about runs."""
-        return self.root / "report"
-
-    @property
-    def npm(self) -> Path:
+        self.npm = root / "npm"
         """Packages that npm fetched for web pages, a folder for each set of versions."""
-        return self.root / "npm"
-
-    @property
-    def database(self) -> Path:
-        """MLflow's embedded database."""
-        return self.root / "mlflow.db"
-
-    @property
-    def tracked_files(self) -> Path:
+        self.tracked_files = root / "mlartifacts"
         """Files of MLflow's runs, where it uses the embedded database."""
-        return self.root / "mlartifacts"
+        self.parts = tuple(path for path in vars(self).values() if path != root)
+        """All of these folders."""
+        self.database = root / "mlflow.db"
+        """MLflow's embedded database."""
 
 
 def read_json(path: Path) -> Any:
