@@ -145,7 +145,6 @@ def _cell(stage: PlannedStage) -> Text:
 
 
 def _print(steps: Sequence[StagePlan], console: Console) -> None:
-    """The plan of each stage, the reasons below it, and the time in all."""
     widest = max((len(step.stage.name) for step in steps), default=0)
     for step in steps:
         console.print(Text.assemble((step.stage.name.ljust(widest + 2), "bold"), _described(step)))
@@ -165,7 +164,6 @@ def _print(steps: Sequence[StagePlan], console: Console) -> None:
 
 
 def _described(step: StagePlan) -> Text:
-    """Its key where it is cached, else the time that it takes."""
     if step.cached:
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if step.published else "cached", "cyan"), (key, "dim"))

@@ -112,7 +112,6 @@ def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Cons
 
 
 def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
-    """A planned point for other programs."""
     stages = [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
@@ -211,7 +210,6 @@ def _conclude(
     record: SweepRecord | None,
     quiet: bool,
 ) -> None:
-    """Write and print the results of the finished points."""
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
 
     codes = {name: None if ending is None else ending.code for name, ending in endings.items()}

@@ -7,9 +7,8 @@ from typing import Any
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
-from iowbc.pipeline.estimate import estimate
+from iowbc.pipeline.estimate import estimated
 from iowbc.pipeline.ingredients import key_values, slice_value
-from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Borrowed, Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
@@ -90,7 +89,6 @@ class Planner:
         return found[0]
 
     def reads(self, stage: Stage) -> tuple[str, ...]:
-        """Names of the stages whose artifacts a stage reads."""
         return stage.reads(self.loaded.recipe)
 
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
@@ -109,8 +107,7 @@ class Planner:
         former = self._closest(stage.name, ingredients)
         step = StagePlan(stage, code=stage_code(stage))
         if former is not None:
-            found = estimate(stage, ingredients, self.store.artifacts(stage.name), former)
-            step = replace(step, **vars(found), rate_of=_origin_of(former))
+            step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
         if unknown:
             return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
         step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients))
@@ -322,12 +319,6 @@ def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) 
     except Damaged as error:
         return None, str(error)
     return artifact, ""
-
-
-def _origin_of(former: Artifact) -> str:
-    """Whose rate a guess is made at: the recipe of an artifact, and the machine where that is another one."""
-    made = former.manifest
-    return made.recipe if made.host == host() else f"{made.recipe} on another machine"
 
 
 def _shown(value: Any) -> str:

@@ -29,17 +29,14 @@ class StageReport:
         self._display.moved(self._view)
 
     def progress(self, done: float, total: float, note: str = "") -> None:
-        """Say how far the stage is, in units of its own."""
         self._view.progress(done, total, note)
         self._workspace.progress(done, total, note)
         self._display.moved(self._view)
 
     def files(self, path: Path) -> None:
-        """Let tracking have a file or folder of the stage while it runs; it may be told again."""
         if self._tracker is not None:
             self._tracker.files(self._view.name, path)
 
     def say(self, text: str) -> None:
-        """Print one line, with the stage's name before it."""
         prefix = f"{self._view.name}: "
         self._display.say(prefix + text.removeprefix(prefix))

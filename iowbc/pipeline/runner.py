@@ -15,7 +15,7 @@ from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan
-from iowbc.pipeline.store.artifact import Artifact, seal
+from iowbc.pipeline.store.artifact import Artifact, read_artifact, seal
 from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
@@ -41,11 +41,11 @@ class Runner:
         tracker: Tracker | None,
         interrupted: Callable[[], bool],
         *,
-        command: Callable[[list[str]], str] = lambda made: "",
+        command: Callable[[], str] = lambda: "",
         execute: Execute = run_here,
         workers: int | None = None,
     ) -> None:
-        """`command`: what goes on with this run once the stages named were made; kept with a stage while it is made.
+        """`command`: what goes on with this run after the stages in `made`; kept with a stage while it is made.
 
         `execute`: carries a stage out, with the same result wherever. `workers`: processes of a stage, else the
         planner's.
@@ -137,7 +137,6 @@ class Runner:
         return self.planner.decide(stage, self._inputs(stage), whole=whole)
 
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
-        """Artifacts that a stage reads, by name."""
         read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
         for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
@@ -157,18 +156,18 @@ class Runner:
     def _finish_adding(self, stage: Stage, key: str, workspace: Workspace) -> None:
         """Take output into the store that was sealed when its process died on the threshold."""
         try:
-            if workspace.out.is_dir() and self.store.sealed(workspace.out, stage.name, key):
+            if workspace.out.is_dir():
+                read_artifact(workspace.out, stage.name, key).verify()
                 self.store.add(workspace.out, stage.name, key)
                 workspace.remove()
         except Damaged:
             return
 
     def _made(self, step: StagePlan, workspace: Workspace, view: StageView) -> Artifact:
-        """Run the stage and publish what it leaves."""
         stage, key = step.stage, step.key
         assert key is not None
         earlier = workspace.record.get("code", step.code)
-        command = self.command(self.made)
+        command = self.command()
         resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code), command)
         workspace.describe(step.ingredients or {}, as_yaml(self.loaded.recipe))
         view.metric, view.curve = workspace.curve
@@ -222,7 +221,6 @@ class Runner:
         return artifact
 
     def _published(self, step: StagePlan, workspace: Workspace) -> Artifact:
-        """Seal what the stage left and move it into the store."""
         assert step.key is not None
         details = {
             "stage": step.stage.name,

@@ -43,17 +43,19 @@ class Runs:
         """MLflow's embedded database."""
 
 
-def read_json(path: Path) -> Any:
-    """The content of a JSON file, or None where it is missing, no regular file, or not JSON."""
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file; empty where it is missing, no regular file, not JSON, or holds something else."""
     try:
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     except (OSError, ValueError, RecursionError):
-        return None
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
-def read_yaml(path: Path) -> Any:
-    """The content of a YAML file as `read_json` has it, None also where it is nested too deep for YAML's parser."""
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping in a YAML file as `read_json` has it; empty also where it is nested too deep for YAML's parser."""
     try:
-        return plain(read_document(path.read_text(encoding="utf-8"), path.name)) if path.is_file() else None
+        found = plain(read_document(path.read_text(encoding="utf-8"), path.name)) if path.is_file() else {}
     except (OSError, ValueError, RecipeError):
-        return None
+        return {}
+    return found if isinstance(found, dict) else {}
