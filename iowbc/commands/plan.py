@@ -78,7 +78,7 @@ def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
         "stage": stage.name,
         "recipe": key_values(planner.loaded.recipe, planner.deciding, stage),
         "robot": planner.robot_digest,
-        "inputs": {name: before[name] for name in planner.reads(stage)},
+        "inputs": {name: before[name] for name in stage.reads(planner.loaded.recipe)},
         "borrowed": {name: one.named for name, one in stage.borrows(planner.loaded.recipe).items()},
     }
     return data_digest(ingredients)

@@ -112,13 +112,13 @@ def run_recipe(
     within: str | None = None,
     cluster: "Cluster | None" = None,
     errors: Console | None = None,
-    workers: int | None = None,
+    workers: int = 0,
 ) -> RunEnding:
     """Run one recipe.
 
     within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
     where it is said how a run that did not finish goes on; standard error if empty. workers: processes of a stage, as
-    asked for if empty.
+    asked for if 0.
     """
     loaded = planner.loaded
     tracker: Tracker | None = None
@@ -140,7 +140,7 @@ def run_recipe(
                 stop,
                 command=rest,
                 execute=run_here if cluster is None else cluster.run,
-                workers=workers or planner.workers,
+                workers=workers,
             )
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE)

@@ -4,6 +4,7 @@ import contextlib
 import time
 import traceback
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
@@ -31,39 +32,28 @@ def run_here(stage: Stage, job: Job) -> None:
     stage.run(job)
 
 
+@dataclass(eq=False)
 class Runner:
     """One run of a recipe."""
 
-    def __init__(
-        self,
-        planner: Planner,
-        display: Display,
-        tracker: Tracker | None,
-        interrupted: Callable[[], bool],
-        *,
-        command: Callable[[], str] = lambda: "",
-        execute: Execute = run_here,
-        workers: int | None = None,
-    ) -> None:
-        """`command`: what goes on with this run after the stages in `made`; kept with a stage while it is made.
+    planner: Planner
+    display: Display
+    tracker: Tracker | None
+    interrupted: Callable[[], bool]
+    command: Callable[[], str] = lambda: ""
+    """What goes on with this run after the stages in `made`; kept with a stage while it is made."""
+    execute: Execute = run_here
+    """Carries a stage out, with the same result wherever."""
+    workers: int = 0
+    """Processes of a stage; 0 for the planner's."""
+    artifacts: dict[str, Artifact] = field(default_factory=dict)
+    made: list[str] = field(default_factory=list)
+    """Stages that were not cached."""
 
-        `execute`: carries a stage out, with the same result wherever. `workers`: processes of a stage, else the
-        planner's.
-        """
-        self.planner = planner
-        self.loaded = planner.loaded
-        self.store = planner.store
-        self.options = planner.options
-        self.display = display
-        self.tracker = tracker
-        self.interrupted = interrupted
-        self.command = command
-        self.execute = execute
-        self.workers = workers or planner.workers
-        self.views = {stage.name: StageView(stage.name) for stage in planner.stages}
-        self.artifacts: dict[str, Artifact] = {}
-        self.made: list[str] = []
-        """Stages that were not cached."""
+    def __post_init__(self) -> None:
+        self.loaded, self.store, self.options = self.planner.loaded, self.planner.store, self.planner.options
+        self.workers = self.workers or self.planner.workers
+        self.views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
 
     def run(self) -> dict[str, Artifact]:
         """Bring every stage's artifact about. Raises `PipelineFailed` or `Interrupted`."""
@@ -100,14 +90,13 @@ class Runner:
             self._clear(step.artifact)
             return self._reused(step, step.artifact, view)
         for read in self.planner.stages:
-            if read.name in self.planner.reads(stage) and not self.artifacts[read.name].whole:
+            if read.name in stage.reads(self.loaded.recipe) and not self.artifacts[read.name].whole:
                 self.artifacts[read.name] = self._artifact(read, whole=True)
                 step = self._decide(stage, whole)
         assert step.key is not None
 
         def waits(holder: object) -> None:
-            view.state, view.note = "waits", f"{holder} is making it"
-            self.display.changed(view)
+            self._show(view, "waits", f"{holder} is making it")
             self.display.say(f"{stage.name}: busy, held by {holder}; waiting for it, to use what it makes")
 
         with key_lock(self.store.runs, step.key, waits, self.interrupted) as held:
@@ -137,7 +126,7 @@ class Runner:
         return self.planner.decide(stage, self._inputs(stage), whole=whole)
 
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
-        read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
+        read = {name: self.artifacts[name] for name in stage.reads(self.loaded.recipe)}
         for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
                 origin = self.planner.origins[stage.name, name].loaded.file
@@ -147,8 +136,7 @@ class Runner:
 
     def _reused(self, step: StagePlan, artifact: Artifact, view: StageView) -> Artifact:
         notes = ("published", *step.notes) if artifact.published else step.notes
-        view.state, view.note = "cached", "; ".join(notes)
-        self.display.changed(view)
+        self._show(view, "cached", "; ".join(notes))
         if self.tracker is not None:
             self.tracker.finished(step.stage.name, artifact, cached=True)
         return artifact
@@ -172,8 +160,7 @@ class Runner:
         workspace.describe(step.ingredients or {}, as_yaml(self.loaded.recipe))
         view.metric, view.curve = workspace.curve
         view.began = time.monotonic() - workspace.seconds
-        view.state, view.note = "runs", short(step.notes or step.reasons, 1)
-        self.display.changed(view)
+        self._show(view, "runs", short(step.notes or step.reasons, 1))
         view.note = ""
         changed = changed_code(earlier, step.code)
         if resumed and changed:
@@ -214,8 +201,8 @@ class Runner:
             self.display.say(traceback.format_exc())
             raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is also in {details}") from error
         self.made.append(stage.name)
-        view.state, view.note, view.seconds = "done", "", artifact.manifest.seconds
-        self.display.changed(view)
+        view.seconds = artifact.manifest.seconds
+        self._show(view, "done")
         if self.tracker is not None:
             self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
@@ -239,11 +226,15 @@ class Runner:
         workspace.remove()
         return artifact
 
+    def _show(self, view: StageView, state: str, note: str = "") -> None:
+        view.state, view.note = state, note
+        self.display.changed(view)
+
     def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
         with contextlib.suppress(OSError):  # a full disk must not hide why the stage ended
             workspace.write()
-        view.state, view.note, view.seconds = state, "", workspace.seconds
-        self.display.changed(view)
+        view.seconds = workspace.seconds
+        self._show(view, state)
         if self.tracker is not None:
             with contextlib.suppress(OSError):
                 self.tracker.end(view.name, status, message)
