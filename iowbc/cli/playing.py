@@ -38,17 +38,16 @@ def play(
     """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
     from iowbc.commands.play import PORT, PlayRequest, play_on_web, play_word
     from iowbc.errors import UsageError
-    from iowbc.stages.registry import STAGES
 
     request = PlayRequest(
         scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
     )
     if web:
-        play_on_web(store_in(runs), console(), what, stage, request, port or PORT, STAGES)
+        play_on_web(store_in(runs), console(), what, stage, request, port or PORT)
     elif port is not None:
         raise UsageError("--port is that of the page that --web serves; give both")
     else:
-        raise typer.Exit(play_word(store_in(runs), console(), what, stage, request, STAGES))
+        raise typer.Exit(play_word(store_in(runs), console(), what, stage, request))
 
 
 def export(

@@ -137,7 +137,6 @@ def _packages() -> Iterator[Finding]:
 
 
 def _robots() -> Iterator[Finding]:
-    """Every robot that a recipe can name."""
     from iowbc.robot.description import load_robot, robot_folders
 
     folders = robot_folders()

@@ -79,7 +79,6 @@ def _print_work(store: Store, console: Console, folder: Path, record: Mapping[st
 
 
 def _data(store: Store) -> dict[str, Any]:
-    """The same for other programs."""
     working = [
         {
             "stage": record.get("stage"),

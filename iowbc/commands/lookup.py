@@ -177,8 +177,7 @@ def points_of(store: Store, words: Sequence[str]) -> list[str]:
 
 def _recorded(file: Path, key: str) -> list[str]:
     """Names in the record of a sweep or a comparison; none where the file is no such record."""
-    record = read_json(file)
-    names = record.get(key) if isinstance(record, dict) else None
+    names = read_json(file).get(key)
     return [name for name in names if isinstance(name, str)] if isinstance(names, (dict, list)) else []
 
 
@@ -227,15 +226,14 @@ def _training(store: Store, folder: Path, record: Mapping[str, Any]) -> InTraini
     total = float(record.get("total", 0.0))
     state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
     share = f", {100 * float(record.get('done', 0.0)) / total:.0f} % done" if total else ""
-    known = isinstance(recipe, dict) and isinstance(ingredients, dict)
-    playable = record["stage"] == PLAYED and checkpoint.is_file() and known
+    playable = record["stage"] == PLAYED and checkpoint.is_file() and bool(recipe and ingredients)
     then = f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else ""
     return InTraining(
         stage=str(record["stage"]),
         key=folder.name,
         text=f"{record['stage']} of {record['recipe']} {state}{share}{then}",
         checkpoint=checkpoint,
-        ingredients=ingredients if isinstance(ingredients, dict) else {},
+        ingredients=ingredients,
         recipe=recipe if playable else None,
     )
 

@@ -41,7 +41,6 @@ def require_free(port: int) -> None:
 
 
 def _free(port: int) -> bool:
-    """True where a server may listen on a port of this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

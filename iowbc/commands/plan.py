@@ -39,7 +39,7 @@ Planned = Mapping[str, Sequence[PlannedStage]]
 
 def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a study a table of what would run of each recipe."""
-    asked = [prepared(one, request, registry)[0] for one in recipes(request)]
+    asked = [prepared(one, request, registry) for one in recipes(request)]
     each = [one for planner in asked for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
     for one in each:  # a recipe may be asked for, and be what another one begins from
@@ -78,7 +78,7 @@ def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
         "stage": stage.name,
         "recipe": key_values(planner.loaded.recipe, planner.deciding, stage),
         "robot": planner.robot_digest,
-        "inputs": {name: before[name] for name in planner.reads(stage)},
+        "inputs": {name: before[name] for name in stage.reads(planner.loaded.recipe)},
         "borrowed": {name: one.named for name, one in stage.borrows(planner.loaded.recipe).items()},
     }
     return data_digest(ingredients)
@@ -145,7 +145,6 @@ def _cell(stage: PlannedStage) -> Text:
 
 
 def _print(steps: Sequence[StagePlan], console: Console) -> None:
-    """The plan of each stage, the reasons below it, and the time in all."""
     widest = max((len(step.stage.name) for step in steps), default=0)
     for step in steps:
         console.print(Text.assemble((step.stage.name.ljust(widest + 2), "bold"), _described(step)))
@@ -165,7 +164,6 @@ def _print(steps: Sequence[StagePlan], console: Console) -> None:
 
 
 def _described(step: StagePlan) -> Text:
-    """Its key where it is cached, else the time that it takes."""
     if step.cached:
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if step.published else "cached", "cyan"), (key, "dim"))

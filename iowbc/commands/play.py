@@ -27,7 +27,6 @@ from iowbc.commands.results import evaluated_actor
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
 from iowbc.evaluation.play_request import PlayRequest as PlayRequest
-from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall, require_whole
@@ -35,25 +34,21 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.finding import SUFFIXES
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
+from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
 
 PORT = 8080
 """Port of the page where no other is asked for."""
-Registry = Mapping[str, Stage]
-"""The stages that there are, by name."""
-NO_STAGES: Registry = MappingProxyType({})
 NOTHING: Mapping[str, Artifact] = MappingProxyType({})
 
 
-def play_word(
-    store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, registry: Registry = NO_STAGES
-) -> int:
+def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
     """Play an episode of what a word names. Returns the exit code."""
     require_training("play")
     close_on_termination()
-    source = named_source(store, console, word, stage, request.scene, registry)
+    source = named_source(store, console, word, stage, request.scene)
 
     from iowbc.evaluation.play import play
 
@@ -68,15 +63,7 @@ def play_word(
     return 0
 
 
-def play_on_web(
-    store: Store,
-    console: Console,
-    word: str,
-    stage: str | None,
-    request: PlayRequest,
-    port: int,
-    registry: Registry = NO_STAGES,
-) -> None:
+def play_on_web(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, port: int) -> None:
     """Serve the viewer in the browser until interrupted. Raises `UsageError` where it cannot begin."""
     if request.video is not None:
         raise UsageError("--web and --video exclude each other: open the page, or make a film")
@@ -93,7 +80,7 @@ def play_on_web(
         require_whole(store.runs, [played])
         source = _whole_source(store, played)
     else:
-        source = named_source(store, console, word, stage, registry=registry)
+        source = named_source(store, console, word, stage)
 
     from iowbc.live.page import play_on_page
     from iowbc.live.server import serving
@@ -114,14 +101,7 @@ def play_on_web(
         play_on_page(server, session, actor, ready)
 
 
-def named_source(
-    store: Store,
-    console: Console,
-    word: str,
-    stage: str | None,
-    scene: str | None = None,
-    registry: Registry = NO_STAGES,
-) -> "Source":
+def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
     """The source that a word and `--stage` name, with a line on the console while it is trained. Raises `UsageError`,
     also for a `scene` that its recipe has not.
 
@@ -138,7 +118,7 @@ def named_source(
         return _training_source(store, training)
     loaded = load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
     try:
-        artifact = playable(store, word, stage, NOTHING if loaded is None else _planned(store, loaded, registry))
+        artifact = playable(store, word, stage, NOTHING if loaded is None else _planned(store, loaded))
     except UsageError:
         if training is None:
             raise
@@ -176,10 +156,10 @@ def _whole_source(store: Store, artifact: Artifact) -> "Source":
     return _source(artifact, generator)
 
 
-def _planned(store: Store, loaded: LoadedRecipe, registry: Registry) -> dict[str, Artifact]:
+def _planned(store: Store, loaded: LoadedRecipe) -> dict[str, Artifact]:
     """By stage: the stored artifacts that a recipe's file plans to use, of those that leave a policy."""
     request = Request(str(loaded.file), (), store.runs, Options())
-    steps = prepared(loaded, request, registry)[0].plan() if registry else []
+    steps = prepared(loaded, request, STAGES).plan()
     return {step.stage.name: step.artifact for step in steps if step.cached and step.artifact is not None}
 
 

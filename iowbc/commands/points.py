@@ -107,7 +107,6 @@ class PointThread:
                 self._ending = RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
 
     def ending(self) -> RunEnding | None:
-        """Its ending; None while it runs."""
         return None if self._thread.is_alive() else self._ending
 
     def stop(self) -> None:

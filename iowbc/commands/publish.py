@@ -21,7 +21,7 @@ def publish_recipe(
     Raises `UsageError` where a stage has not run, and where no artifact has a file of such a name. Code that changed
     since an artifact was made is no obstacle, and is said.
     """
-    planners = [prepared(loaded, request, registry)[0] for loaded in recipes(request)]
+    planners = [prepared(loaded, request, registry) for loaded in recipes(request)]
     steps = [step for planner in planners for step in planner.plan()]
     missing = [step.stage.name for step in steps if not step.cached]
     if missing:

@@ -62,8 +62,8 @@ def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
     return variants or (load_recipe(request.word, request.overrides),)
 
 
-def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> tuple[Planner, Path]:
-    """The planner of a recipe and the robot's folder. Raises `RecipeError` for all that is wrong before a run."""
+def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> Planner:
+    """The planner of a recipe. Raises `RecipeError` for all that is wrong before a run."""
     from iowbc.robot.description import robot_folder
 
     try:
@@ -71,7 +71,7 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
     except FileNotFoundError as error:
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
     check_against_robot(loaded, robot)
-    return planner_for(loaded, registry, Store(request.runs), robot, request.options), robot
+    return planner_for(loaded, registry, Store(request.runs), robot, request.options)
 
 
 def in_order(planner: Planner) -> list[Planner]:

@@ -102,7 +102,6 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
 
 
 def _print_tables(artifact: Artifact, folder: Path, console: Console) -> None:
-    """Draw the main ones of an artifact's tables, and say where the others are."""
     shown = {table.name: table for table in tables_of(artifact) if table.name in DRAWN}
     for name in sorted(shown, key=DRAWN.index):
         console.print()
@@ -119,7 +118,6 @@ def split_tables(tables: Sequence[Table]) -> tuple[list[Table], list[Table]]:
 
 
 def _rank(path: Path) -> tuple[int, str]:
-    """The order in which tables are drawn."""
     return TABLES.index(path.stem) if path.stem in TABLES else len(TABLES), path.name
 
 

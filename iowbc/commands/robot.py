@@ -95,7 +95,6 @@ def robot(
 
 
 def _stop_request() -> threading.Event:
-    """Set by Ctrl+C and termination."""
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())

@@ -50,12 +50,12 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
         ):
             if cluster is not None and manner != "quiet":
                 console.print(cluster.text, highlight=False)
-            for planner, robot in ready:
+            for planner in ready:
                 order = in_order(planner)
                 for one in order:
                     if (len(ready) > 1 or len(order) > 1) and manner != "quiet":
                         console.print(f"{one.loaded.recipe.name}:", highlight=False)
-                    ending = run_recipe(one, robot, request, console, stop, manner, cluster=cluster)
+                    ending = run_recipe(one, request, console, stop, manner, cluster=cluster)
                     if ending.code != DONE:
                         return ending.code
     except KeyboardInterrupt:
@@ -105,7 +105,6 @@ def engine(options: Options, execution: Execution) -> "Iterator[Cluster | None]"
 
 def run_recipe(
     planner: Planner,
-    robot: Path,
     request: Request,
     console: Console,
     stop: StopRequest,
@@ -113,17 +112,22 @@ def run_recipe(
     within: str | None = None,
     cluster: "Cluster | None" = None,
     errors: Console | None = None,
-    workers: int | None = None,
+    workers: int = 0,
 ) -> RunEnding:
     """Run one recipe.
 
     within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
     where it is said how a run that did not finish goes on; standard error if empty. workers: processes of a stage, as
-    asked for if empty.
+    asked for if 0.
     """
     loaded = planner.loaded
     tracker: Tracker | None = None
     runner: Runner | None = None
+
+    def rest() -> str:
+        """The command that makes what is missing."""
+        return request.command([name for name in request.options.force if runner is None or name not in runner.made])
+
     status, ending, closing, delivered = "KILLED", RunEnding(INTERRUPTED), "", True
     try:
         try:
@@ -131,13 +135,12 @@ def run_recipe(
             display = _display(loaded, console, lambda: stop.text, manner)
             runner = Runner(
                 planner,
-                robot,
                 display,
                 tracker,
                 stop,
-                command=lambda made: _rest(request, made),
+                command=rest,
                 execute=run_here if cluster is None else cluster.run,
-                workers=workers or planner.workers,
+                workers=workers,
             )
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE)
@@ -145,15 +148,15 @@ def run_recipe(
                 tracker.describe(main_tables(artifact.folder for artifact in runner.artifacts.values()))
         except PipelineFailed as error:
             status, ending = "FAILED", RunEnding(STAGE_FAILED, str(error).splitlines()[0])
-            closing = f"{error}\nfinished stages are kept; after a remedy:\n{_rest(request, _made(runner))}"
+            closing = f"{error}\nfinished stages are kept; after a remedy:\n{rest()}"
         except Interrupted as error:
-            closing = "\n".join(filter(None, (str(error), _resumption(request, runner))))
+            closing = "\n".join(filter(None, (str(error), f"interrupted; to go on:\n{rest()}")))
         finally:
             if tracker is not None:
-                wait = within is None and bool(_made(runner)) and not stop()
+                wait = within is None and runner is not None and bool(runner.made) and not stop()
                 delivered = tracker.close(status, wait=wait) or not wait
     except KeyboardInterrupt:
-        ending, closing = RunEnding(INTERRUPTED), _resumption(request, runner)
+        ending, closing = RunEnding(INTERRUPTED), f"interrupted; to go on:\n{rest()}"
     if ending.code == DONE and runner is not None and manner != "quiet":
         print_results(request.runs, loaded.recipe.name, runner.artifacts, console)
     if tracker is not None and not delivered and backlog(request.runs):
@@ -162,19 +165,6 @@ def run_recipe(
         told = errors or Console(stderr=True)
         told.print(closing, markup=False, highlight=False, soft_wrap=True)
     return ending
-
-
-def _resumption(request: Request, runner: Runner | None) -> str:
-    return f"interrupted; to go on:\n{_rest(request, _made(runner))}"
-
-
-def _made(runner: Runner | None) -> list[str]:
-    return runner.made if runner is not None else []
-
-
-def _rest(request: Request, made: Sequence[str]) -> str:
-    """The command that makes what is missing."""
-    return request.command([name for name in request.options.force if name not in made])
 
 
 def _display(loaded: LoadedRecipe, console: Console, stopping: Callable[[], str], manner: Manner) -> Display:

@@ -66,7 +66,6 @@ class ReadyPoint:
 
     point: Point
     planner: Planner
-    robot: Path
     request: Request
 
 
@@ -79,7 +78,7 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
     points = []
     for point in found.points:
         request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
-        points.append(ReadyPoint(point, *prepared(point.loaded, request, registry), request))
+        points.append(ReadyPoint(point, prepared(point.loaded, request, registry), request))
     return found, points
 
 
@@ -113,7 +112,6 @@ def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Cons
 
 
 def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
-    """A planned point for other programs."""
     stages = [step_data(stage.step) | {"shared_with": stage.shared_with or None} for stage in own]
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
@@ -184,7 +182,6 @@ def _task(
     def run(console: Console) -> RunEnding:
         return run_recipe(
             one.planner,
-            one.robot,
             one.request,
             console,
             stop,
@@ -213,7 +210,6 @@ def _conclude(
     record: SweepRecord | None,
     quiet: bool,
 ) -> None:
-    """Write and print the results of the finished points."""
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
 
     codes = {name: None if ending is None else ending.code for name, ending in endings.items()}

@@ -116,7 +116,6 @@ def table(sweep: Sweep, made: Outcomes) -> Table:
 
 
 def _write_points(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], path: Path) -> None:
-    """Every metric of every point, for other programs."""
     rows = []
     for point in sweep.points:
         row: dict[str, object] = {"point": point.name, "state": states.get(point.name, "waits"), **point.settings}

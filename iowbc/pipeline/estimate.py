@@ -1,13 +1,14 @@
 """Expected time of a stage: learnt from its last runs on this machine, else guessed from what is stored."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from statistics import median
 from typing import Any
 
 from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.stage_plan import StagePlan
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.recipe.recipe import SEEDS
 
@@ -17,32 +18,22 @@ UNSEEN = (0.8, 1.25)
 """Factors by which the next run may lie beyond the fastest and the slowest of them, for other programs change times."""
 
 
-@dataclass(frozen=True)
-class TimeEstimate:
-    """The time that a stage takes [s]."""
-
-    expected: float | None = None
-    """Median of its last runs here that differ in seed and counts alone; None where there are none."""
-    roughly: float | None = None
-    """A guess where there are none: at the rate of the stored artifact that differs least, wherever it was made."""
-    spread: tuple[float, float] = UNSEEN
-    """Ends of the range in which the time will lie, as parts of `expected`."""
-
-
-def estimate(
-    stage: Stage, ingredients: Mapping[str, Any], stored: Iterable[Artifact], closest: Artifact | None
-) -> TimeEstimate:
-    """The time of a stage with these ingredients; `closest`: the stored artifact that differs least."""
-    if closest is None:
-        return TimeEstimate()
+def estimated(
+    step: StagePlan, ingredients: Mapping[str, Any], stored: Iterable[Artifact], closest: Artifact
+) -> StagePlan:
+    """A step with its time: the median of its last runs here that differ in seed and counts alone, else a guess at the
+    rate of `closest`, the stored artifact that differs least."""
+    made = closest.manifest
+    rate_of = made.recipe if made.host == host() else f"{made.recipe} on another machine"
     own = sorted((one for one in stored if one.manifest.host == host()), key=lambda one: -one.manifest.made)
-    reckoned = (_reckoned(stage, one, ingredients) for one in own)
+    reckoned = (_reckoned(step.stage, one, ingredients) for one in own)
     times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
     if not times:
-        return TimeEstimate(roughly=_reckoned(stage, closest, ingredients)[0])
+        guess = _reckoned(step.stage, closest, ingredients)[0]
+        return replace(step, roughly=guess, spread=UNSEEN, rate_of=rate_of)
     middle = median(times)
     spread = (UNSEEN[0] * min(times) / middle, UNSEEN[1] * max(times) / middle) if middle else UNSEEN
-    return TimeEstimate(expected=middle, spread=spread)
+    return replace(step, expected=middle, spread=spread, rate_of=rate_of)
 
 
 def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:

@@ -65,7 +65,6 @@ class Identity:
 
 
 def identity() -> Identity:
-    """This machine's."""
     return Identity(host(), versions(), _code())
 
 

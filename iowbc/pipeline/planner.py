@@ -1,15 +1,14 @@
 """The plan of a recipe: stages that would run, and why."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
-from iowbc.pipeline.estimate import estimate
+from iowbc.pipeline.estimate import estimated
 from iowbc.pipeline.ingredients import key_values, slice_value
-from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Borrowed, Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
@@ -25,27 +24,21 @@ from iowbc.recipe.section import deciding
 NOT_WHOLE = "its published artifact leaves out large files"
 
 
+@dataclass(eq=False)
 class Planner:
     """Decides, stage by stage, for one recipe on one store."""
 
-    def __init__(
-        self,
-        loaded: LoadedRecipe,
-        stages: Sequence[Stage],
-        store: Store,
-        robot: Path,
-        options: Options,
-        origins: Mapping[tuple[str, str], "Planner"],
-    ) -> None:
-        """`origins`: by stage and input, the planner of the recipe that makes what is borrowed; see `planner_for`."""
-        self.loaded = loaded
-        self.stages = stages
-        self.store = store
-        self.robot = robot
-        self.options = options
-        self.origins = origins
-        self.robot_digest = folder_digest(robot)
-        self.deciding = deciding(loaded.recipe)
+    loaded: LoadedRecipe
+    stages: Sequence[Stage]
+    store: Store
+    robot: Path
+    options: Options
+    origins: Mapping[tuple[str, str], "Planner"]
+    """By stage and input, the planner of the recipe that makes what is borrowed; see `planner_for`."""
+
+    def __post_init__(self) -> None:
+        self.robot_digest = folder_digest(self.robot)
+        self.deciding = deciding(self.loaded.recipe)
 
     @property
     def workers(self) -> int:
@@ -56,12 +49,14 @@ class Planner:
         """A step for each stage, as things stand; nothing is changed."""
         steps: dict[str, StagePlan] = {}
         for stage in self.stages:
-            inputs = {name: steps[name].artifact if steps[name].cached else None for name in self.reads(stage)}
+            inputs = {
+                name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
+            }
             step = self.decide(stage, {**inputs, **self.borrowed(stage)})
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
-            for name in self.reads(stage):
+            for name in stage.reads(self.loaded.recipe):
                 made = steps[name].artifact
                 if not steps[stage.name].cached and steps[name].cached and made is not None and not made.whole:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
@@ -89,10 +84,6 @@ class Planner:
             raise wrong_origin(self.loaded, borrowed, f"is damaged: {error}") from None
         return found[0]
 
-    def reads(self, stage: Stage) -> tuple[str, ...]:
-        """Names of the stages whose artifacts a stage reads."""
-        return stage.reads(self.loaded.recipe)
-
     def decide(self, stage: Stage, inputs: Mapping[str, Artifact | None], *, whole: bool = False) -> StagePlan:
         """The plan for a stage with these inputs; None is an input that would be made anew.
 
@@ -109,8 +100,7 @@ class Planner:
         former = self._closest(stage.name, ingredients)
         step = StagePlan(stage, code=stage_code(stage))
         if former is not None:
-            found = estimate(stage, ingredients, self.store.artifacts(stage.name), former)
-            step = replace(step, **vars(found), rate_of=_origin_of(former))
+            step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
         if unknown:
             return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
         step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients))
@@ -322,12 +312,6 @@ def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) 
     except Damaged as error:
         return None, str(error)
     return artifact, ""
-
-
-def _origin_of(former: Artifact) -> str:
-    """Whose rate a guess is made at: the recipe of an artifact, and the machine where that is another one."""
-    made = former.manifest
-    return made.recipe if made.host == host() else f"{made.recipe} on another machine"
 
 
 def _shown(value: Any) -> str:

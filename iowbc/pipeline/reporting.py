@@ -1,6 +1,7 @@
 """A stage's report: to the console, to the tracking journal, and to its record on disk."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.pipeline.console.display import Display, StageView
@@ -8,38 +9,35 @@ from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
 
 
+@dataclass
 class StageReport:
     """Implements the `Report` that a stage receives."""
 
-    def __init__(self, view: StageView, display: Display, tracker: Tracker | None, workspace: Workspace) -> None:
-        self._view = view
-        self._display = display
-        self._tracker = tracker
-        self._workspace = workspace
+    view: StageView
+    display: Display
+    tracker: Tracker | None
+    workspace: Workspace
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
         """Record named values at a step; the first name is the stage's main metric."""
         if not values:
             return
-        name = self._view.metric if self._view.metric in values else next(iter(values))
-        self._view.measured(name, step, float(values[name]))
-        self._workspace.drawn(self._view.metric, self._view.curve)
-        if self._tracker is not None:
-            self._tracker.metrics(self._view.name, values, step)
-        self._display.moved(self._view)
+        name = self.view.metric if self.view.metric in values else next(iter(values))
+        self.view.measured(name, step, float(values[name]))
+        self.workspace.drawn(self.view.metric, self.view.curve)
+        if self.tracker is not None:
+            self.tracker.metrics(self.view.name, values, step)
+        self.display.moved(self.view)
 
     def progress(self, done: float, total: float, note: str = "") -> None:
-        """Say how far the stage is, in units of its own."""
-        self._view.progress(done, total, note)
-        self._workspace.progress(done, total, note)
-        self._display.moved(self._view)
+        self.view.progress(done, total, note)
+        self.workspace.progress(done, total, note)
+        self.display.moved(self.view)
 
     def files(self, path: Path) -> None:
-        """Let tracking have a file or folder of the stage while it runs; it may be told again."""
-        if self._tracker is not None:
-            self._tracker.files(self._view.name, path)
+        if self.tracker is not None:
+            self.tracker.files(self.view.name, [path])
 
     def say(self, text: str) -> None:
-        """Print one line, with the stage's name before it."""
-        prefix = f"{self._view.name}: "
-        self._display.say(prefix + text.removeprefix(prefix))
+        prefix = f"{self.view.name}: "
+        self.display.say(prefix + text.removeprefix(prefix))

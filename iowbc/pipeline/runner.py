@@ -4,7 +4,7 @@ import contextlib
 import time
 import traceback
 from collections.abc import Callable
-from pathlib import Path
+from dataclasses import dataclass, field
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
@@ -16,7 +16,7 @@ from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan
-from iowbc.pipeline.store.artifact import Artifact, seal
+from iowbc.pipeline.store.artifact import Artifact, read_artifact, seal
 from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
@@ -32,41 +32,28 @@ def run_here(stage: Stage, job: Job) -> None:
     stage.run(job)
 
 
+@dataclass(eq=False)
 class Runner:
     """One run of a recipe."""
 
-    def __init__(
-        self,
-        planner: Planner,
-        robot: Path,
-        display: Display,
-        tracker: Tracker | None,
-        interrupted: Callable[[], bool],
-        *,
-        command: Callable[[list[str]], str] = lambda made: "",
-        execute: Execute = run_here,
-        workers: int | None = None,
-    ) -> None:
-        """`command`: what goes on with this run once the stages named were made; kept with a stage while it is made.
+    planner: Planner
+    display: Display
+    tracker: Tracker | None
+    interrupted: Callable[[], bool]
+    command: Callable[[], str] = lambda: ""
+    """What goes on with this run after the stages in `made`; kept with a stage while it is made."""
+    execute: Execute = run_here
+    """Carries a stage out, with the same result wherever."""
+    workers: int = 0
+    """Processes of a stage; 0 for the planner's."""
+    artifacts: dict[str, Artifact] = field(default_factory=dict)
+    made: list[str] = field(default_factory=list)
+    """Stages that were not cached."""
 
-        `execute`: carries a stage out, with the same result wherever. `workers`: processes of a stage, else the
-        planner's.
-        """
-        self.planner = planner
-        self.loaded = planner.loaded
-        self.store = planner.store
-        self.options = planner.options
-        self.robot = robot
-        self.display = display
-        self.tracker = tracker
-        self.interrupted = interrupted
-        self.command = command
-        self.execute = execute
-        self.workers = workers or planner.workers
-        self.views = {stage.name: StageView(stage.name) for stage in planner.stages}
-        self.artifacts: dict[str, Artifact] = {}
-        self.made: list[str] = []
-        """Stages that were not cached."""
+    def __post_init__(self) -> None:
+        self.loaded, self.store, self.options = self.planner.loaded, self.planner.store, self.planner.options
+        self.workers = self.workers or self.planner.workers
+        self.views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
 
     def run(self) -> dict[str, Artifact]:
         """Bring every stage's artifact about. Raises `PipelineFailed` or `Interrupted`."""
@@ -103,14 +90,13 @@ class Runner:
             self._clear(step.artifact)
             return self._reused(step, step.artifact, view)
         for read in self.planner.stages:
-            if read.name in self.planner.reads(stage) and not self.artifacts[read.name].whole:
+            if read.name in stage.reads(self.loaded.recipe) and not self.artifacts[read.name].whole:
                 self.artifacts[read.name] = self._artifact(read, whole=True)
                 step = self._decide(stage, whole)
         assert step.key is not None
 
         def waits(holder: object) -> None:
-            view.state, view.note = "waits", f"{holder} is making it"
-            self.display.changed(view)
+            self._show(view, "waits", f"{holder} is making it")
             self.display.say(f"{stage.name}: busy, held by {holder}; waiting for it, to use what it makes")
 
         with key_lock(self.store.runs, step.key, waits, self.interrupted) as held:
@@ -140,8 +126,7 @@ class Runner:
         return self.planner.decide(stage, self._inputs(stage), whole=whole)
 
     def _inputs(self, stage: Stage) -> dict[str, Artifact]:
-        """Artifacts that a stage reads, by name."""
-        read = {name: self.artifacts[name] for name in self.planner.reads(stage)}
+        read = {name: self.artifacts[name] for name in stage.reads(self.loaded.recipe)}
         for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
                 origin = self.planner.origins[stage.name, name].loaded.file
@@ -151,8 +136,7 @@ class Runner:
 
     def _reused(self, step: StagePlan, artifact: Artifact, view: StageView) -> Artifact:
         notes = ("published", *step.notes) if artifact.published else step.notes
-        view.state, view.note = "cached", "; ".join(notes)
-        self.display.changed(view)
+        self._show(view, "cached", "; ".join(notes))
         if self.tracker is not None:
             self.tracker.finished(step.stage.name, artifact, cached=True)
         return artifact
@@ -160,24 +144,23 @@ class Runner:
     def _finish_adding(self, stage: Stage, key: str, workspace: Workspace) -> None:
         """Take output into the store that was sealed when its process died on the threshold."""
         try:
-            if workspace.out.is_dir() and self.store.sealed(workspace.out, stage.name, key):
+            if workspace.out.is_dir():
+                read_artifact(workspace.out, stage.name, key).verify()
                 self.store.add(workspace.out, stage.name, key)
                 workspace.remove()
         except Damaged:
             return
 
     def _made(self, step: StagePlan, workspace: Workspace, view: StageView) -> Artifact:
-        """Run the stage and publish what it leaves."""
         stage, key = step.stage, step.key
         assert key is not None
         earlier = workspace.record.get("code", step.code)
-        command = self.command(self.made)
+        command = self.command()
         resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code), command)
         workspace.describe(step.ingredients or {}, as_yaml(self.loaded.recipe))
         view.metric, view.curve = workspace.curve
         view.began = time.monotonic() - workspace.seconds
-        view.state, view.note = "runs", short(step.notes or step.reasons, 1)
-        self.display.changed(view)
+        self._show(view, "runs", short(step.notes or step.reasons, 1))
         view.note = ""
         changed = changed_code(earlier, step.code)
         if resumed and changed:
@@ -187,7 +170,7 @@ class Runner:
         job = Job(
             recipe=self.loaded.recipe,
             key=key,
-            robot=self.robot,
+            robot=self.planner.robot,
             inputs={name: artifact.folder for name, artifact in self._inputs(stage).items()},
             out=workspace.out,
             work=workspace.scratch,
@@ -218,14 +201,13 @@ class Runner:
             self.display.say(traceback.format_exc())
             raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is also in {details}") from error
         self.made.append(stage.name)
-        view.state, view.note, view.seconds = "done", "", artifact.manifest.seconds
-        self.display.changed(view)
+        view.seconds = artifact.manifest.seconds
+        self._show(view, "done")
         if self.tracker is not None:
             self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
 
     def _published(self, step: StagePlan, workspace: Workspace) -> Artifact:
-        """Seal what the stage left and move it into the store."""
         assert step.key is not None
         details = {
             "stage": step.stage.name,
@@ -244,11 +226,15 @@ class Runner:
         workspace.remove()
         return artifact
 
+    def _show(self, view: StageView, state: str, note: str = "") -> None:
+        view.state, view.note = state, note
+        self.display.changed(view)
+
     def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
         with contextlib.suppress(OSError):  # a full disk must not hide why the stage ended
             workspace.write()
-        view.state, view.note, view.seconds = state, "", workspace.seconds
-        self.display.changed(view)
+        view.seconds = workspace.seconds
+        self._show(view, state)
         if self.tracker is not None:
             with contextlib.suppress(OSError):
                 self.tracker.end(view.name, status, message)

@@ -77,23 +77,6 @@ class Job:
         (self.out / SUMMARY).write_text(text, encoding="utf-8")
 
 
-def _none(recipe: Recipe) -> Iterator[tuple[str, str]]:
-    return iter(())
-
-
-def _empty(recipe: Recipe) -> Mapping[str, Any]:
-    return {}
-
-
-def _never(recipe: Recipe) -> bool:
-    return False
-
-
-def always(recipe: Recipe) -> bool:
-    """Whatever the recipe says."""
-    return True
-
-
 @dataclass(frozen=True)
 class Borrowed:
     """An artifact that another recipe makes."""
@@ -139,19 +122,19 @@ class Stage:
     results: tuple[str, ...] = ("*",)
     """Patterns of the files that decide the stages which read this one, the same for the same key; all others are
     records: curves, times, pictures, convenience."""
-    problems: Callable[[Recipe], Iterator[tuple[str, str]]] = _none
+    problems: Callable[[Recipe], Iterator[tuple[str, str]]] = lambda recipe: iter(())
     """Requests of a recipe that this stage cannot fulfil, known before it runs: dotted paths, and the problem there."""
-    defaults: Callable[[Recipe], Mapping[str, Any]] = _empty
+    defaults: Callable[[Recipe], Mapping[str, Any]] = lambda recipe: {}
     """Values of the program that decide the result where a recipe has none: JSON data by dotted path, for the key."""
     extends: str | None = None
     """Dotted recipe path of a number that only says where the work ends: the stage goes on from an artifact that
     differs in nothing but a smaller one, as if it had never stopped."""
     extends_from: tuple[str, ...] = ()
     """Files of that artifact that it goes on from; where a published one lacks any, it starts anew."""
-    borrows: Callable[[Recipe], Mapping[str, Borrowed]] = _empty
+    borrows: Callable[[Recipe], Mapping[str, Borrowed]] = lambda recipe: {}
     """Artifacts that other recipes make, by their names among the job's inputs, for a given recipe."""
     counts: tuple[str, ...] = ()
     """Dotted recipe paths of numbers that the time it takes is proportional to."""
     presentation: Presentation = Presentation()
-    spreads: Callable[[Recipe], bool] = _never
+    spreads: Callable[[Recipe], bool] = lambda recipe: False
     """True for a recipe of which it leaves its heavy work to `Job.spread` where there is one."""

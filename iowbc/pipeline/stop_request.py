@@ -8,7 +8,7 @@ the end of the process: the second may come while what was stopped is written do
 import contextlib
 import os
 import signal
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Self
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -40,9 +40,7 @@ class StopRequest:
                 self._afterwards[number] = signal.signal(number, self._received)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *reason: object) -> None:
         for number, action in self._afterwards.items():
             signal.signal(number, action)  # type: ignore[arg-type]
 

@@ -52,7 +52,6 @@ class RemoteWorkers(Workers):
         self._changes = True
 
     def ask(self, messages: Sequence[Message]) -> None:
-        """See `Workers`."""
         self._changes = messages[0].changes
         written = [
             ({name: self.buffers[name][first:last] for name in WRITTEN}, message)
@@ -61,7 +60,6 @@ class RemoteWorkers(Workers):
         self._pool.ask(written, changes=self._changes)
 
     def answers(self) -> list[Any]:
-        """See `Workers`."""
         found = self._pool.answers()
         if self._changes:
             for group, state in zip(self.groups, self._pool.states, strict=True):
@@ -75,7 +73,6 @@ class RemoteWorkers(Workers):
         return [answer for answer, _ in found]
 
     def close(self) -> None:
-        """See `Workers`."""
         self._pool.close()
 
 
@@ -102,9 +99,7 @@ class RolloutActor:
         return answer, files
 
     def state(self) -> dict[str, Any]:
-        """See `Member`."""
         return self._batch.snapshot()
 
     def restore(self, state: dict[str, Any]) -> None:
-        """See `Member`."""
         self._batch.restore(state)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.errors import Interrupted
-from iowbc.pipeline.stage import Job, Presentation, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
@@ -222,5 +222,5 @@ STAGE = Stage(
         columns=("succeeded", "trials"),
         pictures=("comparison.png", "compliance.png", "push_map.png"),
     ),
-    spreads=always,
+    spreads=lambda recipe: True,
 )

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 
 from iowbc.errors import StageFailed
-from iowbc.pipeline.stage import Job, Presentation, Stage, always
+from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.stages.labelling import label_everywhere
 
 LABELLED = "labelled.npz"
@@ -129,5 +129,5 @@ STAGE = Stage(
     results=("dataset.npz", LABELLED),
     counts=("rg.sampling.samples",),
     presentation=Presentation(headline=("samples", "kept", "crosscheck_p90"), pictures=("postures.png",)),
-    spreads=always,
+    spreads=lambda recipe: True,
 )

@@ -87,7 +87,6 @@ def run(job: Job) -> None:
 
 
 def _competitors(job: Job) -> "list[Competitor]":
-    """This recipe's skill, those of others, and rivals."""
     from iowbc.learning.storage import read_teacher
     from iowbc.skill.evaluation.games import Competitor
 

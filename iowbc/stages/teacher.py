@@ -147,7 +147,6 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
 
 
 def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
-    """Films of the check, where the recipe asks for any."""
     parts = job.recipe.teacher.check.films
     if not parts:
         return None

@@ -25,7 +25,6 @@ from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.registry import STAGES
 
 ROOT = Path(__file__).parents[2]
 
@@ -130,10 +129,10 @@ def test_a_recipe_that_plans_cached_is_played_by_its_own_sequence_and_film_setti
         "  video: {width: 96, height: 64}\n"
     )
     store, console = Store(Runs(tmp_path / "runs")), Console(file=io.StringIO())
-    source = named_source(store, console, str(own), None, "wide_box", STAGES)
+    source = named_source(store, console, str(own), None, "wide_box")
     assert source.policy.parent.name == "distill"
     assert requested_episode(source.world.recipe, PlayRequest()).duration == 5.0
     assert requested_episode(source.world.recipe, PlayRequest(scene="wide_box")).scene == "wide_box"
     assert source.world.recipe.eval.video.width == 96
     with pytest.raises(UsageError, match="did you mean 'wide_box'"):
-        named_source(store, console, str(own), None, "wide_bx", STAGES)
+        named_source(store, console, str(own), None, "wide_bx")

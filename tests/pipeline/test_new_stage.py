@@ -70,7 +70,7 @@ def run(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> Run:
     loaded = replace(load_recipe(workplace.recipe), recipe=recipe)
     registry = workplace.registry | {"juggle": STAGE}
     planner = planner_for(loaded, registry, workplace.store, workplace.robot, Options())
-    made = Runner(planner, workplace.robot, workplace.display, None, lambda: False).run()
+    made = Runner(planner, workplace.display, None, lambda: False).run()
     return Run("small", made, recipe.model_dump(mode="json"))
 
 

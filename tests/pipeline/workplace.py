@@ -76,7 +76,7 @@ class Workplace:
         self, *overrides: str, interrupted: Callable[[], bool] = lambda: False, **options: Any
     ) -> dict[str, Artifact]:
         """Run in this process, without MLflow."""
-        runner = Runner(self.planner(*overrides, **options), self.robot, self.display, None, interrupted)
+        runner = Runner(self.planner(*overrides, **options), self.display, None, interrupted)
         return runner.run()
 
     def ran(self) -> list[str]:

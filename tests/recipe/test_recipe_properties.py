@@ -57,7 +57,7 @@ def as_tree(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def planned(loaded: LoadedRecipe, folder: Path) -> None:
-    planner, _ = prepared(loaded, Request("mine.yaml", (), Runs(folder / "runs"), Options()), STAGES)
+    planner = prepared(loaded, Request("mine.yaml", (), Runs(folder / "runs"), Options()), STAGES)
     assert [step.stage.name for step in planner.plan()] == list(loaded.recipe.stages)
 
 

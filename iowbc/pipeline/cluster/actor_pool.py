@@ -107,7 +107,6 @@ class NodeActorPool:
         return [place.answer for place in self._places]
 
     def close(self) -> None:
-        """End the members."""
         import ray
 
         for place in self._places:
@@ -141,7 +140,6 @@ class NodeActorPool:
             place.state = state
 
     def _remake(self, place: Place, why: str) -> None:
-        """Remake a member whose node or worker is lost, and ask it again."""
         import ray
 
         place.losses += 1

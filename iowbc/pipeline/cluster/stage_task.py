@@ -125,7 +125,6 @@ class NodeReport:
         self._stop = False
 
     def metrics(self, values: Mapping[str, float], step: int) -> None:
-        """Record named values at a step."""
         self._add("metrics", dict(values), step)
 
     def progress(self, done: float, total: float, note: str = "") -> None:
@@ -135,7 +134,6 @@ class NodeReport:
         self._add("progress", done, total, note)
 
     def say(self, text: str) -> None:
-        """Print one line."""
         self._add("say", text)
 
     def files(self, path: Path) -> None:

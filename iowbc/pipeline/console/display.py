@@ -115,7 +115,6 @@ class PlainDisplay(Display):
         self._last = time.monotonic()
 
     def changed(self, view: StageView) -> None:
-        """A stage changed its state: shown at once."""
         spent = f" in {duration(view.seconds)}" if view.seconds is not None else ""
         self.say(f"{view.name}: {view.state}{spent}{' - ' + view.note if view.note else ''}")
         self._last = time.monotonic()

@@ -57,20 +57,16 @@ class LiveTable(Display):
         self._live = Live(console=console, get_renderable=self._drawn, refresh_per_second=REFRESH_RATE)
 
     def begin(self, views: Sequence[StageView]) -> None:
-        """Start to show these stages."""
         self._views = views
         self._live.start()
 
     def changed(self, view: StageView) -> None:
-        """A stage changed its state: shown at once."""
         self._live.refresh()
 
     def say(self, text: str) -> None:
-        """One line."""
         self.console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def end(self) -> None:
-        """Nothing more comes."""
         self._live.stop()
 
     def _drawn(self) -> Constrain:

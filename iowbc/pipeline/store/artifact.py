@@ -92,15 +92,14 @@ class Artifact:
         """Ingredients of its key; empty where they are not readable or do not give the key."""
         found = read_json(self.folder / INGREDIENTS)
         try:
-            return found if isinstance(found, dict) and data_digest(found) == self.manifest.key else {}
+            return found if data_digest(found) == self.manifest.key else {}
         except ValueError:
             return {}
 
     @property
     def recipe(self) -> dict[str, Any]:
         """The resolved recipe that it was made with; empty where that is not readable."""
-        found = read_yaml(self.folder / RECIPE)
-        return found if isinstance(found, dict) else {}
+        return read_yaml(self.folder / RECIPE)
 
     @property
     def size(self) -> int:
@@ -110,8 +109,7 @@ class Artifact:
     @property
     def metrics(self) -> dict[str, float]:
         """The metrics that the stage left in its summary."""
-        summary = read_json(self.folder / SUMMARY)
-        metrics = summary.get("metrics") if isinstance(summary, dict) else None
+        metrics = read_json(self.folder / SUMMARY).get("metrics")
         if not isinstance(metrics, dict):
             return {}
         return {str(name): float(value) for name, value in metrics.items() if isinstance(value, (int, float))}
@@ -196,10 +194,8 @@ def read_artifact(folder: Path, stage: str, key: str, *, published: bool = False
     return Artifact(folder, manifest, published)
 
 
-def _sealed(found: Any) -> bool:
+def _sealed(found: Mapping[str, Any]) -> bool:
     """True for a manifest as it was written, also by a newer version with more entries."""
-    if not isinstance(found, dict):
-        return False
     try:
         return bool(data_digest({name: entry for name, entry in found.items() if name != "seal"}) == found.get("seal"))
     except ValueError:

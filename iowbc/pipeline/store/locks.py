@@ -89,6 +89,6 @@ def named_lock(path: Path) -> Iterator[None]:
 def _read(path: Path) -> Holder:
     """The holder that a lock file names; one that is being written, or was overwritten, names nobody."""
     data = read_json(path)
-    pid, name, since = (data.get(key) if isinstance(data, dict) else None for key in ("pid", "host", "since"))
+    pid, name, since = (data.get(key) for key in ("pid", "host", "since"))
     known = isinstance(pid, int) and isinstance(since, (int, float))
     return Holder(pid, str(name), since) if known else Holder(0, "?", time.time())  # type: ignore[arg-type]

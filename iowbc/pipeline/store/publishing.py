@@ -31,28 +31,24 @@ def publish(runs: Runs, artifact: Artifact, without: Collection[str] = ()) -> Ar
     with named_lock(lock_path(runs, PUBLISHING)):
         for leftover in runs.published.glob("*/.*"):
             restore_folder(leftover) if leftover.suffix == OLD else shutil.rmtree(leftover)
-        return _publish(runs, artifact, without)
-
-
-def _publish(runs: Runs, artifact: Artifact, without: Collection[str]) -> Artifact:
-    made = artifact.manifest
-    target = runs.published / made.stage / made.key
-    unfinished = target.with_name(f".{made.key}.new")
-    omitted = tuple(
-        name
-        for name, record in made.files.items()
-        if name in made.omitted or name in without or record.size > LARGEST_FILE or Path(name).suffix not in KINDS
-    )
-    for name in (*made.files, *BESIDE):
-        if name not in omitted:
-            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(artifact.folder / name, unfinished / name)
-            synchronise(unfinished / name)
-    write_manifest(unfinished, made.model_copy(update={"omitted": omitted}))
-    replace_folder(unfinished, target)
-    copy = read_artifact(target, made.stage, made.key, published=True)
-    copy.verify()
-    return copy
+        made = artifact.manifest
+        target = runs.published / made.stage / made.key
+        unfinished = target.with_name(f".{made.key}.new")
+        omitted = tuple(
+            name
+            for name, record in made.files.items()
+            if name in made.omitted or name in without or record.size > LARGEST_FILE or Path(name).suffix not in KINDS
+        )
+        for name in (*made.files, *BESIDE):
+            if name not in omitted:
+                (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(artifact.folder / name, unfinished / name)
+                synchronise(unfinished / name)
+        write_manifest(unfinished, made.model_copy(update={"omitted": omitted}))
+        replace_folder(unfinished, target)
+        copy = read_artifact(target, made.stage, made.key, published=True)
+        copy.verify()
+        return copy
 
 
 def published_size(runs: Runs) -> int:

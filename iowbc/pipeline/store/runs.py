@@ -1,7 +1,6 @@
 """Folders of everything that runs leave behind."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,107 +8,54 @@ from iowbc.errors import RecipeError
 from iowbc.recipe.reading.document import plain, read_document
 
 
-@dataclass(frozen=True)
 class Runs:
     """The folder `runs/` and its parts."""
 
-    root: Path
-
-    @property
-    def store(self) -> Path:
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.store = root / "store"
         """Finished artifacts, `<stage>/<key>/`."""
-        return self.root / "store"
-
-    @property
-    def published(self) -> Path:
+        self.published = root / "published"
         """Artifacts that came with the repository, `<stage>/<key>/`; only `iowbc publish` writes there."""
-        return self.root / "published"
-
-    @property
-    def work(self) -> Path:
+        self.work = root / "work"
         """Scratch and checkpoints of stages that are not finished, `<key>/`."""
-        return self.root / "work"
-
-    @property
-    def damaged(self) -> Path:
+        self.damaged = root / "damaged"
         """Artifacts that were found damaged and set aside."""
-        return self.root / "damaged"
-
-    @property
-    def locks(self) -> Path:
+        self.locks = root / "locks"
         """One lock file a key, with its holder's name in it."""
-        return self.root / "locks"
-
-    @property
-    def recipes(self) -> Path:
+        self.recipes = root / "recipes"
         """Artifacts that each recipe used last, `<name>.json`."""
-        return self.root / "recipes"
-
-    @property
-    def tracking(self) -> Path:
+        self.tracking = root / "tracking"
         """Journals of what MLflow is told, until it has taken it."""
-        return self.root / "tracking"
-
-    @property
-    def parts(self) -> tuple[Path, ...]:
-        """All of these folders."""
-        return (
-            self.store,
-            self.published,
-            self.work,
-            self.damaged,
-            self.locks,
-            self.recipes,
-            self.tracking,
-            self.tracked_files,
-            self.compared,
-            self.reports,
-            self.sweeps,
-            self.npm,
-        )
-
-    @property
-    def sweeps(self) -> Path:
+        self.sweeps = root / "sweeps"
         """Points and results of each sweep, `<name>/`."""
-        return self.root / "sweeps"
-
-    @property
-    def compared(self) -> Path:
+        self.compared = root / "compare"
         """Tables, figures and films over several runs; those of a study in `<name>/`."""
-        return self.root / "compare"
-
-    @property
-    def reports(self) -> Path:
+        self.reports = root / "report"
         """HTML pages about runs."""
-        return self.root / "report"
-
-    @property
-    def npm(self) -> Path:
+        self.npm = root / "npm"
         """Packages that npm fetched for web pages, a folder for each set of versions."""
-        return self.root / "npm"
-
-    @property
-    def database(self) -> Path:
-        """MLflow's embedded database."""
-        return self.root / "mlflow.db"
-
-    @property
-    def tracked_files(self) -> Path:
+        self.tracked_files = root / "mlartifacts"
         """Files of MLflow's runs, where it uses the embedded database."""
-        return self.root / "mlartifacts"
+        self.parts = tuple(path for path in vars(self).values() if path != root)
+        """All of these folders."""
+        self.database = root / "mlflow.db"
+        """MLflow's embedded database."""
 
 
-def read_json(path: Path) -> Any:
-    """The content of a JSON file, or None where it is missing, no regular file, or not JSON."""
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file; empty where it is missing, no regular file, not JSON, or holds something else."""
     try:
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     except (OSError, ValueError, RecursionError):
-        return None
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
-def read_yaml(path: Path) -> Any:
-    """The content of a YAML file as `read_json` has it, None also where it is nested too deep for YAML's parser."""
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping in a YAML file as `read_json` has it; empty also where it is nested too deep for YAML's parser."""
     try:
-        return plain(read_document(path.read_text(encoding="utf-8"), path.name)) if path.is_file() else None
+        found = plain(read_document(path.read_text(encoding="utf-8"), path.name)) if path.is_file() else {}
     except (OSError, ValueError, RecipeError):
-        return None
+        return {}
+    return found if isinstance(found, dict) else {}

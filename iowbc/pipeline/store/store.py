@@ -41,11 +41,6 @@ class Store:
                 return artifact
         return None
 
-    def sealed(self, out: Path, stage: str, key: str) -> bool:
-        """True where a folder that is not in the store yet holds a whole artifact. Raises `Damaged` where not."""
-        read_artifact(out, stage, key).verify()
-        return True
-
     def artifacts(self, stage: str | None = None) -> list[Artifact]:
         """All readable artifacts, of one stage or of all, oldest first; of two with one key the one made here."""
         found: dict[str, Artifact] = {}

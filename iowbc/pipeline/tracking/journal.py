@@ -66,7 +66,6 @@ class Journal:
             raise OSError(error.errno, error.strerror, str(self.path)) from error
 
     def close(self) -> None:
-        """Release the journal."""
         self._file.close()
 
     def __enter__(self) -> Self:
@@ -101,7 +100,6 @@ def _event(line: bytes) -> dict[str, Any] | None:
 
 
 def events(path: Path) -> Iterator[dict[str, Any]]:
-    """All whole events."""
     return (event for event, _ in lines(path) if event is not None)
 
 

@@ -60,7 +60,7 @@ class RunRecord:
         if figures:
             self.metrics(PARENT, figures, 0)
         if files:
-            self._files(PARENT, files)
+            self.files(PARENT, files)
 
     def metrics(self, name: str, values: Mapping[str, float], step: int) -> None:
         """Values of a run at a step, under names that MLflow accepts."""
@@ -86,7 +86,8 @@ class RunRecord:
             time.sleep(0.05)
         return not unsent(path)
 
-    def _files(self, name: str, paths: Sequence[Path]) -> None:
+    def files(self, name: str, paths: Sequence[Path]) -> None:
+        """Files and folders below `runs` of a run; a folder's further files follow when it is told again."""
         self._journal.write("files", id=name, paths=[os.path.relpath(path, self.runs.root) for path in paths])
 
 
@@ -148,10 +149,6 @@ class Tracker(RunRecord):
             self._journal.write("run", id=name, parent=PARENT, name=name, tags=tags, params=parameters(slices))
         self.send()
 
-    def files(self, name: str, path: Path) -> None:
-        """A file or folder of a stage that is still running; a folder's further files follow when it is told again."""
-        self._files(name, [path])
-
     def end(self, name: str, status: str, message: str = "") -> None:
         """A stage that ran has ended with MLflow's status FAILED or KILLED."""
         if message:
@@ -173,9 +170,9 @@ class Tracker(RunRecord):
             self.metrics(name, {f"summary/{key}": value for key, value in artifact.metrics.items()}, 0)
             self.metrics(PARENT, {f"{name}/{key}": value for key, value in artifact.metrics.items()}, 0)
         files = [INGREDIENTS, RECIPE] if cached else [INGREDIENTS, RECIPE, *SHOWN_FOLDERS]
-        self._files(name, [artifact.folder / file for file in files if (artifact.folder / file).exists()])
+        self.files(name, [artifact.folder / file for file in files if (artifact.folder / file).exists()])
         if not cached:
-            self._files(PARENT, [artifact.folder / RECIPE])
+            self.files(PARENT, [artifact.folder / RECIPE])
         self._journal.write("end", id=name, status="FINISHED")
 
 
