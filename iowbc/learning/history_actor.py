@@ -17,7 +17,9 @@ def student_architecture(teacher: Teacher, observation: int, actions: int, mirro
     """Arguments of the `StudentNetwork` that a recipe asks for; `mirrors`: of a row (s_t, s_priv) and of an action."""
     assert teacher.history is not None
     rows, action = mirrors
-    own = MirrorMap(rows.permutation[:observation], np.asarray(rows.sign)[:observation])
+    sign = np.asarray(rows.sign)
+    own = MirrorMap(rows.permutation[:observation], sign[:observation])
+    privileged = MirrorMap(rows.permutation[observation:] - observation, sign[observation:])
     symmetric = teacher.symmetry == "construction"
     return {
         "observation": observation,
@@ -30,6 +32,7 @@ def student_architecture(teacher: Teacher, observation: int, actions: int, mirro
         "clip": teacher.normalization_clip,
         "encoder": teacher.history.encoder,
         "mirrors": [mirror_as_json(own), mirror_as_json(action)] if symmetric else None,
+        "privileged": mirror_as_json(privileged) if teacher.history.estimate else None,
     }
 
 
@@ -63,7 +66,8 @@ class HistoryActor(Perceptron):
     def hidden(self, prepared: Tensor) -> Hidden:
         flat = prepared.reshape(-1, prepared.shape[-1])
         frames = flat[:, : self.length * self.observation].reshape(-1, self.length, self.observation)
-        both = torch.cat([frames[:, -1], self.network.encoder(frames)], dim=1)
+        told = self.network.told(self.network.encoder(frames))
+        both = torch.cat([frames[:, -1], told], dim=1)
         parts = self.network.body.hidden(self.network.body.prepare(both))
         return tuple(part.reshape(*prepared.shape[:-1], -1) for part in parts)
 

@@ -149,5 +149,8 @@ class StudentNetwork(nn.Module):
 
     def act(self, newest: Tensor, latent: Tensor) -> Tensor:
         """The mean action."""
-        told = latent if self.estimate is None else self.estimate(latent)
-        return cast(Tensor, self.body(torch.cat([newest, told], dim=1)))
+        return cast(Tensor, self.body(torch.cat([newest, self.told(latent)], dim=1)))
+
+    def told(self, latent: Tensor) -> Tensor:
+        """What the body sees of a latent: itself, or s_priv as it is read from it."""
+        return latent if self.estimate is None else cast(Tensor, self.estimate(latent))

@@ -75,6 +75,13 @@ class HistoryNetwork(Encoder):
 
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
+    estimate: bool = Field(default=False, json_schema_extra=LATER)
+    """Lets the body see s_priv as the latent tells it, and not the latent, as a student does that is distilled with
+    `distill.start: teacher`."""
+    student: ArtifactName | None = Field(default=None, json_schema_extra=COSMETIC)
+    """A distilled student to begin from, as `teacher.start` names a teacher: that recipe's student goes on learning
+    from the reward. A student imitates its teacher, also where the history does not tell what its teacher knows; PPO
+    finds what to do there. Its network must be this one (`estimate` included)."""
 
 
 class Restart(Section):
@@ -205,6 +212,12 @@ class Teacher(Section):
     def _history_without_augmentation(self) -> "Teacher":
         if self.history is not None and self.symmetry == "augment":
             raise ValueError("symmetry: with `history` it is `construction` or `none`, not `augment`")
+        return self
+
+    @model_validator(mode="after")
+    def _one_start(self) -> "Teacher":
+        if self.start is not None and self.history is not None and self.history.student is not None:
+            raise ValueError("history.student: `start` names a policy to begin from, too; give one of them")
         return self
 
     @model_validator(mode="after")

@@ -88,11 +88,13 @@ def run(job: Job) -> None:
             seed,
         )
         curves = train(job, training, settings.checkpoint_every, _note)
+        curriculum = environments.curriculum()
     finally:
         environments.close()
 
     told = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
-    save_network(training.network, training.architecture, job.out, "student", {"layout": told})
+    about = {"layout": told, "curriculum": curriculum}
+    save_network(training.network, training.architecture, job.out, "student", about)
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 
 

@@ -52,8 +52,10 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 
 def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
-    """The teacher that training begins from."""
-    start = recipe.teacher.start
+    """The teacher or student that training begins from."""
+    start, history = recipe.teacher.start, recipe.teacher.history
+    if history is not None and history.student is not None:
+        return {START: Borrowed("teacher.history.student", history.student, "distill")}
     return {} if start is None else {START: Borrowed("teacher.start", start, "teacher")}
 
 
@@ -121,9 +123,10 @@ def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) 
 
     network, about = load_network(start)
     if about["layout"] != environments.layout.describe():
-        raise StageFailed("teacher.start: that teacher observes something else; leave the observation as it was")
+        raise StageFailed("teacher.start: that policy observes something else; leave the observation as it was")
     training.begin(network)
-    environments.set_curriculum(about["curriculum"])
+    if "curriculum" in about:  # students of earlier versions left none
+        environments.set_curriculum(about["curriculum"])
 
 
 def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
