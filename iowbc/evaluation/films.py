@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import imageio.v2
@@ -48,14 +49,13 @@ def with_text(frame: Frame, lines: Sequence[str]) -> Frame:
 def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
     """A function that appends a frame (H, W, 3) to an mp4 file, which appears when the block ends without an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(".part.mp4")
     settings = {"fps": fps, "codec": "libx264", "quality": QUALITY, "pixelformat": "yuv420p"}
-    try:
+    # in a folder of its own, which goes with whatever an interrupted encoder still writes
+    with TemporaryDirectory(dir=path.parent, prefix=".film-", ignore_cleanup_errors=True) as folder:
+        unfinished = Path(folder, path.name)
         with imageio.v2.get_writer(unfinished, format="FFMPEG", **settings) as writer:
             yield writer.append_data
         unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
