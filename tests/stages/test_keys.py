@@ -51,6 +51,7 @@ COSMETIC = {
     "simulation.physics.divergences_kept",
     "teacher.check.films",
     "teacher.start",
+    "teacher.history.student",
     "distill.experts",
     "teacher.checkpoint_every",
     "distill.checkpoint_every",

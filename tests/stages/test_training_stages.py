@@ -139,6 +139,36 @@ def test_a_training_begins_as_the_policy_of_another_one_while_its_value_learns(
     assert any(not np.array_equal(value, state[name]) for name, value in learnt.items() if "actor" in name)
 
 
+def test_a_training_begins_as_a_distilled_student_while_its_value_learns(trained: Path, tmp_path: Path) -> None:
+    start, steps = trained / "distill" / "out", ENVIRONMENTS * 16
+    history = {"estimate": True, "student": "0123abcd"}
+    recipe = small_recipe(history=history, steps=steps, value_first=steps)
+    assert {one.stage for one in teacher.STAGE.borrows(recipe).values()} == {"distill"}
+    job = make_job(tmp_path / "same", recipe, inputs={"start": start}, workers=0)
+    teacher.STAGE.run(job)
+    before, after = load_file(start / "student.safetensors"), load_file(job.out / "teacher.safetensors")
+    assert after.keys() == before.keys()
+    for name in before.keys() - {"log_std"}:
+        np.testing.assert_array_equal(after[name], before[name], err_msg=name)
+    learning = small_recipe(history=history, steps=steps, value_first=0)
+    job = make_job(tmp_path / "learning", learning, inputs={"start": start}, workers=0)
+    teacher.STAGE.run(job)
+    learnt = load_file(job.out / "state.safetensors")
+    moved = [
+        name
+        for name, value in before.items()
+        if not np.array_equal(learnt.get(f"policy/actor.network.{name}", value), value)
+    ]
+    assert {name.split(".")[0] for name in moved} == {"encoder", "estimate", "body"}, "all of it goes on learning"
+    other = make_job(
+        tmp_path / "other", small_recipe(history={"student": "0123abcd"}), inputs={"start": start}, workers=0
+    )
+    with pytest.raises(StageFailed, match="estimate"):
+        teacher.STAGE.run(other)
+    with pytest.raises(ValueError, match="give one of them"):
+        small_recipe(history=history, start="full.yaml")
+
+
 @pytest.mark.parametrize(
     ("task", "changes", "text"),
     [
