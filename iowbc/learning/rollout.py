@@ -15,12 +15,14 @@ SINGLE = ("log_density", "value", "advantage", "target")
 class Samples:
     """Samples of T steps of n environments as rows, so that an epoch shuffles them with a single gather.
 
-    `columns` are views of the rows by name: the prepared observation, the action, the policy's mean, density and the
-    value before the update, and the advantage and target that are learnt from. Each rollout overwrites the one before.
+    `columns` are views of the rows by name: the prepared observation, the action, the policy's mean, the mean of its
+    neighbours in time, density and value before the update, and the advantage and target that are learnt from. Each
+    rollout overwrites the one before.
     """
 
     def __init__(self, steps: int, environments: int, observation: int, actions: int) -> None:
-        sizes = {"observation": observation, "action": actions, "mean": actions, **dict.fromkeys(SINGLE, 1)}
+        acting = dict.fromkeys(("action", "mean", "neighbours"), actions)
+        sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         ends = np.cumsum(list(sizes.values())).tolist()
         self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
         self.rows = torch.zeros(steps, environments, ends[-1])
@@ -42,6 +44,17 @@ class Samples:
         found = advantages(rewards, ended, values, last_value, discount, decay)
         self.columns["advantage"].copy_(torch.from_numpy(found))
         self.columns["target"].copy_(torch.from_numpy(found + values))
+
+
+def neighbours(means: Tensor, ended: Mask) -> Tensor:
+    """Mean of the policy's means one step before and one after, (T, n, A); at the ends of rollout and episodes its own.
+
+    means: (T, n, A); ended: (T, n), where an episode ended with the step.
+    """
+    found, goes_on = means.clone(), torch.from_numpy(~ended)
+    inside = (goes_on[:-2] & goes_on[1:-1])[..., None]
+    found[1:-1] = torch.where(inside, 0.5 * (means[:-2] + means[2:]), means[1:-1])
+    return found
 
 
 def advantages(rewards: Array, ended: Mask, values: Array, last_value: Array, discount: float, decay: float) -> Array:

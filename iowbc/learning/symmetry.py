@@ -35,7 +35,8 @@ class MirroredSamples:
         old, new = samples.named(rows), samples.named(images)
         with torch.no_grad():
             new["observation"].copy_(mirror_tensor(self.mirrors[0], old["observation"]))
-            new["action"].copy_(mirror_tensor(self.mirrors[1], old["action"]))
+            for name in ("action", "neighbours"):
+                new[name].copy_(mirror_tensor(self.mirrors[1], old[name]))
             new["mean"].copy_(policy.actor.head(policy.actor.hidden(new["observation"])))
             new["log_density"].copy_(log_density(new["action"], new["mean"], policy.log_std))
         unlikely = new["log_density"] < old["log_density"] - self.gap

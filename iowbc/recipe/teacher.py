@@ -130,6 +130,10 @@ class Teacher(Section):
     """PPO's clip range of the probability ratio."""
     entropy: float = Field(default=0.0, ge=0)
     """Weight of the entropy bonus."""
+    smoothness: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
+    """Weight of the KL divergence of the policy from the mean of what it did one step before and after: half of the
+    action's second difference, in standard deviations. A reward for smoothness sees the exploration as well, whose
+    jitter outweighs the policy's own; this term does not (temporal smoothness of CAPS, Mysore et al. 2021)."""
     value_weight: float = Field(default=0.5, ge=0)
     """Weight of the value loss."""
     gradient_norm: float = Field(default=1.0, gt=0)
