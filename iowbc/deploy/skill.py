@@ -55,7 +55,8 @@ class Skill:
         says or belongs to another controller."""
         folder = Path(folder)
         contract = read_skill_contract(folder)
-        own, other = contract.sources.get("distill"), controller.contract.sources.get("distill")
+        both = (contract.sources, controller.contract.sources)
+        own, other = (sources.get("distill", sources.get("teacher")) for sources in both)
         if own != other:
             raise ContractBroken(f"{folder}: trained with the student {own}, the controller has {other}; export both")
         if (ratio := controller.frequency / contract.frequency) != round(ratio):
