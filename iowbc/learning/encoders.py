@@ -42,8 +42,13 @@ class MirroredEncoder(nn.Module):
         self.register_buffer("sign", torch.from_numpy(mirror.as_float32().sign), persistent=False)
 
     def forward(self, history: Tensor) -> Tensor:
-        image = torch.index_select(history, -1, self.permutation) * self.sign
-        return torch.cat([self.encoder(history), self.encoder(image)], dim=1)
+        first, activate = self.encoder.frame
+        assert isinstance(first, nn.Linear)
+        # the image's features by mirrored weights: they are smaller than the histories of a batch
+        mirrored = torch.index_select(first.weight * self.sign, 1, self.permutation)
+        both = nn.functional.linear(history, torch.cat([first.weight, mirrored]), first.bias.repeat(2))
+        own, image = activate(both).chunk(2, dim=-1)
+        return torch.cat([self.encoder.whole(own.flatten(1)), self.encoder.whole(image.flatten(1))], dim=1)
 
 
 class PrivilegedEstimate(nn.Module):
