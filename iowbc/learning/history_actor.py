@@ -48,7 +48,7 @@ class HistoryNormalizer(Normalizer):
         places = torch.arange(len(self.mean))
         past = places[: self.observation].repeat(self.length - 1)
         every = torch.cat([past, places])
-        return torch.clamp((x - self.mean[every]) / self.std[every], -self.clip, self.clip)
+        return (x - self.mean[every]).div_(self.std[every]).clamp_(-self.clip, self.clip)
 
     def newest(self, rows: Any) -> Any:
         """The part (s_t, s_priv) of rows, (..., size)."""

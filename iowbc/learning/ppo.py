@@ -190,7 +190,8 @@ class Learner:
         images = None if self.mirrored is None else self.mirrored.images(self.samples, self.policy)
         found: list[Tensor] = []
         for _ in range(settings.epochs):
-            shuffled = (samples if images is None else half_mirrored(samples, images))[torch.randperm(len(samples))]
+            rows = samples if images is None else half_mirrored(samples, images)
+            shuffled = torch.index_select(rows, 0, torch.randperm(len(rows)))
             found += [self._gradient_step(batch, before) for batch in torch.split(shuffled, self._batch)]
         every = torch.stack(found).view(settings.epochs, -1, len(FIGURES))
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))
