@@ -59,14 +59,14 @@ def network(recipe: Recipe) -> TeacherNetwork:
 @pytest.fixture
 def folder(tmp_path: Path, recipe: Recipe, network: TeacherNetwork, controller: Controller) -> Path:
     rows = np.random.default_rng(0).normal(size=(20, len(network.normalizer.mean))).astype(np.float32)
-    sources = {"distill": controller.contract.sources["distill"]}
+    sources = {"teacher": controller.contract.sources["teacher"]}
     assert write_skill(tmp_path, network, recipe, sources, rows) < 1e-5
     return tmp_path
 
 
 def game_of(recipe: Recipe, controller: Controller) -> TransportGame:
     sources = controller.contract.sources
-    rg, student = PUBLISHED / "rg-fit" / sources["rg-fit"], PUBLISHED / "distill" / sources["distill"]
+    rg, student = PUBLISHED / "rg-fit" / sources["rg-fit"], PUBLISHED / "teacher" / sources["teacher"]
     world = Specification(recipe, robot_folder(recipe.robot), rg).deployed
     return TransportGame(world, load_student(student), n=1, plans=[Plan("lift_straight", "path", known=False)])
 

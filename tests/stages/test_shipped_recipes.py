@@ -52,7 +52,7 @@ VARIANTS = {
     },
     "wo_distill": {
         "stages",
-        *(f"teacher.history.{name}" for name in ("length", "encoder", "frame_features", "latent")),
+        *(f"teacher.history.{name}" for name in ("length", "encoder", "frame_features", "latent", "estimate")),
     },
     "blind": {"distill.observe_object"},
 }
