@@ -152,5 +152,5 @@ class StudentNetwork(nn.Module):
         return cast(Tensor, self.body(torch.cat([newest, self.told(latent)], dim=1)))
 
     def told(self, latent: Tensor) -> Tensor:
-        """What the body sees of a latent: itself, or s_priv as it is read from it."""
+        """Second input of the body: the latent, or the estimate of s_priv."""
         return latent if self.estimate is None else cast(Tensor, self.estimate(latent))

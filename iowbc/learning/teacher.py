@@ -165,7 +165,8 @@ class TeacherTraining:
             take_over(model.policy, network)
         except RuntimeError as error:
             names = "teacher.hidden, activation, symmetry and history (estimate, too)"
-            raise StageFailed(f"teacher.start: that policy's networks are other ones; {names} say which") from error
+            path, _ = self.settings.beginning
+            raise StageFailed(f"{path}: that policy's networks are other ones; {names} say which") from error
         model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
         model.normalization.move(model.policy.normalizer)
         if self.average is not None:

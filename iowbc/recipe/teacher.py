@@ -218,6 +218,12 @@ class Teacher(Section):
             raise ValueError("symmetry: with `history` it is `construction` or `none`, not `augment`")
         return self
 
+    @property
+    def beginning(self) -> tuple[str, str | None]:
+        """Dotted path of the value that names the policy to begin from, and that value."""
+        student = None if self.history is None else self.history.student
+        return ("teacher.start", self.start) if student is None else ("teacher.history.student", student)
+
     @model_validator(mode="after")
     def _one_start(self) -> "Teacher":
         if self.start is not None and self.history is not None and self.history.student is not None:

@@ -53,10 +53,9 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
 
 def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
     """The teacher or student that training begins from."""
-    start, history = recipe.teacher.start, recipe.teacher.history
-    if history is not None and history.student is not None:
-        return {START: Borrowed("teacher.history.student", history.student, "distill")}
-    return {} if start is None else {START: Borrowed("teacher.start", start, "teacher")}
+    path, named = recipe.teacher.beginning
+    stage = "teacher" if path == "teacher.start" else "distill"
+    return {} if named is None else {START: Borrowed(path, named, stage)}
 
 
 def run(job: Job) -> None:
@@ -123,7 +122,8 @@ def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) 
 
     network, about = load_network(start)
     if about["layout"] != environments.layout.describe():
-        raise StageFailed("teacher.start: that policy observes something else; leave the observation as it was")
+        path, _ = training.settings.beginning
+        raise StageFailed(f"{path}: that policy observes something else; leave the observation as it was")
     training.begin(network)
     if "curriculum" in about:  # students of earlier versions left none
         environments.set_curriculum(about["curriculum"])

@@ -163,7 +163,7 @@ def test_a_training_begins_as_a_distilled_student_while_its_value_learns(trained
     other = make_job(
         tmp_path / "other", small_recipe(history={"student": "0123abcd"}), inputs={"start": start}, workers=0
     )
-    with pytest.raises(StageFailed, match="estimate"):
+    with pytest.raises(StageFailed, match=r"^teacher\.history\.student: .*estimate"):
         teacher.STAGE.run(other)
     with pytest.raises(ValueError, match="give one of them"):
         small_recipe(history=history, start="full.yaml")
