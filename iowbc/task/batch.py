@@ -87,8 +87,7 @@ class Batch:
             as_slice(self.robot.support),
             lateral=self.robot.lateral,
             holding=self._holding,
-            followable=~pushing & (episodes is None),
-            own_terms=episodes is None,
+            training=episodes is None,
             period=period,
         )
         self._pushes = PlannedPushes(schedule.pushes, period)

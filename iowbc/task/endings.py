@@ -79,5 +79,16 @@ def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination
     place: the object's place from the base, heading frame, (n, 3) [m]; grasped: hands that hold, (n, 2).
     """
     distance = np.sqrt(np.square(motion.object_offset - place).sum(axis=1))
-    lost: Mask = held & (~grasped.any(axis=1) | (distance > termination.object_distance))
-    return lost
+    away: Mask = held & (~grasped.any(axis=1) | (distance > termination.object_distance))
+    return away
+
+
+def lost(motion: Motion, place: Array, pushed: Mask, termination: Termination) -> Mask:
+    """A pushed object too far to the side of the hands, (n,).
+
+    place: the middle of the hands from the base, heading frame, (n, 3) [m].
+    """
+    if termination.object_beside is None:
+        return np.zeros(len(pushed), np.bool_)
+    aside: Mask = pushed & (np.abs(motion.object_offset - place)[:, 1] > termination.object_beside)
+    return aside

@@ -11,7 +11,7 @@ from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
 from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import LOCOMOTION, OWN_RANGES
-from iowbc.task.endings import Ending, dropped, fallen, lagging
+from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion, low_pass, motion
 from iowbc.task.progress import follow, heading_error
@@ -43,17 +43,16 @@ class Judge:
         *,
         lateral: Indices,
         holding: Mask,
-        followable: Mask,
-        own_terms: bool,
+        training: bool,
         period: float,
     ) -> None:
         """`support`: places of the support joints; `lateral`: places among them, see `Robot.lateral`; `holding`:
-        environments that begin with an object in the hands; `followable`: those whose command can be followed, at least
-        in the recipe's own ranges; (n,) each; `own_terms`: execute the reward's terms in a user's file."""
+        environments that begin with an object in the hands, (n,); `training`: execute the reward's terms in a user's
+        file, and end the episodes of robots that stand instead of walking, or lose their crate."""
         self._task, self._height = recipe.task, recipe.rg.height
         self._support, self._lateral = support, lateral
-        self._holding, self._followable, self._period = holding, followable, period
-        self._reward = RewardFunction(recipe.task.reward, period, own=own_terms)
+        self._holding, self._training, self._period = holding, training, period
+        self._reward = RewardFunction(recipe.task.reward, period, own=training)
         self._admittance = Admittance(recipe.task.reward.yielding, holding)
         self._velocity = np.zeros((len(holding), 3))
 
@@ -106,12 +105,16 @@ class Judge:
             commanded=gait.wants_to_move(memory.command, self._task.references.gait),
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),
-            pushed=state.has_object & ~self._holding,
+            pushed=self._pushed(state),
             object_place=place,
             ended=ending.failed,
         )
         scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
         return Judgement(moved, ending, scored, memory.command.copy(), error)
+
+    def _pushed(self, state: SimulationState) -> Mask:
+        """Environments with an object that is not held, (n,)."""
+        return state.has_object & ~self._holding
 
     def _filter(self, memory: Memory, moved: Motion) -> None:
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
@@ -129,10 +132,12 @@ class Judge:
         self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array
     ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
-        followable = self._followable & (memory.played[:, LOCOMOTION] <= OWN_RANGES)
+        pushed = self._pushed(state)
+        followable = ~pushed & (memory.played[:, LOCOMOTION] <= OWN_RANGES) & self._training
+        left = lost(moved, place, pushed & self._training, termination)
         return Ending(
             fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
-            dropped=dropped(moved, place, self._holding, state.grasped, termination) & ~diverged,
+            dropped=(dropped(moved, place, self._holding, state.grasped, termination) | left) & ~diverged,
             lagging=lagging(memory.lag, heading_error, followable, termination) & ~diverged,
             time_limit=memory.steps >= memory.limit,
             diverged=diverged,

@@ -9,7 +9,7 @@ import pytest
 from task_worlds import QUIET
 
 from iowbc.recipe.task.task import Termination
-from iowbc.task.endings import dropped, fallen, lagging
+from iowbc.task.endings import dropped, fallen, lagging, lost
 from iowbc.task.vector.vector_env import VectorEnv
 
 Make = Callable[..., VectorEnv]
@@ -54,6 +54,13 @@ def test_a_drop_is_an_object_out_of_both_hands_or_far_from_its_place(
     motion: Any = SimpleNamespace(object_offset=np.array([[0.3 + offset, 0.0, 0.0]]))
     place = np.array([[0.3, 0.0, 0.0]])
     assert dropped(motion, place, np.array([held]), np.array([grasped]), RECIPE)[0] == lost
+
+
+def test_a_crate_beside_the_hands_is_lost_where_the_recipe_says_so() -> None:
+    motion: Any = SimpleNamespace(object_offset=np.array([[0.9, -0.6, 0.0], [0.9, -0.4, 0.0], [0.9, -0.6, 0.0]]))
+    place, pushed = np.array([[0.4, 0.0, 0.0]] * 3), np.array([True, True, False])
+    assert lost(motion, place, pushed, Termination(object_beside=0.5)).tolist() == [True, False, False]
+    assert not lost(motion, place, pushed, RECIPE).any()
 
 
 def test_lagging_ends_an_episode_only_where_the_command_can_be_followed() -> None:

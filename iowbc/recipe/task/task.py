@@ -66,6 +66,9 @@ class Termination(Section):
     """An episode ends when the heading is this far from the integrated command [rad]; where, and empty, as above."""
     object_distance: float = Field(default=0.35, gt=0.0)
     """A held object further than this from its place in the grasp is dropped [m]."""
+    object_beside: float | None = Field(default=None, gt=0.0, json_schema_extra=LATER)
+    """A pushed object further than this to the side of the hands is dropped [m]; empty never drops one. Only in training:
+    a robot that goes on beside a lost crate learns nothing of pushing."""
 
 
 class SceneShares(NamedEntries):
