@@ -47,7 +47,7 @@ OWN_NAME = "[a-z][a-z0-9_]{0,31}"
 class Section(BaseModel):
     """A frozen part of a recipe that refuses keys it does not know."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @property
     def idle(self) -> bool:

@@ -4,7 +4,6 @@ import functools
 import operator
 import os
 import signal
-import statistics
 import subprocess
 import sys
 import textwrap
@@ -17,7 +16,6 @@ import numpy as np
 import psutil
 import pytest
 from faulty import StepBy
-from processor_time import processor_seconds
 from task_worlds import actions
 
 from iowbc.errors import WorkerFailed
@@ -43,13 +41,6 @@ def gone(processes: list[int], patience: float = SOON) -> bool:
             return True
         time.sleep(0.02)
     return False
-
-
-def test_a_worker_takes_little_more_of_a_processor_to_start_than_its_imports(make: Make) -> None:
-    env = make(num_envs=8, workers=2)
-    env.reset()
-    started = statistics.mean(sum(psutil.Process(pid).cpu_times()[:2]) for pid in processes_of(env))
-    assert started < 4.0 * processor_seconds("-c", "import iowbc.task.vector.setup")
 
 
 def test_workers_do_not_import_what_only_the_learner_needs(make: Make) -> None:

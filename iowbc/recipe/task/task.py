@@ -67,8 +67,8 @@ class Termination(Section):
     object_distance: float = Field(default=0.35, gt=0.0)
     """A held object further than this from its place in the grasp is dropped [m]."""
     object_beside: float | None = Field(default=None, gt=0.0, json_schema_extra=LATER)
-    """A pushed object further than this to the side of the hands is dropped [m]; empty never drops one. Only in training:
-    a robot that goes on beside a lost crate learns nothing of pushing."""
+    """A pushed object further than this to the side of the hands is dropped [m]; empty never drops one. Only in
+    training: a robot that goes on beside a lost crate learns nothing of pushing."""
 
 
 class SceneShares(NamedEntries):
