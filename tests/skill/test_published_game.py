@@ -34,7 +34,7 @@ def world() -> Specification:
 
 @pytest.fixture(scope="module")
 def student() -> Student:
-    return load_student(input_of_skill("distill"))
+    return load_student(input_of_skill("teacher"))
 
 
 @pytest.mark.slow
