@@ -19,8 +19,8 @@ PUBLISHED = Path("runs/published")
 
 
 def input_of_skill(stage: str) -> Path:
-    """The published artifact of a stage above which the published skill was trained."""
-    (skill,) = (PUBLISHED / "skill").iterdir()
+    """The published artifact of a stage above which every published skill was trained."""
+    skill = min((PUBLISHED / "skill").iterdir())
     digest = json.loads((skill / "key.json").read_text())["inputs"][stage]
     found = {json.loads((path / "manifest.json").read_text())["digest"]: path for path in (PUBLISHED / stage).iterdir()}
     return found[digest]
