@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iowbc.errors import Problem, RecipeError
-from iowbc.pipeline.planner import Planner, planner_for
+from iowbc.pipeline.planner import Planner, Plans, planner_for
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.digests import folder_digest
@@ -77,8 +77,9 @@ def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stag
 def in_order(planner: Planner) -> list[Planner]:
     """Planners of all that runs for a recipe: first those from whose artifacts it begins, where they are not stored,
     then itself."""
-    missing = [origin for origin in planner.origins.values() if not origin.plan()[-1].cached]
-    return [*(each for origin in missing for each in in_order(origin)), planner]
+    known: Plans = {}
+    missing = [origin for origin in planner.origins.values() if not origin.plan(known)[-1].cached]
+    return list(dict.fromkeys([*(each for origin in missing for each in in_order(origin)), planner]))
 
 
 @cache

@@ -45,14 +45,20 @@ class Planner:
         """Worker processes of a stage: as asked for, or the recipe's, or as many as there are cores."""
         return self.options.workers or self.loaded.recipe.execution.workers or available_cores()
 
-    def plan(self) -> list[StagePlan]:
-        """A step for each stage, as things stand; nothing is changed."""
+    def plan(self, known: "Plans | None" = None) -> list[StagePlan]:
+        """A step for each stage, as things stand; nothing is changed. `known`: plans made in the same moment."""
+        known = {} if known is None else known
+        if self not in known:
+            known[self] = self._planned(known)
+        return known[self]
+
+    def _planned(self, known: "Plans") -> list[StagePlan]:
         steps: dict[str, StagePlan] = {}
         for stage in self.stages:
             inputs = {
                 name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
             }
-            step = self.decide(stage, {**inputs, **self.borrowed(stage)})
+            step = self.decide(stage, {**inputs, **self.borrowed(stage, known)})
             unknown = [name for name in inputs if not steps[name].cached and steps[name].expected is None]
             steps[stage.name] = replace(step, expected=None, roughly=step.guess) if unknown else step
         for stage in reversed(self.stages):
@@ -62,17 +68,22 @@ class Planner:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
         return list(steps.values())
 
-    def borrowed(self, stage: Stage) -> dict[str, Artifact | None]:
+    def borrowed(self, stage: Stage, known: "Plans | None" = None) -> dict[str, Artifact | None]:
         """The artifacts of other recipes that a stage reads, by their names among the inputs.
 
         None for one that is not made yet. Raises `RecipeError` for one that is not stored, or damaged.
         """
-        return {name: self._found(stage, name, one) for name, one in stage.borrows(self.loaded.recipe).items()}
+        known, found = {} if known is None else known, dict[str, Artifact | None]()
+        for name, one in stage.borrows(self.loaded.recipe).items():
+            if (stage.name, name) in self.origins:
+                step = self.origins[stage.name, name].plan(known)[-1]
+                found[name] = step.artifact if step.cached else None
+            else:
+                found[name] = self.named(one)
+        return found
 
-    def _found(self, stage: Stage, name: str, borrowed: Borrowed) -> Artifact | None:
-        if (stage.name, name) in self.origins:
-            step = self.origins[stage.name, name].plan()[-1]
-            return step.artifact if step.cached else None
+    def named(self, borrowed: Borrowed) -> Artifact:
+        """The stored artifact whose key the recipe names. Raises `RecipeError` without one, or where it is damaged."""
         found = [one for one in self.store.artifacts(borrowed.stage) if one.manifest.key.startswith(borrowed.named)]
         if len(found) != 1:
             keys = ", ".join(one.manifest.key[:12] for one in found) or "none"
@@ -225,6 +236,10 @@ class Planner:
         yield from (f"{name} is not read any more" for name in old_inputs if name not in ingredients["inputs"])
 
 
+Plans = dict[Planner, list[StagePlan]]
+"""Plans by planner: what several recipes begin from is planned once."""
+
+
 def planner_for(
     loaded: LoadedRecipe,
     registry: Mapping[str, Stage],
@@ -232,25 +247,28 @@ def planner_for(
     robot: Path,
     options: Options,
     above: Sequence[Path] = (),
+    ready: "dict[tuple[Path, str], Planner] | None" = None,
 ) -> Planner:
     """The planner of a recipe, and of those whose artifacts it begins from. `above`: files of the recipes that begin
-    from this one.
+    from this one; `ready`: planners by file and last stage, for those that several begin from.
 
     Raises `RecipeError` for stages that the recipe has not, or that cannot run, and for a start that is not there.
     """
     stages = _selected(loaded, registry, options)
     itself = () if loaded.overrides else (loaded.file.resolve(),)
-    origins = {}
+    origins, ready = dict[tuple[str, str], Planner](), {} if ready is None else ready
+    planner = Planner(loaded, stages, store, robot, options, origins)
     for stage in stages:
         for name, borrowed in stage.borrows(loaded.recipe).items():
             origin = _origin(loaded, borrowed, (*above, *itself))
-            if origin is not None:
+            if origin is None:
+                planner.named(borrowed)
+                continue
+            place = origin.file.resolve(), borrowed.stage
+            if place not in ready:
                 until = replace(options, until=borrowed.stage, force=frozenset())
-                made = planner_for(origin, registry, store, robot, until, (*above, *itself))
-                origins[stage.name, name] = made
-    planner = Planner(loaded, stages, store, robot, options, origins)
-    for stage in stages:
-        planner.borrowed(stage)
+                ready[place] = planner_for(origin, registry, store, robot, until, (*above, *itself), ready)
+            origins[stage.name, name] = ready[place]
     return planner
 
 

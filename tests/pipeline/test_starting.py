@@ -2,15 +2,24 @@
 
 import json
 import shutil
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from workplace import RECIPE, Workplace
 
 from iowbc.errors import RecipeError
-from iowbc.pipeline.stage import START, Job
+from iowbc.pipeline.planner import Planner, planner_for
+from iowbc.pipeline.stage import START, Job, Stage
+from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.publishing import publish
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.store import Store
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.robot.description import robot_folder
+from iowbc.stages.registry import STAGES
 
 
 @pytest.fixture
@@ -128,3 +137,17 @@ def test_a_recipe_that_is_not_there_is_refused_with_its_place(workplace: Workpla
     workplace.recipe.write_text(RECIPE.replace("steps: 4096", "steps: 4096\n  start: secnd.yaml"))
     with pytest.raises(RecipeError, match=r"small\.yaml:4:\d+: key 'teacher.start' = 'secnd\.yaml': .*no such file"):
         workplace.plan()
+
+
+def test_a_recipe_that_several_begin_from_is_planned_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    decided, decide = Counter[tuple[Path, str | None, str]](), Planner.decide
+
+    def counted(self: Planner, stage: Stage, inputs: Any) -> StagePlan:
+        decided[self.loaded.file, self.options.until, stage.name] += 1
+        return decide(self, stage, inputs)
+
+    monkeypatch.setattr(Planner, "decide", counted)
+    experts = load_recipe(Path(__file__).parents[2] / "recipes" / "experts" / "still.yaml")
+    planner_for(experts, STAGES, Store(Runs(tmp_path)), robot_folder("g1"), Options()).plan()
+    assert len(decided) > 20
+    assert set(decided.values()) == {1}
