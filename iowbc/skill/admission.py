@@ -14,6 +14,9 @@ from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2
 """Success of the reference pair, at least, and of a lone robot, at most: four of five trials."""
+DRAGGED = 1.5
+"""Partner force with a passive robot that succeeds, at least, in parts of the reference pair's: a controller that yields
+lets itself be led while it is told to stand, and only the force tells that it does not help."""
 PAIRS: dict[str, tuple[str, Rule]] = {
     "reference": ("path", "lead"),
     "lone robot": (ABSENT, "lead"),
@@ -40,7 +43,8 @@ class Admission:
         found = []
         if self.success["reference"] < SOLVED:
             found.append(f"the reference pair solves {self.success['reference']:.0%}, expected {SOLVED:.0%} or more")
-        for pair in ("lone robot", "passive robot"):
+        led = self.force["passive robot"] >= DRAGGED * self.force["reference"]
+        for pair in ("lone robot",) if led else ("lone robot", "passive robot"):
             if self.success[pair] > UNSOLVED:
                 found.append(f"with a {pair} {self.success[pair]:.0%} succeed, expected {UNSOLVED:.0%} or less")
         if self.reward["ignoring"] >= self.reward["reference"]:
