@@ -32,6 +32,7 @@ PUBLISHED_TO = {
     "blind": "export",
     "compliant": "export",
     "transport": "skill-eval",
+    "transport_all": "skill-eval",
 }
 
 
