@@ -82,7 +82,8 @@ class Judge:
         error = heading_error(moved, memory)
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
         follow(memory, target, error, disturbed, self._task.termination, self._period)
-        ending = self._ending(state, memory, moved, place, error)
+        pushed = state.has_object & ~self._holding
+        ending = self._ending(state, memory, moved, place, error, pushed)
         foot_phase, stance = gait.foot_phase(memory.phase), self._task.references.gait.stance
         step = Step(
             state=state,
@@ -105,16 +106,12 @@ class Judge:
             commanded=gait.wants_to_move(memory.command, self._task.references.gait),
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),
             held=self._holding & state.grasped.any(axis=1),
-            pushed=self._pushed(state),
+            pushed=pushed,
             object_place=place,
             ended=ending.failed,
         )
         scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
         return Judgement(moved, ending, scored, memory.command.copy(), error)
-
-    def _pushed(self, state: SimulationState) -> Mask:
-        """Environments with an object that is not held, (n,)."""
-        return state.has_object & ~self._holding
 
     def _filter(self, memory: Memory, moved: Motion) -> None:
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
@@ -129,10 +126,9 @@ class Judge:
         memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(
-        self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array
+        self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array, pushed: Mask
     ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
-        pushed = self._pushed(state)
         followable = ~pushed & (memory.played[:, LOCOMOTION] <= OWN_RANGES) & self._training
         left = lost(moved, place, pushed & self._training, termination)
         return Ending(

@@ -31,7 +31,7 @@ def test_help_answers_at_once() -> None:
 def test_a_wrong_recipe_fails_at_once(tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("teacher:\n  stebs: 3\n")
-    assert function_calls("-m", "iowbc", "run", str(path)) < 1_200_000
+    assert function_calls("-m", "iowbc", "run", str(path)) < 970_000
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_finished_recipe_is_cached_and_fast(folder: Path, command: Command) ->
     done = command("run", "first.yaml")
     assert done.returncode == 0
     assert done.stdout.count(": cached") == 6
-    assert function_calls(str(SMALL_STAGES), "run", "first.yaml", folder=folder) < 2_400_000
+    assert function_calls(str(SMALL_STAGES), "run", "first.yaml", folder=folder) < 1_940_000
     assert "all stages are cached" in command("plan", "first.yaml").stdout
 
 

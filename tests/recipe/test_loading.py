@@ -274,4 +274,4 @@ def test_a_recipe_is_validated_fast_and_without_heavy_imports(tmp_path: Path) ->
     path = write(tmp_path, "teacher:\n  steps: 4096\n")
     done = subprocess.run([sys.executable, script, path], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-    assert function_calls(str(script), str(path)) < 650_000
+    assert function_calls(str(script), str(path)) < 550_000
