@@ -17,6 +17,7 @@ from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
 from iowbc.recipe.section import Section
+from iowbc.recipe.sentences import sentences
 from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
@@ -212,15 +213,12 @@ def metadata(contract: Contract) -> dict[str, str]:
     }
 
 
-def sentences(section: type[Section], path: str = "") -> dict[str, str]:
-    """The sentence under each field of a section, and of the sections in it, by dotted path."""
-    found = {}
+def meanings(section: type[Section], path: str = "") -> dict[str, str]:
+    """The sentence below each field of a section, and of the sections in it, by dotted path."""
+    found = {f"{path}{name}": sentence.replace("\n", " ") for name, sentence in sentences(section).items()}
     for name, about in section.model_fields.items():
-        place = f"{path}.{name}" if path else name
-        if about.description:
-            found[place] = about.description.replace("\n", " ")
         if isinstance(about.annotation, type) and issubclass(about.annotation, Section):
-            found |= sentences(about.annotation, place)
+            found |= meanings(about.annotation, f"{path}{name}.")
     return found
 
 

@@ -63,7 +63,7 @@ def write_folder(
             sensors=(drawn.sensor_latency.low, drawn.sensor_latency.high),
             object=(drawn.object_latency.low, drawn.object_latency.high),
         ),
-        sentences=contract.sentences(contract.Contract),
+        sentences=contract.meanings(contract.Contract),
         versions={name: version(name) for name in PACKAGES},
         sources=dict(sources),
     )

@@ -66,7 +66,7 @@ class FileBeside(Section):
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """In a recipe that people write it is a path; in a resolved one it has been taken in."""
-        taken: dict[str, Any] = handler.resolve_ref_schema(handler(core))
+        taken: dict[str, Any] = handler.resolve_ref_schema(super().__get_pydantic_json_schema__(core, handler))
         return {"anyOf": [{"type": "string", "description": "Path from the recipe's file."}, taken]}
 
 

@@ -5,8 +5,20 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    PositiveFloat,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from iowbc.recipe.sentences import sentences
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Extra of a field that changes how a stage is carried out or shown, and none of its results."""
@@ -53,6 +65,16 @@ class Section(BaseModel):
     def idle(self) -> bool:
         """True where an entry of a mapping does nothing, so that it might as well not be there."""
         return False
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Each field is described by the sentence below it."""
+        schema = handler(core)
+        fields = handler.resolve_ref_schema(schema).get("properties", {})
+        for name, sentence in sentences(cls).items():
+            if name in fields:
+                fields[name]["description"] = sentence
+        return schema
 
 
 class NamedEntries(Section):
