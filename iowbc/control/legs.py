@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants
+from iowbc.arrays import Array, Constants, namespace
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Hinge
@@ -114,3 +114,15 @@ def _axis(hinge: Hinge) -> str:
     """The coordinate axis about which a hinge turns, or its direction where it is none."""
     found = [name for name, unit in zip("xyz", np.eye(3), strict=True) if np.array_equal(hinge.axis, unit)]
     return found[0] if found else f"({', '.join(f'{value:g}' for value in hinge.axis)})"
+
+
+def direction(angle: Array) -> tuple[Array, Array]:
+    """Cosine and sine."""
+    xp = namespace(angle)
+    return xp.cos(angle), xp.sin(angle)
+
+
+def pitched(direction: tuple[Array, Array], x: Array, z: Array) -> tuple[Array, Array]:
+    """Vectors of the sagittal plane turned as a positive pitch turns them: what points up leans forward."""
+    cosine, sine = direction
+    return cosine * x + sine * z, cosine * z - sine * x

@@ -105,11 +105,13 @@ class ReferenceLayer(Constants):
             return self.default_support + 0.0 * command[:, :1]
         return self.network(arms, command[:, HEIGHT : PITCH + 1])
 
-    def with_stride(self, support: Array, command: Array, phase: Array, stepping: Mask) -> Array:
-        """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]."""
+    def with_stride(
+        self, support: Array, command: Array, phase: Array, stepping: Mask, foothold: Array | None = None
+    ) -> Array:
+        """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]; `foothold` (n, 2) [m]."""
         if self._stride is None:
             return support
-        return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping)
+        return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping, foothold)
 
     def wants_steps(self, measured: Measured, support: Array, command: Array) -> Mask:
         """True where the gait clock has a reason to run, (n,): a commanded velocity, or a fall to be caught."""

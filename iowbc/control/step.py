@@ -15,6 +15,7 @@ from iowbc.arrays import Array, Constants, Mask, namespace
 from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
+from iowbc.control.foothold import FootPlacement
 from iowbc.control.observation import ObservationLayout, Sensed
 from iowbc.control.references import ReferenceLayer
 from iowbc.control.sensors import Measured
@@ -38,6 +39,8 @@ class State:
     """Gait phase in [0, 1), (n, 1)."""
     stepping: Array
     """1 while the gait clock runs, else 0, (n, 1)."""
+    foothold: Array
+    """How far ahead of its place in the stride each foot is put, (n, 2) [m]."""
     begun: Array
     """0 in a state that `settle` made, 1 afterwards, (n, 1)."""
     action: Array
@@ -53,6 +56,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
     "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
     "phase": ("1", "-", "gait phase in [0, 1)"),
     "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
+    "foothold": ("m", "heading", "how far ahead of its place in the stride each foot is put, left and right"),
     "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
     "action": ("action", "joint", "residual action that the motors follow, support order"),
     "history": ("SI", "-", "the last observations, oldest first"),
@@ -89,6 +93,7 @@ class ControlStep(Constants):
         self.references, self.layout, self.policy = references, layout, policy
         self.bound, self.scale = task.action.bound, action_scale(robot, task.action)
         self._gait, self._period = task.references.gait, 1.0 / task.control_frequency
+        self._placement = FootPlacement.of(robot, task.references.gait, self._period)
         self._largest_step = rate_limits(task.commands.rates) * self._period
         self._order = np.argsort(np.concatenate([robot.support, robot.interaction])).tolist()
         self._blank, support, arms = np.zeros((1, history, layout.size)), len(robot.support), len(robot.interaction)
@@ -96,7 +101,9 @@ class ControlStep(Constants):
             "command": (len(COMMAND),),
             "arms": (arms,),
             "posture": (support,),
-            **dict.fromkeys(("heading_reference", "phase", "stepping", "begun"), (1,)),
+            **dict.fromkeys(("heading_reference", "phase", "stepping"), (1,)),
+            "foothold": (2,),
+            "begun": (1,),
             "action": (support,),
             "history": (history, layout.size),
         }
@@ -110,7 +117,8 @@ class ControlStep(Constants):
         command = self.references.clamp(command)
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
-        return State(command, arms, posture, heading, zero, zero, zero, 0.0 * posture, zero[:, None] + self._blank)
+        blank = zero[:, None] + self._blank
+        return State(command, arms, posture, heading, zero, zero, 0.0 * grasp[:, :, 0], zero, 0.0 * posture, blank)
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> Step:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
@@ -123,7 +131,11 @@ class ControlStep(Constants):
         arms, posture = self.references.advance(state.arms, state.posture, command, grasp, self._period)
         arms, posture = xp.where(begun, arms, state.arms), xp.where(begun, posture, state.posture)
         phase, stepping = self._clock(state, measured, command, posture)
-        support = self.references.with_stride(posture, command, phase, stepping)
+        foothold = state.foothold
+        if self._placement is not None:
+            placed = self._placement(foothold, measured, command, phase, 1.0 * stepping)
+            foothold = xp.where(begun, placed, foothold)
+        support = self.references.with_stride(posture, command, phase, stepping, foothold)
         sensed = Sensed(
             measured=measured,
             command=command,
@@ -141,7 +153,7 @@ class ControlStep(Constants):
         held = self.references.arm_target(arms, posture, command, load[:, 0])
         turned = state.heading_reference + command[:, YAW_RATE, None] * self._period
         clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
-        after = State(command, arms, posture, turned, phase[:, None], clock, one, action, history)
+        after = State(command, arms, posture, turned, phase[:, None], clock, foothold, one, action, history)
         return Step(self._joints(support + self.scale * action, held), action, support, after)
 
     def _clock(self, state: State, measured: Measured, command: Array, posture: Array) -> tuple[Array, Mask]:

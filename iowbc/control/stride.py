@@ -15,7 +15,7 @@ import numpy as np
 from iowbc.arrays import Array, Constants, namespace
 from iowbc.control.command import YAW_RATE
 from iowbc.control.gait import foot_phase, swing_height, swing_progress
-from iowbc.control.legs import Legs, leg_geometry, leg_joints
+from iowbc.control.legs import Legs, direction, leg_geometry, leg_joints, pitched
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.description import Robot
 
@@ -53,17 +53,28 @@ class Stride(Constants):
             upper=robot.upper[robot.support],
         )
 
-    def __call__(self, posture: Array, pelvis_pitch: Array, command: Array, phase: Array, stepping: Array) -> Array:
+    def __call__(
+        self,
+        posture: Array,
+        pelvis_pitch: Array,
+        command: Array,
+        phase: Array,
+        stepping: Array,
+        foothold: Array | None = None,
+    ) -> Array:
         """θ_S_ref with the stride, (n, support joints) [rad].
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
-        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero.
+        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `foothold` (n, 2) [m]:
+        how far ahead of its place in the stride each foot is put.
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]
         thigh = pitch + hip
-        x, z = _turned(_direction(thigh), *_ankle(legs, knee))
+        x, z = pitched(direction(thigh), *_ankle(legs, knee))
         ahead, left, up, turn = self._soles(pitch, x, command, phase, stepping)
+        if foothold is not None:
+            ahead = ahead + foothold
         bent, angle = self._bent(x + ahead, z + up)
         running = stepping[:, None]
         change, bend = (angle - thigh) * running, (bent - knee) * running
@@ -117,7 +128,7 @@ def travel(foot: Array, swing: Array, stance: float) -> Array:
 
 def _ankle(legs: Legs, knee: Array) -> tuple[Array, Array]:
     """The ankle ahead of and above the hip pitch axis, in the thigh's frame, (n, 2) [m]."""
-    x, z = _turned(_direction(knee), legs.shank_x, legs.shank_z)
+    x, z = pitched(direction(knee), legs.shank_x, legs.shank_z)
     return legs.thigh_x + x, legs.thigh_z + z
 
 
@@ -127,31 +138,19 @@ def _sideways(legs: Legs, thigh: Array, knee: Array, left: Array, turn: Array) -
     With levers of the three axes (the sole's motion to the left per radian) and their directions a:
     Σ lever·δ = left, Σ a_z·δ = turn, Σ a_x·δ = 0.
     """
-    direction = _direction(thigh)
+    leaning = direction(thigh)
     ankle_x, ankle_z = _ankle(legs, knee)
     sole_x, sole_z = legs.sole_x, legs.sole_z + legs.ankle_roll_z
-    roll_x, roll_z = direction[0], -direction[1]
-    yaw_x, yaw_z = _turned(direction, legs.tilt_x, legs.tilt_z)
-    from_roll = _turned(direction, ankle_x - legs.roll_x, ankle_z - legs.roll_z)
-    from_yaw = _turned(direction, ankle_x - legs.yaw_x, ankle_z - legs.yaw_z)
+    roll_x, roll_z = leaning[0], -leaning[1]
+    yaw_x, yaw_z = pitched(leaning, legs.tilt_x, legs.tilt_z)
+    from_roll = pitched(leaning, ankle_x - legs.roll_x, ankle_z - legs.roll_z)
+    from_yaw = pitched(leaning, ankle_x - legs.yaw_x, ankle_z - legs.yaw_z)
     roll_lever = roll_z * (from_roll[0] + sole_x) - roll_x * (from_roll[1] + sole_z)
     yaw_lever = yaw_z * (from_yaw[0] + sole_x) - yaw_x * (from_yaw[1] + sole_z)
     whole = roll_lever * yaw_z - yaw_lever * roll_z
     hip_roll = (left * yaw_z - yaw_lever * turn) / whole
     hip_yaw = (roll_lever * turn - left * roll_z) / whole
     return hip_roll, hip_yaw, -(roll_x * hip_roll + yaw_x * hip_yaw)
-
-
-def _direction(angle: Array) -> tuple[Array, Array]:
-    """Cosine and sine."""
-    xp = namespace(angle)
-    return xp.cos(angle), xp.sin(angle)
-
-
-def _turned(direction: tuple[Array, Array], x: Array, z: Array) -> tuple[Array, Array]:
-    """Vectors of the sagittal plane turned as a positive pitch turns them: what points up leans forward."""
-    cosine, sine = direction
-    return cosine * x + sine * z, cosine * z - sine * x
 
 
 def _forward(x: Array, z: Array) -> Array:

@@ -10,6 +10,7 @@ from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.chain import Frame
 from iowbc.control.command import HEIGHT, YAW_RATE
+from iowbc.control.foothold import FootPlacement
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
@@ -40,6 +41,7 @@ class Guidance:
         task = specification.recipe.task
         self._settings, self._period = task.references.gait, period
         self.references = ReferenceLayer(robot, task.references, specification.rg)
+        self._placement = FootPlacement.of(robot, task.references.gait, period)
         self.commander = Commander(task, self.references, scripts, holding, pushing, period)
         self.grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
@@ -58,7 +60,7 @@ class Guidance:
         memory.stepping[which] = False
         halves = np.floor(2.0 * random.uniform(key, "gait/phase", 1)[:, 0])
         memory.phase[which] = np.where(self.commander.scripted[which], 0.0, 0.5 * halves)
-        memory.height_rate[which] = 0.0
+        memory.height_rate[which], memory.foothold[which] = 0.0, 0.0
         joints = np.empty((len(which), self._joints))
         joints[:, self._support], joints[:, self._arms] = posture, arms
         return joints, self.references.start_pitch(posture, command)
@@ -77,7 +79,9 @@ class Guidance:
         moving = self.references.wants_steps(measured, posture, memory.command)
         phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
         memory.phase[:], memory.stepping[:] = phase, stepping
-        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping)
+        if self._placement is not None:
+            memory.foothold[:] = self._placement(memory.foothold, measured, memory.command, phase, 1.0 * stepping)
+        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, memory.foothold)
 
     def turn(self, memory: Memory) -> None:
         """Turns the heading reference by the yaw rate that was commanded in the step just made."""

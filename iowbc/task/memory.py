@@ -62,6 +62,8 @@ class Memory:
     """Gait phase, (n,)."""
     stepping: Array
     """Whether the gait clock runs, (n,) bool."""
+    foothold: Array
+    """How far ahead of its place in the stride each foot is put, (n, 2) [m]."""
     arms: Array
     """θ_I_ref, (n, 14) [rad]."""
     posture: Array
@@ -116,6 +118,7 @@ class Memory:
             played=np.zeros((n, len(AXES))),
             command=np.zeros((n, len(COMMAND))),
             goal=np.zeros((n, len(COMMAND))),
+            foothold=np.zeros((n, 2)),
             arms=np.zeros((n, arms)),
             posture=np.zeros((n, support)),
             support=np.zeros((n, support)),

@@ -83,6 +83,20 @@ class Recovery(Section):
     the capture point's angle."""
 
 
+class Placement(Section):
+    """Feedback of the felt speed on where feet land: a robot that is pushed ahead steps further ahead."""
+
+    gain: float = Field(default=0.15, ge=0.0)
+    """Way that a foot lands further ahead for each m/s above the commanded speed [s]. The capture point of a pendulum
+    of 0.7 m is 0.27 s ahead, but the felt speed errs by as much as it varies, 0.15 m/s."""
+    longest: float = Field(default=0.25, ge=0.0)
+    """Longest such way [m]: about half of a leg's swing."""
+    filter_time: float = Field(default=0.1, gt=0.0)
+    """Time over which the last measurements before touch-down count [s]: joint velocities are noisy."""
+    return_time: float = Field(default=0.27, gt=0.0)
+    """Time constant with which a standing foot comes back to its place [s]: sqrt(h / g) of a pendulum of 0.7 m."""
+
+
 class GaitPrior(Section):
     """The gait clock, and the stride that it adds to the support reference while a velocity is commanded."""
 
@@ -112,6 +126,8 @@ class GaitPrior(Section):
     """Commanded yaw rate above which the clock runs [rad/s]."""
     recovery: Recovery | None = Field(default=None, json_schema_extra=LATER)
     """Steps while standing, after a push; empty leaves the clock to the command alone."""
+    placement: Placement | None = Field(default=None, json_schema_extra=LATER)
+    """Where feet land by the felt speed; empty leaves it to the policy."""
 
 
 class References(Section):

@@ -1,0 +1,79 @@
+"""Foot placement by feedback: feet land further ahead, or behind, as the robot is felt to move faster, or slower, than
+commanded (Raibert's rule; the capture point of a pendulum).
+
+The speed is that of the standing leg, or of the one that has stood longer, by joint velocities and gyroscope. While a
+foot swings, its place goes to where it should land; on the ground it comes back under the pelvis as a pendulum's would.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from iowbc.arrays import Array, Constants, namespace
+from iowbc.control.gait import expected_stance, foot_phase, swing_progress
+from iowbc.control.legs import Legs, direction, leg_geometry, leg_joints, pitched
+from iowbc.control.sensors import Measured
+from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.robot.description import Robot
+
+SAGITTAL = (0, 3, 4)
+"""Hip pitch, knee and ankle pitch among the joints of a leg."""
+
+
+@dataclass(frozen=True)
+class FootPlacement(Constants):
+    """The feedback of a robot. Holds constants only."""
+
+    settings: GaitPrior
+    legs: Legs
+    joints: tuple[tuple[int, ...], ...]
+    """Places of hip pitch, knee and ankle pitch, left and right, among all joints."""
+    period: float
+    """[s]."""
+
+    @classmethod
+    def of(cls, robot: Robot, settings: GaitPrior, period: float) -> Self | None:
+        """The feedback of a robot whose control period is `period` [s], or none where it is switched off."""
+        if not settings.enabled or settings.placement is None:
+            return None
+        left, right = leg_joints(robot)
+        places = tuple((int(robot.support[left[j]]), int(robot.support[right[j]])) for j in SAGITTAL)
+        return cls(settings, leg_geometry(robot), places, period)
+
+    def __call__(self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array) -> Array:
+        """How far ahead of its place in the stride each foot is put, (n, 2) [m], one control period later.
+
+        `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
+        """
+        gait, period, feedback = self.settings, self.period, self.settings.placement
+        assert feedback is not None
+        foot, running = foot_phase(phase), stepping[:, None]
+        standing = 1.0 * expected_stance(foot, stepping > 0.5, gait.stance)
+        longer = running * (standing * (foot >= gait.stance - 0.5)) + 0.5 * (1.0 - running)
+        speed = (longer * self.speed(measured)).sum(1)
+        wanted = (feedback.gain * (speed - command[:, 0])).clip(-feedback.longest, feedback.longest)[:, None]
+        left = (1.0 - swing_progress(foot, gait.stance)) * ((1.0 - gait.stance) / gait.frequency)
+        landing = foothold + (wanted - foothold) * (period / (left + feedback.filter_time))
+        kept = foothold * float(np.exp(-period / feedback.return_time))
+        placed: Array = (standing * kept + (1.0 - standing) * landing) * running
+        return placed
+
+    def speed(self, measured: Measured) -> Array:
+        """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""
+        xp, legs, gravity = namespace(measured.heading), self.legs, measured.projected_gravity
+        angle = xp.arctan2(gravity[:, 0], -gravity[:, 2])[:, None]
+        rate = measured.base_angular_velocity[:, 1:2]
+        segments: Sequence[tuple[Array, Array]] = (
+            (legs.hip_x, legs.hip_z),
+            (legs.thigh_x, legs.thigh_z),
+            (legs.shank_x, legs.shank_z),
+            (legs.sole_x, legs.sole_z),
+        )
+        speed = -rate * pitched(direction(angle), *segments[0])[1]
+        for joint, segment in zip(self.joints, segments[1:], strict=True):
+            angle = angle + measured.joint_position[:, list(joint)]
+            rate = rate + measured.joint_velocity[:, list(joint)]
+            speed = speed - rate * pitched(direction(angle), *segment)[1]
+        return speed
