@@ -79,7 +79,10 @@ def graph_of(
 
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
-    return Recipe.model_validate({"name": "test", "export": {"acceptance": [], "golden_steps": 5}})
+    gait = {"recovery": {}, "placement": {}}
+    return Recipe.model_validate(
+        {"name": "test", "task": {"references": {"gait": gait}}, "export": {"acceptance": [], "golden_steps": 5}}
+    )
 
 
 @pytest.fixture(scope="session")

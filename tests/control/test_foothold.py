@@ -1,0 +1,106 @@
+"""Foot placement by the felt speed."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iowbc.control.foothold import FootPlacement
+from iowbc.control.legs import leg_joints
+from iowbc.control.sensors import Measured
+from iowbc.recipe.task.joint_references import GaitPrior, Placement
+from iowbc.robot.description import Robot
+
+FEEDBACK = Placement(gain=0.2, longest=0.25, filter_time=0.001)
+PRIOR = GaitPrior(placement=FEEDBACK)
+PERIOD, STEP = 0.02, 1e-6
+
+
+@pytest.fixture(scope="module")
+def placement(robot: Robot) -> FootPlacement:
+    made = FootPlacement.of(robot, PRIOR, PERIOD)
+    assert made is not None
+    return made
+
+
+def sagittal(robot: Robot, random: np.random.Generator) -> tuple[Any, Any]:
+    """Positions and velocities of all joints; of the legs only those about the lateral axis differ from the default."""
+    position, velocity = robot.default_position.copy(), np.zeros(len(robot.joints))
+    for leg in leg_joints(robot):
+        for joint in (0, 3, 4):
+            place = robot.support[leg[joint]]
+            position[place] += random.uniform(-0.3, 0.3)
+            velocity[place] = random.uniform(-2.0, 2.0)
+        for joint in (1, 2, 5):
+            position[robot.support[leg[joint]]] = 0.0
+    return position, velocity
+
+
+def ahead(robot: Robot, position: Any, pitch: float, side: int) -> float:
+    """How far a sole is ahead of the base, heading frame [m]."""
+    place, _ = robot.tree.forward(dict(zip(robot.joints, position, strict=True)), robot.base, robot.soles[side])
+    return float(np.cos(pitch) * place[0] + np.sin(pitch) * place[2])
+
+
+def measured(robot: Robot, position: Any, velocity: Any, pitch: float, rate: float) -> Measured:
+    return Measured(
+        projected_gravity=np.array([[np.sin(pitch), 0.0, -np.cos(pitch)]]),
+        base_angular_velocity=np.array([[0.0, rate, 0.0]]),
+        heading=np.zeros((1, 1)),
+        joint_position=position[None],
+        joint_velocity=velocity[None],
+    )
+
+
+def moving(robot: Robot, speed: float) -> Measured:
+    """A robot in its default posture that turns over its feet at such a speed."""
+    position = robot.default_position
+    unit = FootPlacement.of(robot, PRIOR, PERIOD)
+    assert unit is not None
+    still = np.zeros(len(position))
+    per_rate = unit.speed(measured(robot, position, still, 0.0, 1.0)).mean()
+    return measured(robot, position, still, 0.0, speed / per_rate)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_felt_speed_is_that_of_a_base_over_a_foot_at_rest(
+    robot: Robot, placement: FootPlacement, seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    position, velocity = sagittal(robot, random)
+    pitch, rate = random.uniform(-0.3, 0.5), random.uniform(-1.0, 1.0)
+    felt = placement.speed(measured(robot, position, velocity, pitch, rate))[0]
+    for side in range(2):
+        ends = [ahead(robot, position + way * velocity, pitch + way * rate, side) for way in (-STEP, STEP)]
+        assert felt[side] == pytest.approx(-(ends[1] - ends[0]) / (2.0 * STEP), abs=0.01)
+
+
+@pytest.mark.parametrize("excess", [0.4, -0.3])
+@pytest.mark.parametrize("start", [0.0, 0.5])
+def test_a_swinging_foot_lands_where_the_speed_beyond_the_commanded_one_asks_for(
+    robot: Robot, placement: FootPlacement, excess: float, start: float
+) -> None:
+    command = np.zeros((1, 11))
+    command[:, 0] = 0.3
+    foothold, ones, swinging = np.zeros((1, 2)), np.ones(1), 1 if start == 0.0 else 0
+    for phase in np.arange(PRIOR.stance - 0.5, 0.5, PRIOR.frequency * PERIOD) + start:
+        foothold = placement(foothold, moving(robot, 0.3 + excess), command, np.array([phase % 1.0]), ones)
+    assert foothold[0, swinging] == pytest.approx(0.2 * excess, rel=0.1)
+    assert foothold[0, 1 - swinging] == 0.0, "the other foot stands"
+
+
+def test_a_foot_on_the_ground_comes_back_and_no_step_is_longer_than_allowed(
+    robot: Robot, placement: FootPlacement
+) -> None:
+    command, ones = np.zeros((1, 11)), np.ones(1)
+    fast = moving(robot, 9.0)
+    landed = placement(np.array([[0.2, 0.0]]), fast, command, np.array([0.2]), ones)
+    assert landed[0, 0] == pytest.approx(0.2 * np.exp(-PERIOD / FEEDBACK.return_time))
+    landing = placement(np.array([[0.0, 0.25]]), fast, command, np.array([0.49]), ones)
+    assert landing[0, 1] == pytest.approx(0.25)
+    np.testing.assert_array_equal(placement(np.full((1, 2), 0.2), fast, command, np.zeros(1), np.zeros(1)), 0.0)
+
+
+def test_without_the_setting_or_the_prior_there_is_none(robot: Robot) -> None:
+    assert FootPlacement.of(robot, GaitPrior(), PERIOD) is None
+    assert FootPlacement.of(robot, PRIOR.model_copy(update={"enabled": False}), PERIOD) is None
