@@ -31,10 +31,10 @@ types: setup
 	$(BIN)/mypy
 
 check: lint types
-	$(BIN)/pytest -m "unit and not slow"
+	$(BIN)/pytest -n 2 -m "unit and not slow"
 
 test: lint types
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 -v
 
 run: setup
 	$(BIN)/iowbc run recipes/quickstart.yaml

@@ -3,9 +3,11 @@
 import signal
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
+from xdist.scheduler import LoadFileScheduling
 
 from iowbc.robot.description import DESCRIPTION, Robot, load_robot, robot_folder
 
@@ -15,6 +17,11 @@ TIERS = {
     "system": {"chaos", "commands", "pipeline", "web"},
 }
 """Folders of each tier; a file may choose another by its `pytestmark`, and one beside the folders is a unit test."""
+RAY = {
+    *("tests/commands/test_smoke.py", "tests/pipeline/test_actor_pool.py", "tests/pipeline/test_cluster.py"),
+    *("tests/pipeline/test_cluster_parts.py", "tests/stages/test_training_stages.py"),
+}
+"""Files whose tests start clusters, of which a machine has one at a time."""
 STIFF = ("waist_roll", "waist_pitch", "wrist_pitch", "wrist_yaw")
 """Joints that the robot of 29 joints has and the one of 23 has not."""
 
@@ -26,6 +33,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not any(item.get_closest_marker(tier) for tier in TIERS):
             folder = item.path.relative_to(Path(__file__).parent).parts[0]
             item.add_marker(next((tier for tier, folders in TIERS.items() if folder in folders), "unit"))
+
+
+class Scheduling(LoadFileScheduling):  # type: ignore[misc]
+    """The tests of a file follow each other in one process, and so do all that start clusters."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = str(super()._split_scope(nodeid))
+        return "ray" if file in RAY else file
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Scheduling:
+    """Which process has which tests."""
+    return Scheduling(config, log)
 
 
 @pytest.fixture(scope="session", autouse=True)
