@@ -1,11 +1,9 @@
 """Kinematics of both arms, many rows at once: forward, Jacobian, damped differential IK (paper eq. 2, 3)."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from iowbc.arrays import Array, Constants, namespace, stacked
-from iowbc.control.chain import Chain, Frame, jacobian, rotated, rotated_back, turned
+from iowbc.arrays import Array, Constants, namespace
+from iowbc.control.chain import Chain, Frames, crossed, product, rotated_back, turn
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Body
@@ -53,6 +51,7 @@ class ArmKinematics(Constants):
         self._lower, self._upper = by_arm(self.lower[None]), by_arm(self.upper[None])
         self._chain, self._waist = Chain(chains), Chain([waist])
         self._grip = robot.grip_offset.T[:, :, None]
+        self._identity = np.eye(3)[:, :, None, None]
 
     def forward(self, arm_position: Array) -> tuple[Array, Array]:
         """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one)."""
@@ -64,15 +63,15 @@ class ArmKinematics(Constants):
         """Wrists (3, 2, n) [m] and their Jacobian (3, joints, 2, n), of positions (joints, 2, n) [rad]."""
         return self._reached(self._chain.frames(position))
 
-    def _reached(self, frames: Sequence[Frame]) -> tuple[Array, Array]:
-        wrist = frames[-1].origin + rotated(frames[-1].rotation, self._grip)
-        return wrist, jacobian(frames, wrist)
+    def _reached(self, frames: Frames) -> tuple[Array, Array]:
+        wrist = frames.end(self._grip)
+        return wrist, frames.jacobian(wrist)
 
-    def frames(self, arm_position: Array) -> list[Frame]:
+    def frames(self, arm_position: Array) -> Frames:
         """The hinges of both arms, of `arm_position` (n, arm joints) [rad]."""
         return self._chain.frames(by_arm(arm_position))
 
-    def solve_step(self, arm_position: Array, target: Array, dt: float, frames: Sequence[Frame] | None = None) -> Array:
+    def solve_step(self, arm_position: Array, target: Array, dt: float, frames: Frames | None = None) -> Array:
         """One step of differential IK (paper eq. 3), damped, with the redundancy drawn to the rest posture.
 
         `arm_position` (n, arm joints) [rad]; `target` wrist positions (n, 2, 3) [m] in the torso frame; `dt` [s];
@@ -88,7 +87,7 @@ class ArmKinematics(Constants):
         damping = settings.damping**2 + settings.reach * distance.clip(None, settings.longest_step)
         posture = settings.posture_gain * dt * (self._rest - position)
         wanted = error - (columns * posture).sum(1)
-        step = posture + (columns * _solved(columns, damping, wanted)[:, None]).sum(0)
+        step = posture + (columns * _solved(columns, self._identity * damping, wanted)[:, None]).sum(0)
         moved = position + step.clip(-self._speed * dt, self._speed * dt)
         return by_row(moved.clip(self._lower, self._upper))
 
@@ -100,8 +99,8 @@ class ArmKinematics(Constants):
 
     def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
         """Points (n, k, 3) [m] of the heading frame at the base, as the torso frame sees them; the rest as below."""
-        torso, xp = self._torso(waist, pelvis_pitch, None), namespace(points)
-        seen: Array = xp.swapaxes(rotated_back(torso.rotation, xp.swapaxes(points, 0, 2) - torso.origin), 0, 2)
+        (rotation, origin), xp = self._torso(waist, pelvis_pitch, None), namespace(points)
+        seen: Array = xp.swapaxes(rotated_back(rotation, xp.swapaxes(points, 0, 2) - origin), 0, 2)
         return seen
 
     def torso_in_heading(
@@ -111,29 +110,21 @@ class ArmKinematics(Constants):
 
         `waist` (n, waist joints): positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
         """
-        torso = self._torso(waist, pelvis_pitch, pelvis_roll)
-        return np.stack([column[:, 0].T for column in torso.rotation], axis=2), torso.origin[:, 0].T
+        rotation, origin = self._torso(waist, pelvis_pitch, pelvis_roll)
+        return np.moveaxis(rotation[:, :, 0], -1, 0), origin[:, 0].T
 
-    def _torso(self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None) -> Frame:
-        """The last hinge of the waist in the heading frame at the base."""
-        pelvis = self._waist.turned(Y, pelvis_pitch[None])
+    def _torso(self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None) -> tuple[Array, Array]:
+        """Rotation (3, 3, 1, n) and origin (3, 1, n) [m] of the waist's last hinge in the heading frame at the base."""
+        pelvis = turn(Y, pelvis_pitch[None])
         if pelvis_roll is not None:
-            pelvis = turned(pelvis, X, pelvis_roll[None])
-        return self._waist.frames(waist.T[:, None], pelvis)[-1]
+            pelvis = product(pelvis, turn(X, pelvis_roll[None]))
+        frames = self._waist.frames(waist.T[:, None], pelvis)
+        return frames.rotation[-1], frames.origin[-1]
 
 
 def _solved(columns: Array, damping: Array, wanted: Array) -> Array:
-    """(JJᵀ + damping)⁻¹ wanted by Cramer's rule, (3, 2, n), of a Jacobian (3, joints, 2, n), damping (2, n)."""
-    x, y, z = columns
-    (xx, yy, zz), (yz, zx, xy) = (
-        [(a * a).sum(0) + damping for a in (x, y, z)],
-        [(a * b).sum(0) for a, b in ((y, z), (z, x), (x, y))],
-    )
-    first, second, third = yy * zz - yz * yz, yz * zx - xy * zz, xy * yz - yy * zx
-    a, b, c = wanted
-    middle, corner, last = zz * xx - zx * zx, xy * zx - yz * xx, xx * yy - xy * xy
-    solved: Array = stacked(
-        [first * a + second * b + third * c, second * a + middle * b + corner * c, third * a + corner * b + last * c]
-    )
-    inverse: Array = solved / (xx * first + xy * second + zx * third)
-    return inverse
+    """(JJᵀ + damping)⁻¹ wanted by Cramer's rule, (3, 2, n), of a Jacobian (3, joints, 2, n), damping (3, 3, 2, n)."""
+    matrix = (columns[:, None] * columns[None]).sum(2) + damping
+    cofactors = crossed(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
+    solved: Array = (cofactors * wanted[None]).sum(1) / (matrix[:, 0] * cofactors[:, 0]).sum(0)
+    return solved

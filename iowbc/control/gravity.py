@@ -1,12 +1,10 @@
 """Torques with which the arms carry their own weight, and a load in the hands: a feed-forward for their motors."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from iowbc.arrays import Array, Constants, namespace
+from iowbc.arrays import Array, Constants, namespace, stacked
 from iowbc.control.arms import arm_chains, by_arm, by_row
-from iowbc.control.chain import Chain, Frame, combined, crossed, entries, rotated, rotated_back
+from iowbc.control.chain import Chain, Frames, crossed, rotated, rotated_back
 from iowbc.robot.description import GRAVITY, Robot
 
 
@@ -17,11 +15,11 @@ class ArmGravity(Constants):
         chains, waist = arm_chains(robot)
         self._arms, self._waist = Chain(chains), Chain([waist])
         hinges = self._arms.length
-        moment, mass = np.zeros((hinges, 3, 2)), np.zeros((hinges, 2, 1))
+        moment, mass = np.zeros((hinges, 3, 2, 1)), np.zeros((hinges, 1, 2, 1))
         for side, chain in enumerate(chains):
             for place, body in enumerate(body for body in chain if body.hinge is not None):
-                mass[place, side], moment[place, :, side] = robot.tree.burden(body.name)
-        self._mass, self._moment = mass, tuple(map(entries, moment))
+                mass[place, :, side], moment[place, :, side, 0] = robot.tree.burden(body.name)
+        self._mass, self._moment = mass, moment
         self._outward = np.cumsum(mass[::-1], axis=0)[::-1].copy()
         self._grip = robot.grip_offset.T[:, :, None]
 
@@ -31,7 +29,7 @@ class ArmGravity(Constants):
         waist: Array,
         gravity: Array,
         load: Array | None = None,
-        frames: Sequence[Frame] | None = None,
+        frames: Frames | None = None,
     ) -> Array:
         """Motor torques that hold the arms still, (n, arms) [N·m], in the order of the interaction branch.
 
@@ -43,15 +41,15 @@ class ArmGravity(Constants):
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
         """
         xp, frames = namespace(arms), frames or self._arms.frames(by_arm(arms))
-        torso = self._waist.frames(waist.T[:, None])[-1].rotation
+        torso = self._waist.frames(waist.T[:, None]).rotation[-1]
         down = GRAVITY * rotated_back(torso, gravity.T[:, None])
-        moments, mass = [0.0 * frames[-1].origin], self._outward
+        own = self._mass * frames.origin + rotated(frames.rotation, self._moment)
+        mass, moments = self._outward, [own[-1]]
         if load is not None:
             mass = mass + load.T
-            moments = [load.T * (frames[-1].origin + rotated(frames[-1].rotation, self._grip))]
-        for hinge in reversed(range(len(frames))):
-            own = self._mass[hinge] * frames[hinge].origin + combined(frames[hinge].rotation, self._moment[hinge])
-            moments.append(moments[-1] + own)
-        axes, origins = (xp.stack([getattr(frame, name) for frame in frames], 1) for name in ("axis", "origin"))
-        lever = xp.stack(moments[:0:-1], 1) - mass * origins
-        return by_row(-(crossed(axes, lever) * down[:, None]).sum(0))
+            moments = [own[-1] + load.T * frames.end(self._grip)]
+        for hinge in reversed(range(len(own) - 1)):
+            moments.append(moments[-1] + own[hinge])
+        lever = stacked(moments[::-1]) - mass * frames.origin
+        torque = (crossed(xp.swapaxes(frames.axis, 0, 1), xp.swapaxes(lever, 0, 1)) * down[:, None]).sum(0)
+        return by_row(-torque)

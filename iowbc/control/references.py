@@ -3,14 +3,13 @@
 Pure arrays over n environments; the exported graph is traced from the same lines.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from iowbc.arrays import Array, Constants, Mask, as_slice, namespace
 from iowbc.control.arms import ArmKinematics
-from iowbc.control.chain import Frame
+from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.gait import is_falling, wants_to_move
 from iowbc.control.gravity import ArmGravity
@@ -93,7 +92,7 @@ class ReferenceLayer(Constants):
         command: Array,
         grasp: Array,
         dt: float,
-        frames: Sequence[Frame] | None = None,
+        frames: Frames | None = None,
     ) -> tuple[Array, Array]:
         """References one control period later; shapes as in `start`. `frames` of `arms`, where they are known."""
         arms = self.arms.solve_step(arms, self.wrist_target(support, command, grasp), dt, frames)
@@ -145,7 +144,7 @@ class ReferenceLayer(Constants):
         return wrists
 
     def arm_target(
-        self, arms: Array, support: Array, command: Array, load: Array, frames: Sequence[Frame] | None = None
+        self, arms: Array, support: Array, command: Array, load: Array, frames: Frames | None = None
     ) -> Array:
         """Targets of the arms' joint controllers, (n, arm joints) [rad]: the references and what balances the weight of
         the arms and of a load (n,) [kg] between the hands, θ + τ / kp, in the posture of the references. `frames` of

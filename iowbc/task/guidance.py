@@ -8,7 +8,7 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
 from iowbc.control import gait
 from iowbc.control.action import action_scale
-from iowbc.control.chain import Frame
+from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, YAW_RATE
 from iowbc.control.foothold import FootPlacement
 from iowbc.control.references import ReferenceLayer, both_wrists
@@ -46,7 +46,7 @@ class Guidance:
         self.grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
         self._load = np.array([getattr(task.references.loads, name) for name in scenes])
-        self._frames: Sequence[Frame] | None = None
+        self._frames: Frames | None = None
         """Of the arms' references in the step being made: from its targets to the references of the next."""
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iowbc.control.chain import Chain, jacobian, rotated, rotated_back
+from iowbc.control.chain import Chain, rotated, rotated_back, turn
 from iowbc.robot import rotations
 
 LENGTH, ROWS = 4, 5
@@ -56,21 +56,21 @@ def test_points_axes_and_jacobian_are_those_of_the_matrices(axes: list[Any], ran
     chains = [[body(pair[side], random) for pair in pairs] for side in range(2)]
     angle, grip = random.normal(size=(LENGTH, 2, ROWS)), random.normal(size=3)
     frames = Chain(chains).frames(angle)
-    end = frames[-1].origin + rotated(frames[-1].rotation, grip[:, None, None])
-    columns = jacobian(frames, end)
+    end = frames.end(grip[:, None, None])
+    columns = frames.jacobian(end)
     for side, chain in enumerate(chains):
         for row in range(ROWS):
             rotation, position, origins, hinges = by_matrices(chain, angle[:, side, row])
             point = position + rotation @ grip
             expected = [np.cross(axis, point - origin) for axis, origin in zip(hinges, origins, strict=True)]
             np.testing.assert_allclose(columns[:, :, side, row].T, expected, atol=1e-12)
-            np.testing.assert_allclose([frame.axis[:, side, row] for frame in frames], hinges, atol=1e-12)
+            np.testing.assert_allclose(frames.axis[:, :, side, row], hinges, atol=1e-12)
             assert end[:, side, row] == pytest.approx(point)
 
 
 def test_rotating_back_undoes_a_rotation(random: np.random.Generator) -> None:
     chain = Chain([[body([0, 0, 1], random), body(unit(random), random)]])
-    rotation = chain.frames(random.normal(size=(2, 1, ROWS)))[-1].rotation
+    rotation = chain.frames(random.normal(size=(2, 1, ROWS))).rotation[-1]
     vector = random.normal(size=(3, 1, ROWS))
     assert rotated_back(rotation, rotated(rotation, vector)) == pytest.approx(vector)
 
@@ -82,19 +82,19 @@ def test_a_base_may_be_turned(axis: int, random: np.random.Generator) -> None:
         random.normal(size=(1, 1, ROWS)),
         random.normal(size=(1, ROWS)),
     )
-    level, tilted = chain.frames(angle)[0], chain.frames(angle, chain.turned(axis, base))[0]
+    level, tilted = (frames.origin[0] for frames in (chain.frames(angle), chain.frames(angle, turn(axis, base))))
     matrices = rotations.axis_matrix(np.eye(3)[axis], base[0])
-    assert pytest.approx(np.einsum("nij,jn->ni", matrices, level.origin[:, 0])) == tilted.origin[:, 0].T
+    assert pytest.approx(np.einsum("nij,jn->ni", matrices, level[:, 0])) == tilted[:, 0].T
 
 
 def test_a_body_without_a_hinge_is_fixed_to_the_one_before(random: np.random.Generator) -> None:
     chain = [body([0, 0, 1], random), body([1, 0, 0], random), body([0, 1, 0], random)]
     chain[1].hinge = None
     angle, point = random.normal(size=(2, 1, 1)), random.normal(size=3)
-    last = Chain([chain]).frames(angle)[-1]
+    frames = Chain([chain]).frames(angle)
     chain[1].hinge = SimpleNamespace(axis=np.array([1, 0, 0]))
     rotation, position, _, _ = by_matrices(chain, [angle[0, 0, 0], 0.0, angle[1, 0, 0]])
-    carried = last.origin + rotated(last.rotation, point[:, None, None])
+    carried = frames.end(point[:, None, None])
     assert carried.ravel() == pytest.approx(position + rotation @ point)
 
 
@@ -110,7 +110,7 @@ def test_the_example_of_the_docstring(random: np.random.Generator) -> None:
     upper.quaternion = lower.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     upper.position, lower.position = np.zeros(3), np.array([0.2, 0.0, 0.0])
     frames = Chain([[upper, lower]]).frames(np.full((2, 1, 1), np.pi / 2))
-    end = frames[-1].origin + rotated(frames[-1].rotation, np.array([0.3, 0.0, 0.0])[:, None, None])
+    end = frames.end(np.array([0.3, 0.0, 0.0])[:, None, None])
     assert end[:, 0, 0] == pytest.approx([0.0, 0.2, -0.3])
-    assert jacobian(frames, end)[:, 0, 0, 0] == pytest.approx([-0.2, 0.0, 0.0])
-    assert jacobian(frames, end)[:, 1, 0, 0] == pytest.approx([0.0, -0.3, 0.0])
+    assert frames.jacobian(end)[:, 0, 0, 0] == pytest.approx([-0.2, 0.0, 0.0])
+    assert frames.jacobian(end)[:, 1, 0, 0] == pytest.approx([0.0, -0.3, 0.0])
