@@ -43,7 +43,7 @@ class FootPlacement(Constants):
         return cls(settings, leg_geometry(robot), places, period)
 
     def __call__(self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array) -> Array:
-        """How far ahead of its place in the stride each foot is put, (n, 2) [m], one control period later.
+        """Forward offset of each foot from its nominal place in the stride one control period later, (n, 2) [m].
 
         `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
         """

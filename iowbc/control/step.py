@@ -40,7 +40,7 @@ class State:
     stepping: Array
     """1 while the gait clock runs, else 0, (n, 1)."""
     foothold: Array
-    """How far ahead of its place in the stride each foot is put, (n, 2) [m]."""
+    """Forward offset of each foot from its nominal place in the stride, (n, 2) [m]."""
     begun: Array
     """0 in a state that `settle` made, 1 afterwards, (n, 1)."""
     action: Array
@@ -56,7 +56,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
     "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
     "phase": ("1", "-", "gait phase in [0, 1)"),
     "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
-    "foothold": ("m", "heading", "how far ahead of its place in the stride each foot is put, left and right"),
+    "foothold": ("m", "heading", "forward offset of left and right foot from the nominal place in the stride"),
     "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
     "action": ("action", "joint", "residual action that the motors follow, support order"),
     "history": ("SI", "-", "the last observations, oldest first"),

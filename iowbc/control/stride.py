@@ -66,7 +66,7 @@ class Stride(Constants):
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
         `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `foothold` (n, 2) [m]:
-        how far ahead of its place in the stride each foot is put.
+        forward offset of each foot from its nominal place in the stride.
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]

@@ -63,7 +63,7 @@ class Memory:
     stepping: Array
     """Whether the gait clock runs, (n,) bool."""
     foothold: Array
-    """How far ahead of its place in the stride each foot is put, (n, 2) [m]."""
+    """Forward offset of each foot from its nominal place in the stride, (n, 2) [m]."""
     arms: Array
     """θ_I_ref, (n, 14) [rad]."""
     posture: Array

@@ -37,7 +37,7 @@ def sagittal(robot: Robot, random: np.random.Generator) -> tuple[Any, Any]:
 
 
 def ahead(robot: Robot, position: Any, pitch: float, side: int) -> float:
-    """How far a sole is ahead of the base, heading frame [m]."""
+    """Forward distance of a sole from the base, heading frame [m]."""
     place, _ = robot.tree.forward(dict(zip(robot.joints, position, strict=True)), robot.base, robot.soles[side])
     return float(np.cos(pitch) * place[0] + np.sin(pitch) * place[2])
 

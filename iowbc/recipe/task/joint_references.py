@@ -84,7 +84,7 @@ class Recovery(Section):
 
 
 class Placement(Section):
-    """Feedback of the felt speed on where feet land: a robot that is pushed ahead steps further ahead."""
+    """Feedback of the estimated forward speed on footholds: a robot that is pushed ahead steps further ahead."""
 
     gain: float = Field(default=0.15, ge=0.0)
     """Way that a foot lands further ahead for each m/s above the commanded speed [s]. The capture point of a pendulum
@@ -127,7 +127,7 @@ class GaitPrior(Section):
     recovery: Recovery | None = Field(default=None, json_schema_extra=LATER)
     """Steps while standing, after a push; empty leaves the clock to the command alone."""
     placement: Placement | None = Field(default=None, json_schema_extra=LATER)
-    """Where feet land by the felt speed; empty leaves it to the policy."""
+    """Feedback of the estimated forward speed on footholds; empty leaves them to the policy."""
 
 
 class References(Section):
