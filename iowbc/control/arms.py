@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants, namespace
-from iowbc.control.chain import Chain, Frames, crossed, product, rotated_back, turn
+from iowbc.arrays import Array, Constants, namespace, stacked
+from iowbc.control.chain import Chain, Frames, crossed, product, turn
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Body
@@ -99,8 +99,10 @@ class ArmKinematics(Constants):
 
     def into_torso(self, waist: Array, pelvis_pitch: Array, points: Array) -> Array:
         """Points (n, k, 3) [m] of the heading frame at the base, as the torso frame sees them; the rest as below."""
-        (rotation, origin), xp = self._torso(waist, pelvis_pitch, None), namespace(points)
-        seen: Array = xp.swapaxes(rotated_back(rotation, xp.swapaxes(points, 0, 2) - origin), 0, 2)
+        xp, cosine, sine = namespace(points), namespace(points).cos(pelvis_pitch), namespace(points).sin(pelvis_pitch)
+        x, y, z = xp.swapaxes(points, 0, 2)
+        at_pelvis = stacked([cosine * x - sine * z, y, sine * x + cosine * z])
+        seen: Array = xp.swapaxes(self._waist.inward(waist.T[:, None], at_pelvis), 0, 2)
         return seen
 
     def torso_in_heading(
@@ -110,16 +112,11 @@ class ArmKinematics(Constants):
 
         `waist` (n, waist joints): positions [rad], as in the chain; `pelvis_pitch`, `pelvis_roll` (n,) [rad].
         """
-        rotation, origin = self._torso(waist, pelvis_pitch, pelvis_roll)
-        return np.moveaxis(rotation[:, :, 0], -1, 0), origin[:, 0].T
-
-    def _torso(self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None) -> tuple[Array, Array]:
-        """Rotation (3, 3, 1, n) and origin (3, 1, n) [m] of the waist's last hinge in the heading frame at the base."""
         pelvis = turn(Y, pelvis_pitch[None])
         if pelvis_roll is not None:
             pelvis = product(pelvis, turn(X, pelvis_roll[None]))
         frames = self._waist.frames(waist.T[:, None], pelvis)
-        return frames.rotation[-1], frames.origin[-1]
+        return np.moveaxis(frames.rotation[-1, :, :, 0], -1, 0), frames.origin[-1, :, 0].T
 
 
 def _solved(columns: Array, damping: Array, wanted: Array) -> Array:

@@ -100,8 +100,7 @@ class Chain(Constants):
 
     def frames(self, angle: Array, base: Array | None = None) -> Frames:
         """The hinges, for angles (hinges, chains, n) [rad]; `base` (3, 3, chains, n) turns the whole chain."""
-        xp, by = namespace(angle), angle[:, None, None]
-        local = self._turn[:, 0] + self._turn[:, 1] * xp.cos(by) + self._turn[:, 2] * xp.sin(by)
+        xp, local = namespace(angle), self._local(angle)
         rotation = [local[0] if base is None else product(base, local[0])]
         for hinge in range(1, self.length):
             rotation.append(product(rotation[-1], local[hinge]))
@@ -110,6 +109,25 @@ class Chain(Constants):
         first = self._offset[:1] + 0.0 * after[:1, 0] if base is None else rotated(base, self._offset[0])[None]
         origin = xp.cumsum(xp.concatenate([first, before]), 0)
         return Frames(after, origin, rotated(after, self._axis))
+
+    def inward(self, angle: Array, points: Array) -> Array:
+        """Points (3, k, n) [m] of the frame that the chains hang on, as the last bodies see them; angles as in
+        `frames`."""
+        for rotation, offset in zip(self._local(angle), self._offset, strict=True):
+            points = rotated_back(rotation, points - offset)
+        return points
+
+    def turned_inward(self, angle: Array, directions: Array) -> Array:
+        """As `inward`, of directions."""
+        for rotation in self._local(angle):
+            directions = rotated_back(rotation, directions)
+        return directions
+
+    def _local(self, angle: Array) -> Array:
+        """Rotation of each body in the frame of the one before, (hinges, 3, 3, chains, n)."""
+        xp, by = namespace(angle), angle[:, None, None]
+        turned: Array = self._turn[:, 0] + self._turn[:, 1] * xp.cos(by) + self._turn[:, 2] * xp.sin(by)
+        return turned
 
 
 def _by_hinge(values: Sequence[Sequence[Array]]) -> Array:

@@ -61,9 +61,9 @@ def swing_progress(foot_phase: Array, stance: float) -> Array:
     return progress
 
 
-def swing_height(foot_phase: Array, gait: GaitPrior) -> Array:
-    """Height of the soles above the ground by the recipe's profile, (n, 2) [m]."""
-    sine = namespace(foot_phase).sin(np.pi * swing_progress(foot_phase, gait.stance))
+def swing_height(progress: Array, gait: GaitPrior) -> Array:
+    """Height of the soles above the ground by the recipe's profile, of their progress in swing, (n, 2) [m]."""
+    sine = namespace(progress).sin(np.pi * progress)
     height: Array = gait.swing_clearance * (sine if gait.profile == "sine" else sine * sine)
     return height
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace, stacked
 from iowbc.control.arms import arm_chains, by_arm, by_row
-from iowbc.control.chain import Chain, Frames, crossed, rotated, rotated_back
+from iowbc.control.chain import Chain, Frames, crossed, rotated
 from iowbc.robot.description import GRAVITY, Robot
 
 
@@ -41,8 +41,7 @@ class ArmGravity(Constants):
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
         """
         xp, frames = namespace(arms), frames or self._arms.frames(by_arm(arms))
-        torso = self._waist.frames(waist.T[:, None]).rotation[-1]
-        down = GRAVITY * rotated_back(torso, gravity.T[:, None])
+        down = GRAVITY * self._waist.turned_inward(waist.T[:, None], gravity.T[:, None])
         own = self._mass * frames.origin + rotated(frames.rotation, self._moment)
         mass, moments = self._outward, [own[-1]]
         if load is not None:

@@ -100,7 +100,7 @@ class Stride(Constants):
         return (
             part * (command[:, 0:1] - rate * legs.side),
             part * (command[:, 1:2] + rate * place_x) - sway,
-            swing_height(foot, gait) * stepping[:, None],
+            swing_height(swing, gait) * stepping[:, None],
             part * rate,
         )
 

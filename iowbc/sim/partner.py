@@ -136,7 +136,7 @@ class Partner:
 
     def _derive(self) -> None:
         """What follows from the shares and behaviours that were drawn."""
-        self._any = bool(self._present.any())
+        self._any, self._steers = bool(self._present.any()), bool(self.steered.any())
         there = self._present > 0.0
         self._which = [np.flatnonzero(there & (self._behaviour == kind)) for kind in range(len(BEHAVIOURS))]
         sign = np.sign(self._share)
@@ -157,7 +157,7 @@ class Partner:
         velocity = self._path(commanded)
         state.partner_velocity[:] = velocity * self._present[:, None]
         along = velocity[:, :2] / (_length(velocity) + self._slow)[:, None]
-        if self.steered.any():
+        if self._steers:
             own = self._own_way / (_length(self._own_way) + HESITANT)[:, None]
             along = np.where(self.steered[:, None], own, along)
         lead = self._aim + velocity * self._period - self._at
@@ -181,7 +181,7 @@ class Partner:
         self._steps += 1
         out[:, :3] = force
         out[:, 3:] = rotations.cross(self._arm, force)
-        if self.steered.any():
+        if self._steers:
             out[:, 5] += self._twist(state)
 
     def _twist(self, state: SimulationState) -> Array:
@@ -218,9 +218,11 @@ class Partner:
         velocity[:, 1] = sine * wanted[:, 0] + cosine * wanted[:, 1] + wanted[:, 2] * offset_x
         velocity[:, :2] *= self._pace[:, None]
         velocity[:, 2] = wanted[:, 3]
-        self._own_way = velocity[:, :2].copy()
-        rate = np.where(self.steered, 0.0, wanted[:, 2])
-        self._turn_rate = np.where(self.steered, wanted[:, 2], 0.0)
+        rate = wanted[:, 2]
+        if self._steers:
+            self._own_way = velocity[:, :2].copy()
+            self._turn_rate = np.where(self.steered, rate, 0.0)
+            rate = rate - self._turn_rate
         if len(self._which[LEADER]):
             rate = rate + self._lead(self._which[LEADER], wanted, velocity)
         if len(self._which[STOPPING]):

@@ -79,9 +79,11 @@ class Guidance:
         moving = self.references.wants_steps(measured, posture, memory.command)
         phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
         memory.phase[:], memory.stepping[:] = phase, stepping
+        foothold = None
         if self._placement is not None:
-            memory.foothold[:] = self._placement(memory.foothold, measured, memory.command, phase, 1.0 * stepping)
-        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, memory.foothold)
+            foothold = self._placement(memory.foothold, measured, memory.command, phase, 1.0 * stepping)
+            memory.foothold[:] = foothold
+        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, foothold)
 
     def turn(self, memory: Memory) -> None:
         """Turns the heading reference by the yaw rate that was commanded in the step just made."""

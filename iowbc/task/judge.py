@@ -101,7 +101,7 @@ class Judge:
             action=action,
             previous_action=memory.action,
             earlier_action=memory.earlier_action,
-            swing_profile=gait.swing_height(foot_phase, self._task.references.gait),
+            swing_profile=gait.swing_height(gait.swing_progress(foot_phase, stance), self._task.references.gait),
             stepping=memory.stepping,
             commanded=gait.wants_to_move(memory.command, self._task.references.gait),
             stance=gait.expected_stance(foot_phase, memory.stepping, stance),

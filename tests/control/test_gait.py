@@ -49,14 +49,16 @@ def test_the_feet_swing_in_turn_and_both_stand_in_between() -> None:
 
 
 def test_soles_swing_along_a_half_wave() -> None:
-    height = gait.swing_height(np.array([[0.3, 0.6], [0.8, 0.7]]), PRIOR)
+    progress = gait.swing_progress(np.array([[0.3, 0.6], [0.8, 0.7]]), PRIOR.stance)
+    height = gait.swing_height(progress, PRIOR)
     assert height == pytest.approx(np.array([[0.0, 0.0], [0.08, 0.08 * np.sin(np.pi / 4)]]), abs=1e-12)
 
 
 def test_a_profile_at_rest_lifts_off_and_lands_without_speed() -> None:
     phase = np.linspace(0.0, 1.0, 10_001)[:-1, None]
-    rest = gait.swing_height(phase, GaitPrior(profile="rest"))[:, 0]
-    sine = gait.swing_height(phase, GaitPrior())[:, 0]
+    progress = gait.swing_progress(phase, PRIOR.stance)
+    rest = gait.swing_height(progress, GaitPrior(profile="rest"))[:, 0]
+    sine = gait.swing_height(progress, GaitPrior())[:, 0]
     assert rest.max() == pytest.approx(sine.max()) == pytest.approx(0.08)
     speed = np.abs(np.diff(rest)) / np.diff(phase[:, 0])
     assert speed[[5800, 5801, -1]] == pytest.approx(0.0, abs=0.01), "the sine has 0.6 m a stride"
