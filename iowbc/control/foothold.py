@@ -36,7 +36,7 @@ class FootPlacement(Constants):
     @classmethod
     def of(cls, robot: Robot, settings: GaitPrior, period: float) -> Self | None:
         """The feedback of a robot whose control period is `period` [s], or none where it is switched off."""
-        if not settings.enabled or settings.placement is None:
+        if settings.placement is None:
             return None
         left, right = leg_joints(robot)
         places = tuple((int(robot.support[left[j]]), int(robot.support[right[j]])) for j in SAGITTAL)

@@ -110,6 +110,11 @@ def test_a_name_that_reads_as_something_else_is_text_wherever_it_is_read_again(t
     assert load_recipe(kept).recipe == recipe
 
 
+def test_feedback_on_the_feet_of_a_gait_prior_that_is_off_is_refused(tmp_path: Path) -> None:
+    (text,) = problems(tmp_path, "task: {references: {gait: {enabled: false, placement: {}}}}\n")
+    assert "placement: moves the feet of the gait prior, which `enabled: false` leaves out" in text
+
+
 def test_a_number_where_text_belongs_is_asked_for_in_quotes(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "name: 1e3\n")
     assert text == "mine.yaml:1:1: key 'name' = 1000.0: should be text; in quotes, a word that reads as a number is"

@@ -129,6 +129,12 @@ class GaitPrior(Section):
     placement: Placement | None = Field(default=None, json_schema_extra=LATER)
     """Feedback of the estimated forward speed on footholds; empty leaves them to the policy."""
 
+    @model_validator(mode="after")
+    def _feet_are_moved(self) -> Self:
+        if self.placement is not None and not self.enabled:
+            raise ValueError("placement: moves the feet of the gait prior, which `enabled: false` leaves out; empty one")
+        return self
+
 
 class References(Section):
     """The reference generation layer of the control loop."""
