@@ -1,4 +1,4 @@
-"""The commands. Nothing heavy is imported before a command needs it, so that `iowbc --help` answers at once."""
+"""The commands. Heavy imports wait until a command needs them, so that `iowbc --help` is fast."""
 
 import contextlib
 import os
@@ -64,7 +64,7 @@ app = typer.Typer(
     context_settings={"max_content_width": 120},
 )
 bench = typer.Typer(
-    help="Measure the speed of this machine, physics engines, or a public controller.",
+    help="Benchmark this machine, physics engines, or a public controller.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )

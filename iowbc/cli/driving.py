@@ -14,9 +14,9 @@ What = Annotated[
 ]
 Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
 Domain = Annotated[int, typer.Option(help="DDS domain; the G1's is 0.", min=0, max=230)]
-Scene = Annotated[str, typer.Option(help="Scene: base grasp and expected load.", metavar="SCENE")]
+Scene = Annotated[str, typer.Option(help="Scene, which sets grasp and expected load.", metavar="SCENE")]
 InStep = Annotated[
-    bool, typer.Option("--lockstep", help="Let robot and simulated robot wait for each other, on a busy machine.")
+    bool, typer.Option("--lockstep", help="Synchronise with the other process step by step, on a busy machine.")
 ]
 Seconds = Annotated[float, typer.Option(help="End after this time [s].", min=0.0)]
 
@@ -30,7 +30,7 @@ def robot(
         str, typer.Option(help="Source of commands: remote, keyboard or udp:PORT.", metavar="SOURCE")
     ] = "keyboard",
     log: Annotated[Path | None, typer.Option(help="Log every message to this new file.", metavar="MCAP")] = None,
-    waive: Annotated[list[str] | None, typer.Option(help="Go on where this check fails (repeatable).")] = None,
+    waive: Annotated[list[str] | None, typer.Option(help="Ignore a failure of this check (repeatable).")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send nothing.")] = False,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
@@ -58,17 +58,17 @@ def robot_sim(
     network: Network = "lo",
     domain: Domain = 0,
     scene: Scene = "free",
-    mass: Annotated[float | None, typer.Option(help="Object mass [kg] (default: drawn).", min=0.0)] = None,
+    mass: Annotated[float | None, typer.Option(help="Object mass [kg] (default: random).", min=0.0)] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
     support: Annotated[
         Literal["band", "fixture", "none"] | None,
-        typer.Option(help="What holds the robot at first (default: band, with an object fixture)."),
+        typer.Option(help="Initial support of the robot (default: band; with an object: fixture)."),
     ] = None,
-    release: Annotated[float, typer.Option(help="Time with full gains until it lets go [s].", min=0.0)] = 3.0,
+    release: Annotated[float, typer.Option(help="Time at full gains before the support releases [s].", min=0.0)] = 3.0,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
 ) -> None:
-    """Simulate a robot on the bus, to be driven by `iowbc robot`."""
+    """Simulate a robot on the bus, which `iowbc robot` can drive."""
     from iowbc.commands.robot import simulated_robot
 
     simulated_robot(

@@ -1,4 +1,4 @@
-"""`status`, `ls`, `show`, `diff`, `compare`, `report`, `ui` and `gc`: runs and artifacts, listed and side by side."""
+"""`status`, `ls`, `show`, `diff`, `compare`, `report`, `ui` and `gc`: list, compare and remove runs and artifacts."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,7 @@ from iowbc.commands import completion
 
 
 def status(as_json: AsJson = False, runs: RunsFolder = None) -> None:
-    """Show what runs, what was left unfinished, and what each recipe has."""
+    """Show running and unfinished stages, and the artifacts of each recipe."""
     from iowbc.commands.listing import print_status
 
     print_status(store_in(runs), console(), as_json)
@@ -39,15 +39,15 @@ def show(what: Named, as_json: AsJson = False, runs: RunsFolder = None) -> None:
 def gc(
     unused: Annotated[bool, typer.Option("--unused", help="Remove artifacts that no recipe uses.")] = False,
     recipe: Annotated[
-        list[str] | None, typer.Option(help="Remove this recipe's record and the artifacts used by it alone.")
+        list[str] | None, typer.Option(help="Remove this recipe's record and the artifacts that only it uses.")
     ] = None,
     work: Annotated[bool, typer.Option("--work", help="Remove checkpoints of unfinished stages.")] = False,
     damaged: Annotated[bool, typer.Option("--damaged", help="Remove artifacts set aside as damaged.")] = False,
-    older_than: Annotated[float, typer.Option(help="Minimum age of what is removed.", min=0.0, metavar="DAYS")] = 0.0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="List what would be removed, remove nothing.")] = False,
+    older_than: Annotated[float, typer.Option(help="Minimum age of removed items.", min=0.0, metavar="DAYS")] = 0.0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the removals without removing anything.")] = False,
     runs: RunsFolder = None,
 ) -> None:
-    """Remove artifacts and checkpoints; refuses without a scope."""
+    """Remove artifacts and checkpoints, selected by at least one option."""
     from iowbc.commands.gc import Scope, collect
 
     scope = Scope(unused, tuple(recipe or ()), work, damaged, older_than)
@@ -65,7 +65,7 @@ def compare(
     recipes: Annotated[
         list[str],
         typer.Argument(
-            help="Finished recipes, two or more, or a study.",
+            help="Two or more finished recipes, or a study.",
             metavar="RECIPE...",
             autocompletion=completion.ran,
         ),
@@ -77,7 +77,7 @@ def compare(
     as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
-    """Write tables and figures over several runs."""
+    """Compare several runs in tables and figures."""
     from iowbc.commands.compare import compare as write_comparison
 
     write_comparison(store_in(runs), console(), recipes, output, film, as_json)
@@ -86,16 +86,16 @@ def compare(
 def report(
     recipes: Annotated[
         list[str],
-        typer.Argument(help="Finished recipes, one or more.", metavar="RECIPE...", autocompletion=completion.ran),
+        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
     output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
     log: Annotated[
         Path | None,
-        typer.Option(help="Replay and draw this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
+        typer.Option(help="Replay and plot this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
     ] = None,
     runs: RunsFolder = None,
 ) -> None:
-    """Write one HTML page about runs: tables, interactive curves, films, differences; it opens without a network."""
+    """Write one HTML page about runs: tables, interactive curves, films, differences; readable offline."""
     from iowbc.commands.compare import report as write_report
 
     if log is not None:
@@ -111,7 +111,7 @@ def report(
 def ui(
     port: Annotated[int, typer.Option(help="Local port.", min=1, max=65535)] = 5000, runs: RunsFolder = None
 ) -> None:
-    """Open MLflow's web interface on the runs, for this machine alone."""
+    """Open MLflow's web interface for the runs, on this machine only."""
     from iowbc.commands.ui import serve
 
     raise typer.Exit(serve(runs_folder(runs), console(), port))

@@ -1,4 +1,4 @@
-"""The benchmarks: of this machine, `bench engines` of two engines, `bench carry` of a public controller."""
+"""Benchmarks of this machine, of two physics engines (`bench engines`) and of a public controller (`bench carry`)."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,10 +14,10 @@ def bench_simulation(
     scene: SceneName = "lift",
     environments: Annotated[int, typer.Option(help="Environments per worker.", min=1)] = 48,
     workers: BenchWorkers = None,
-    others: Annotated[bool, typer.Option(help="Also measure the usual vector environments (default: on).")] = True,
+    others: Annotated[bool, typer.Option(help="Also measure other vector environments (default: on).")] = True,
     runs: RunsFolder = None,
 ) -> None:
-    """Measure how fast the vector environment steps, against a bare loop of MuJoCo; the figures go to MLflow."""
+    """Measure the vector environment's speed against a bare MuJoCo loop; results go to MLflow."""
     from iowbc.commands.bench import simulation
 
     simulation(runs_folder(runs), recipe, scene=scene, environments=environments, workers=workers or (), others=others)
@@ -33,14 +33,14 @@ def bench_training(
     ] = None,
     runs: RunsFolder = None,
 ) -> None:
-    """Measure how fast the teacher trains, against plain stable-baselines3; the figures go to MLflow."""
+    """Measure the teacher's training speed against plain stable-baselines3; results go to MLflow."""
     from iowbc.commands.bench import training
 
     training(runs_folder(runs), recipe, scene=scene, turns=turns, others=others)
 
 
 def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: RunsFolder = None) -> None:
-    """Measure how fast the reference generator's samples are labelled, by each method; the figures go to MLflow."""
+    """Measure the speed of each labelling method of the reference generator; results go to MLflow."""
     from iowbc.commands.bench import reference
 
     reference(runs_folder(runs), recipe, workers=workers or ())
@@ -55,7 +55,7 @@ def bench_control(
     ],
     steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
 ) -> None:
-    """Measure how long a control step of an exported controller takes on one thread, without torch or a simulator."""
+    """Measure the control step's time of an exported controller on one thread, without torch or a simulator."""
     from iowbc.commands.bench import control
 
     control(what, steps)
@@ -70,13 +70,13 @@ def bench_carry(
         typer.Option(help="Its adapter: a Python file, `holosoma` or `deploy`.", metavar="FILE"),
     ],
     arms: Annotated[
-        Literal["measured", "default"], typer.Option(help="How it observes the arms: as they are, or at its default.")
+        Literal["measured", "default"], typer.Option(help="Arm posture that it observes: measured, or its default.")
     ] = "measured",
-    posture: Annotated[bool, typer.Option("--posture", help="Also give it commanded height and torso pitch.")] = False,
+    posture: Annotated[bool, typer.Option("--posture", help="Also send it commanded height and torso pitch.")] = False,
     workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
-    out: Annotated[Path, typer.Option(help="Page to write.", metavar="FILE")] = Path("carry.md"),
+    out: Annotated[Path, typer.Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
 ) -> None:
-    """Measure a controller that others trained in a fixed suite of lifts and pushes, and write a page of results."""
+    """Evaluate a public controller on a fixed suite of lifts and pushes, and write a page of results."""
     from iowbc.commands.bench_carry import carry
 
     carry(policy, adapter, arms=arms, posture=posture, workers=workers, out=out)

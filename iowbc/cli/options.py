@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take, and what they stand for."""
+"""Arguments and options of several commands, and functions that interpret them."""
 
 import os
 import sys
@@ -33,11 +33,11 @@ Overrides = Annotated[
 RunsFolder = Annotated[
     Path | None,
     typer.Option(
-        "--runs", help="Folder of artifacts and tracking (default: $IOWBC_RUNS or ./runs).", envvar="IOWBC_RUNS"
+        "--runs", help="Folder of artifacts and tracking data (default: $IOWBC_RUNS or ./runs).", envvar="IOWBC_RUNS"
     ),
 ]
 SweepFile = Annotated[
-    Path | None, typer.Option("--from", help="YAML file with the grid, the draws, or both, of a sweep.", metavar="YAML")
+    Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
 ]
 Until = Annotated[
     str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
@@ -56,7 +56,7 @@ Address = Annotated[
     typer.Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"),
 ]
 Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Show what would run, as `plan` does.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
 BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]

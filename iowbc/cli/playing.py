@@ -1,4 +1,4 @@
-"""`play` and `export`: a policy to watch, to drive and to show to others."""
+"""`play` and `export`: watch, drive and share a policy."""
 
 from pathlib import Path
 from typing import Annotated
@@ -35,7 +35,7 @@ def play(
     port: Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)] = None,
     runs: RunsFolder = None,
 ) -> None:
-    """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
+    """Watch a trained policy in the viewer, drive it in the browser, or record a film."""
     from iowbc.commands.play import PORT, PlayRequest, play_on_web, play_word
     from iowbc.errors import UsageError
 
@@ -62,7 +62,7 @@ def export(
     web: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],
     runs: RunsFolder = None,
 ) -> None:
-    """Write an exported controller as a web page, in which the robot moves on the visitor's machine (needs npm)."""
+    """Write a web page that simulates an exported controller in the browser (needs npm)."""
     from iowbc.commands.export import export_page
 
     export_page(store_in(runs), console(), what, web)

@@ -1,4 +1,4 @@
-"""`init`, `schema` and `doctor`: before the first run."""
+"""`init`, `schema` and `doctor`: commands to prepare the first run."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +12,7 @@ def init(
     folder: Annotated[Path, typer.Argument(help="Folder to create or to fill.", metavar="DIR")],
     robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
 ) -> None:
-    """Copy the recipes and a robot's description into a folder to begin from."""
+    """Copy the recipes and a robot description into a folder of your own."""
     from iowbc.commands.init import begin
 
     begin(folder, robot, console())

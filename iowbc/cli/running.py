@@ -1,4 +1,4 @@
-"""`run`, `sweep`, `plan` and `publish`: what makes a recipe's artifacts, or says what would."""
+"""`run`, `sweep`, `plan` and `publish`: make, plan and publish a recipe's artifacts."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -43,7 +43,7 @@ def run(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print one line per progress step.")] = False,
     runs: RunsFolder = None,
 ) -> None:
-    """Run a recipe: make every stage that is not cached, and resume what was interrupted."""
+    """Run a recipe: run every stage that is not cached, and resume interrupted ones."""
     from iowbc.commands.plan import plan as print_plan
     from iowbc.commands.run import run as run_recipe
     from iowbc.stages.registry import STAGES
@@ -65,7 +65,7 @@ def sweep(
         list[str] | None,
         typer.Option(
             "--set",
-            help="Values to vary (a,b or 0..4) or to override (repeatable: a grid).",
+            help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
             metavar="A.B.C=VALUES",
             autocompletion=completion.paths,
         ),
@@ -73,7 +73,7 @@ def sweep(
     file: SweepFile = None,
     jobs: Annotated[
         int | None,
-        typer.Option(help="Parallel points, which share the cores (default: 1, or all cores of Ray).", min=1),
+        typer.Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
     ] = None,
     points: Annotated[int, typer.Option(help="Maximum number of points.", min=1)] = 1_000,
     until: Until = None,
@@ -86,7 +86,7 @@ def sweep(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON (with --dry-run).")] = False,
     runs: RunsFolder = None,
 ) -> None:
-    """Run a recipe with every combination of some values; stages that points share are made once."""
+    """Run a recipe with every combination of given values; shared stages run once."""
     from iowbc.commands.sweep import SweepRequest, plan_sweep
     from iowbc.commands.sweep import sweep as run_sweep
     from iowbc.stages.registry import STAGES
@@ -112,7 +112,7 @@ def plan(
     as_json: AsJson = False,
     runs: RunsFolder = None,
 ) -> None:
-    """Say for each stage whether it is cached or would run, why, and how long it takes."""
+    """Show whether each stage is cached or would run, the reason, and the expected time."""
     from iowbc.commands.plan import plan as print_plan
     from iowbc.commands.sweep import SweepRequest, plan_sweep
     from iowbc.stages.registry import STAGES
@@ -137,7 +137,7 @@ def publish(
     ] = None,
     runs: RunsFolder = None,
 ) -> None:
-    """Put a recipe's finished artifacts into the repository (runs/published): a fresh clone starts from them."""
+    """Copy a recipe's finished artifacts to the repository (runs/published), where a fresh clone finds them."""
     from iowbc.commands.publish import publish_recipe
     from iowbc.stages.registry import STAGES
 
