@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from iowbc.cli.options import console
+from iowbc.cli.options import Port, Web, console, page_port
 from iowbc.commands import completion
 
 What = Annotated[
@@ -67,6 +67,8 @@ def robot_sim(
     release: Annotated[float, typer.Option(help="Time with full gains until it lets go [s].", min=0.0)] = 3.0,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
+    web: Web = False,
+    port: Port = None,
 ) -> None:
     """Simulate a robot on the bus, to be driven by `iowbc robot`."""
     from iowbc.commands.robot import simulated_robot
@@ -83,4 +85,5 @@ def robot_sim(
         release=release,
         lockstep=lockstep,
         seconds=seconds,
+        port=page_port(web, port),
     )

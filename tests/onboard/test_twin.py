@@ -71,3 +71,20 @@ def test_the_state_tells_what_the_sensors_deliver(twin: Twin) -> None:
     assert state["crc"] == messages.checksum(state)
     np.testing.assert_allclose(state["motor_state"]["q"][:29], seen.joint_position[0], atol=1e-6)
     np.testing.assert_allclose(state["imu_state"]["gyroscope"], seen.base_angular_velocity[0], atol=1e-6)
+
+
+def test_a_fixture_is_released_when_asked_and_a_band_lowers_the_robot_and_slackens() -> None:
+    fixture, band = Support("fixture", np.inf), Support("band", np.inf)
+    released = []
+    for turn in range(4000):
+        if turn == 10:
+            fixture.let_go()
+            band.let_go()
+        for support in (fixture, band):
+            support.advance(0.002, stiff=False)
+        released.append(fixture.just_released)
+        if turn in (5, 1000):
+            assert band.force(np.zeros(3), np.zeros(3))[2] > 200.0
+            assert band.waits == fixture.rigid == (turn == 5)
+    assert np.flatnonzero(released).tolist() == [10]
+    assert not band.force(np.zeros(3), np.zeros(3)).any()
