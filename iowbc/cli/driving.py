@@ -29,6 +29,9 @@ def robot(
     commands: Annotated[
         str, typer.Option(help="Source of commands: remote, keyboard or udp:PORT.", metavar="SOURCE")
     ] = "keyboard",
+    object_pose: Annotated[
+        str | None, typer.Option(help="Source of the object's pose: udp:PORT (default: with the commands).")
+    ] = None,
     log: Annotated[Path | None, typer.Option(help="Log every message to this new file.", metavar="MCAP")] = None,
     waive: Annotated[list[str] | None, typer.Option(help="Go on where this check fails (repeatable).")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send nothing.")] = False,
@@ -45,6 +48,7 @@ def robot(
         domain=domain,
         scene=scene,
         commands=commands,
+        object_pose=object_pose,
         log=log,
         waived=waive or (),
         dry_run=dry_run,

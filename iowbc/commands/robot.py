@@ -42,6 +42,7 @@ def robot(
     domain: int,
     scene: str,
     commands: str,
+    object_pose: str | None,
     log: Path | None,
     waived: Collection[str],
     dry_run: bool,
@@ -55,13 +56,14 @@ def robot(
     from iowbc.onboard.limits import LIMITS
     from iowbc.onboard.log import LogWriter
     from iowbc.onboard.machine import Machine
-    from iowbc.onboard.operators import Keyboard, Ranges, Udp, operator, single_keys
+    from iowbc.onboard.operators import Keyboard, Ranges, Seeing, Udp, object_poses, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
     from iowbc.onboard.replay import export_digest
 
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
+    poses = None if object_pose is None else object_poses(object_pose, controller.contract)
     stop = _stop_request()
     bus = DdsBus(network, domain)
     with ExitStack() as stack:
@@ -80,8 +82,9 @@ def robot(
         writer = None if log is None else stack.enter_context(LogWriter(log, about))
         if isinstance(source, Keyboard):
             stack.enter_context(single_keys())
-        if isinstance(source, Udp):
-            stack.callback(source.close)
+        for port in (source, poses):
+            if isinstance(port, Udp):
+                stack.callback(port.close)
         source.wanted(0.0, None)  # what was asked for before the robot was ready
         pace = "in step with the simulated robot" if lockstep else prefer_this_process()
         tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
@@ -89,7 +92,7 @@ def robot(
         times = drive(
             bus,
             Machine(controller, scene),
-            source,
+            source if poses is None else Seeing(source, poses),
             clock,
             seconds=seconds,
             log=writer,
