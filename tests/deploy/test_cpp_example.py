@@ -29,7 +29,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     include = next((place for place in places if (place / HEADER).is_file()), None)
     library = next(Path(onnxruntime.__file__).parent.glob("capi/libonnxruntime.so.*"), None)
     if compiler is None or include is None or library is None:
-        pytest.skip(f"compiler {compiler}, {HEADER} in {include} (set ORT_INCLUDE), library {library}: one is missing")
+        pytest.skip(f"compiler {compiler}, {HEADER} in {include} (set ORT_INCLUDE), library {library}: all are needed")
     folder = tmp_path_factory.mktemp("step")
     (folder / "libonnxruntime.so.1").symlink_to(library)
     words = [compiler, "-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", "-isystem", str(include)]
