@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from iowbc.cli.options import console
+from iowbc.cli.options import Port, Web, console, page_port
 from iowbc.commands import completion
 
 What = Annotated[
@@ -29,6 +29,9 @@ def robot(
     commands: Annotated[
         str, typer.Option(help="Source of commands: remote, keyboard or udp:PORT.", metavar="SOURCE")
     ] = "keyboard",
+    object_pose: Annotated[
+        str | None, typer.Option(help="Source of the object's pose: udp:PORT (default: with the commands).")
+    ] = None,
     log: Annotated[Path | None, typer.Option(help="Log every message to this new file.", metavar="MCAP")] = None,
     waive: Annotated[list[str] | None, typer.Option(help="Ignore a failure of this check (repeatable).")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send nothing.")] = False,
@@ -45,6 +48,7 @@ def robot(
         domain=domain,
         scene=scene,
         commands=commands,
+        object_pose=object_pose,
         log=log,
         waived=waive or (),
         dry_run=dry_run,
@@ -67,6 +71,8 @@ def robot_sim(
     release: Annotated[float, typer.Option(help="Time at full gains before the support releases [s].", min=0.0)] = 3.0,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
+    web: Web = False,
+    port: Port = None,
 ) -> None:
     """Simulate a robot on the bus, which `iowbc robot` can drive."""
     from iowbc.commands.robot import simulated_robot
@@ -83,4 +89,5 @@ def robot_sim(
         release=release,
         lockstep=lockstep,
         seconds=seconds,
+        port=page_port(web, port),
     )

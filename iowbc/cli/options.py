@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from iowbc.commands import completion
+from iowbc.commands.needs import PORT
+from iowbc.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -64,6 +66,8 @@ BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worke
 OnCodeChange = Annotated[
     Literal["report", "rerun"], typer.Option(help="Policy for cached stages whose code has changed.")
 ]
+Web = Annotated[bool, typer.Option("--web", help="Interactive viewer in the browser (no display needed).")]
+Port = Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Named = Annotated[
     str,
@@ -73,6 +77,13 @@ Named = Annotated[
         autocompletion=completion.artifacts,
     ),
 ]
+
+
+def page_port(web: bool, port: int | None) -> int | None:
+    """The port of a page; None where there is to be none. Raises UsageError for a port without a page."""
+    if port is not None and not web:
+        raise UsageError("--port is that of the page that --web serves; give both")
+    return port or PORT if web else None
 
 
 def console() -> "Console":

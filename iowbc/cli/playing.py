@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from iowbc.cli.options import RunsFolder, SceneName, console, store_in
+from iowbc.cli.options import Port, RunsFolder, SceneName, Web, console, page_port, store_in
 from iowbc.commands import completion
 
 
@@ -31,21 +31,25 @@ def play(
     video: Annotated[
         Path | None, typer.Option(help="Record a film instead of opening a window.", metavar="MP4")
     ] = None,
-    web: Annotated[bool, typer.Option("--web", help="Interactive viewer in the browser (no display needed).")] = False,
-    port: Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)] = None,
+    web: Web = False,
+    port: Port = None,
     runs: RunsFolder = None,
 ) -> None:
+<<<<<<< HEAD
     """Watch a trained policy in the viewer, drive it in the browser, or record a film."""
     from iowbc.commands.play import PORT, PlayRequest, play_on_web, play_word
     from iowbc.errors import UsageError
+=======
+    """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
+    from iowbc.commands.play import PlayRequest, play_on_web, play_word
+>>>>>>> twin
 
+    page = page_port(web, port)
     request = PlayRequest(
         scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
     )
-    if web:
-        play_on_web(store_in(runs), console(), what, stage, request, port or PORT)
-    elif port is not None:
-        raise UsageError("--port is that of the page that --web serves; give both")
+    if page is not None:
+        play_on_web(store_in(runs), console(), what, stage, request, page)
     else:
         raise typer.Exit(play_word(store_in(runs), console(), what, stage, request))
 

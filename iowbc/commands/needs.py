@@ -11,6 +11,8 @@ MODULES = (
 )
 """Modules of the larger packages that `iowbc[train]` brings; they come together."""
 HOST = "127.0.0.1"
+PORT = 8080
+"""Port of a page where no other is asked for."""
 LAST_PORT = 65_535
 
 

@@ -39,8 +39,6 @@ from iowbc.stages.registry import STAGES
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
 
-PORT = 8080
-"""Port of the page where no other is asked for."""
 NOTHING: Mapping[str, Artifact] = MappingProxyType({})
 
 

@@ -10,17 +10,22 @@ from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 
+from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
 from iowbc.commands.printed import plain_table, tell
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError, require_known
 
 if TYPE_CHECKING:
+    from iowbc.live.remote_view import RemoteView
     from iowbc.onboard.checks import Check
     from iowbc.onboard.process import Clock
+    from iowbc.twin.robot import Twin
 
 LISTENING = 3.0
 """For how long the bus is listened to before the checks [s]; the battery's state comes once or twice a second."""
+POLLING = 5
+"""Periods of the bus between two looks for a request of the page."""
 
 
 def require_bus(command: str) -> None:
@@ -37,6 +42,7 @@ def robot(
     domain: int,
     scene: str,
     commands: str,
+    object_pose: str | None,
     log: Path | None,
     waived: Collection[str],
     dry_run: bool,
@@ -50,13 +56,14 @@ def robot(
     from iowbc.onboard.limits import LIMITS
     from iowbc.onboard.log import LogWriter
     from iowbc.onboard.machine import Machine
-    from iowbc.onboard.operators import Keyboard, Ranges, Udp, operator, single_keys
+    from iowbc.onboard.operators import Keyboard, Ranges, Seeing, Udp, object_poses, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
     from iowbc.onboard.replay import export_digest
 
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
+    poses = None if object_pose is None else object_poses(object_pose, controller.contract)
     stop = _stop_request()
     bus = DdsBus(network, domain)
     with ExitStack() as stack:
@@ -75,8 +82,9 @@ def robot(
         writer = None if log is None else stack.enter_context(LogWriter(log, about))
         if isinstance(source, Keyboard):
             stack.enter_context(single_keys())
-        if isinstance(source, Udp):
-            stack.callback(source.close)
+        for port in (source, poses):
+            if isinstance(port, Udp):
+                stack.callback(port.close)
         source.wanted(0.0, None)  # what was asked for before the robot was ready
         pace = "in step with the simulated robot" if lockstep else prefer_this_process()
         tell(console, f"{pace}; zero torque; commands from {commands}; Ctrl+C damps and ends")
@@ -84,7 +92,7 @@ def robot(
         times = drive(
             bus,
             Machine(controller, scene),
-            source,
+            source if poses is None else Seeing(source, poses),
             clock,
             seconds=seconds,
             log=writer,
@@ -129,16 +137,17 @@ def simulated_robot(
     release: float,
     lockstep: bool,
     seconds: float,
+    port: int | None,
 ) -> None:
-    """Simulate a robot on the bus until it is stopped."""
+    """Simulate a robot on the bus until it is stopped; `port` of a page that shows it, None for no page."""
     require_bus("robot-sim")
-    from iowbc.commands.needs import require_training
-
     require_training("robot-sim")
+    if port is not None:
+        require_viewer()
+        require_free(port)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.operators import Ranges
-    from iowbc.onboard.process import PERIOD
     from iowbc.twin.process import serve
     from iowbc.twin.robot import Twin
     from iowbc.twin.support import Support
@@ -156,19 +165,46 @@ def simulated_robot(
     posture = controller.settled_posture(Ranges(controller.contract).standing)[0]
     frequency = controller.contract.control_frequency
     twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
+    stop, told = _stop_request(), False
+    view = None
+    if port is not None:
+        from iowbc.live.remote_view import RemoteView
+
+        view = RemoteView(twin.simulation, port)
+        tell(console, f"http://{HOST}:{port}")
     bus = DdsBus(network, domain)
     tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
-    stop, told = _stop_request(), False
 
     def watch(robot: Twin) -> None:
-        nonlocal told
+        nonlocal told, view
+        if view is not None and robot.periods % POLLING == 0:
+            try:
+                _show(robot, view)
+            except EOFError:
+                view = None
+                tell(console, "the page has ended; the robot goes on")
         if robot.fallen and not told:
             told = True
-            tell(console, f"{robot.periods * PERIOD:8.3f} s  fallen")
+            tell(console, f"{robot.time:8.3f} s  fallen")
 
     def going() -> bool:
-        return not stop.is_set() and twin.periods * PERIOD < seconds
+        return not stop.is_set() and twin.time < seconds
 
     serve(bus, twin, going, lockstep=lockstep, each=watch, answer=bus.answer_mode_requests)
     tell(console, twin.verdict)
     bus.close()
+    if view is not None:
+        view.close()
+
+
+def _show(twin: "Twin", view: "RemoteView") -> None:
+    """Sends the page the picture that it asks for, and applies what its visitor did. Raises EOFError without a page."""
+    if (asked := view.asked()) is None:
+        return
+    simulation, support = twin.simulation, twin.support
+    if asked.release:
+        support.let_go()
+    simulation.planned_push[0] = asked.pulls["robot"]
+    simulation.planned_impulse[0] = asked.pulls["object"] if simulation.state.has_object[0] else 0.0
+    held = f", held by {support.kind}" if support.waits else ""
+    view.answer(twin.time, (twin.band,), f"{twin.verdict}{held}", support.waits)

@@ -1,7 +1,7 @@
 """The look of an environment at one time: everything that is shown of it, and nothing that simulates."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -15,6 +15,7 @@ from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.rendering.appearance import Appearance
 from iowbc.sim.rendering.forces import Force, forces
+from iowbc.sim.simulation import Simulation
 from iowbc.task.vector.vector_env import VectorEnv
 
 
@@ -39,16 +40,14 @@ class Moment:
     """Those that a trial records, of the step just made, each (k,)."""
 
 
-class Witness:
-    """Takes down the moments of the first environment of an in-process vector environment, in its present episode."""
+class SimulationWitness:
+    """Takes down the moments of the first environment of a simulation, which know no reference and no command."""
 
-    def __init__(self, environment: VectorEnv) -> None:
-        self.environment = environment
-        self._simulation = simulation = environment.batch.simulation
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
         self._appearance = Appearance(simulation, 0)
         self.model = self._appearance.model
         """As it is drawn: with looks, and the object in the size of the present episode."""
-        self._reference = mujoco.MjData(self.model)
         self._world = simulation.world_of(0)[0]
         robot = simulation.robot
         soles = [self.model.body(name).id for name in robot.sole_bodies]
@@ -67,26 +66,19 @@ class Witness:
         return float(self._simulation.drawn["object_mass"][0]) if self._held else 0.0
 
     def look(self, seconds: float) -> Moment:
-        """The environment as it is now."""
-        data, batch = self._appearance.update(), self.environment.batch
+        """The simulation as it is now."""
+        data = self._appearance.update()
+        bodies = _poses(data)
         return Moment(
             seconds=seconds,
-            bodies=_poses(data),
-            reference=self._posture(data),
+            bodies=bodies,
+            reference=bodies,
             forces=tuple(forces(self._simulation, 0)),
             balance=self._balance(),
             support=self._support(data),
-            command=np.array(batch.command[0]).reshape(len(COMMAND)),
-            signals={name: self.environment.signals[name][0].copy() for name in RECORDED},
+            command=np.zeros(len(COMMAND)),
+            signals={},
         )
-
-    def _posture(self, data: Any) -> Array:
-        robot, memory, reference = self._simulation.robot, self.environment.batch.memory, self._reference
-        reference.qpos[:] = data.qpos
-        joints = reference.qpos[self._world.layout.joints]
-        joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
-        mujoco.mj_kinematics(self.model, reference)
-        return _poses(reference)
 
     def _balance(self) -> Array:
         simulation, state = self._simulation, self._simulation.state
@@ -106,6 +98,32 @@ class Witness:
         points = np.concatenate(corners)
         hull = points[ConvexHull(points).vertices]
         return np.column_stack([hull, np.zeros(len(hull))])
+
+
+class Witness(SimulationWitness):
+    """Takes down the moments of the first environment of an in-process vector environment, in its present episode."""
+
+    def __init__(self, environment: VectorEnv) -> None:
+        super().__init__(environment.batch.simulation)
+        self.environment = environment
+        self._reference = mujoco.MjData(self.model)
+
+    def look(self, seconds: float) -> Moment:
+        """The environment as it is now."""
+        return replace(
+            super().look(seconds),
+            reference=self._posture(),
+            command=np.array(self.environment.batch.command[0]).reshape(len(COMMAND)),
+            signals={name: self.environment.signals[name][0].copy() for name in RECORDED},
+        )
+
+    def _posture(self) -> Array:
+        robot, memory, reference = self._simulation.robot, self.environment.batch.memory, self._reference
+        reference.qpos[:] = self._appearance.data.qpos
+        joints = reference.qpos[self._world.layout.joints]
+        joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
+        mujoco.mj_kinematics(self.model, reference)
+        return _poses(reference)
 
 
 def _poses(data: Any) -> Array:

@@ -55,7 +55,7 @@ def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits
     assert sensors.posture is not None
     state, rate = heard.states[-1], len(heard.states) / heard.seconds
     beyond = watchdogs.beyond(sensors.posture, contract, limits)
-    warmest = int(state["motor_state"]["temperature"][: len(contract.joints)].max())
+    warmest, hottest = sensors.posture.temperature.max(), limits.temperature
     charge = None if heard.battery is None else int(heard.battery["soc"])
     model, order = int(state["mode_machine"]), int(state["mode_pr"])
     return [
@@ -66,9 +66,7 @@ def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits
         Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
         Check("joints", beyond is None, beyond or "within limits, no motor overloaded, upright enough"),
         Check("battery", charge is not None and charge >= limits.battery, _charge(charge, limits)),
-        Check(
-            "temperature", warmest <= limits.temperature, f"warmest motor {warmest} °C, {limits.temperature:g} allowed"
-        ),
+        Check("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
         _dry_run(controller, sensors, wanted),
     ]
 

@@ -39,8 +39,12 @@ LOOPBACK = """<General><AllowMulticast>false</AllowMulticast></General>
 """A loopback interface has no multicast: participants find each other at ports of localhost."""
 
 
-def _final(kind: Any) -> Any:
-    return annotations.final(annotations.autoid("sequential")(dataclass(kind)))
+def _struct(name: str, **members: Any) -> Any:
+    """An IDL type by its full name."""
+    made = types.new_class(
+        name.rpartition(".")[2], (IdlStruct,), {"typename": name}, lambda space: space.update(__annotations__=members)
+    )
+    return annotations.final(annotations.autoid("sequential")(dataclass(made)))
 
 
 def _idl_type(kind: np.dtype[np.void]) -> Any:
@@ -50,11 +54,7 @@ def _idl_type(kind: np.dtype[np.void]) -> Any:
         base, shape = kind[name].subdtype or (kind[name], ())
         number = NUMBERS.get(base.str[1:]) or _idl_type(base)
         annotated[name] = array[number, shape[0]] if shape else number
-    name = f"{messages.MODULE}.{messages.NAMES[kind]}"
-    made = types.new_class(
-        messages.NAMES[kind], (IdlStruct,), {"typename": name}, lambda space: space.update(__annotations__=annotated)
-    )
-    return _final(made)
+    return _struct(f"{messages.MODULE}.{messages.NAMES[kind]}", **annotated)
 
 
 def _topic_type(kind: np.dtype[np.void]) -> Any:
@@ -71,53 +71,15 @@ def _sample(kind: Any, data: bytes) -> Any:
     return sample
 
 
-@_final
-class RequestIdentity_(IdlStruct, typename="unitree_api.msg.dds_.RequestIdentity_"):
-    id: int64
-    api_id: int64
-
-
-@_final
-class RequestLease_(IdlStruct, typename="unitree_api.msg.dds_.RequestLease_"):
-    id: int64
-
-
-@_final
-class RequestPolicy_(IdlStruct, typename="unitree_api.msg.dds_.RequestPolicy_"):
-    priority: int32
-    noreply: bool
-
-
-@_final
-class RequestHeader_(IdlStruct, typename="unitree_api.msg.dds_.RequestHeader_"):
-    identity: RequestIdentity_
-    lease: RequestLease_
-    policy: RequestPolicy_
-
-
-@_final
-class Request_(IdlStruct, typename="unitree_api.msg.dds_.Request_"):
-    header: RequestHeader_
-    parameter: str
-    binary: sequence[uint8]
-
-
-@_final
-class ResponseStatus_(IdlStruct, typename="unitree_api.msg.dds_.ResponseStatus_"):
-    code: int32
-
-
-@_final
-class ResponseHeader_(IdlStruct, typename="unitree_api.msg.dds_.ResponseHeader_"):
-    identity: RequestIdentity_
-    status: ResponseStatus_
-
-
-@_final
-class Response_(IdlStruct, typename="unitree_api.msg.dds_.Response_"):
-    header: ResponseHeader_
-    data: str
-    binary: sequence[uint8]
+API = "unitree_api.msg.dds_"
+RequestIdentity_ = _struct(f"{API}.RequestIdentity_", id=int64, api_id=int64)
+RequestLease_ = _struct(f"{API}.RequestLease_", id=int64)
+RequestPolicy_ = _struct(f"{API}.RequestPolicy_", priority=int32, noreply=bool)
+RequestHeader_ = _struct(f"{API}.RequestHeader_", identity=RequestIdentity_, lease=RequestLease_, policy=RequestPolicy_)
+Request_ = _struct(f"{API}.Request_", header=RequestHeader_, parameter=str, binary=sequence[uint8])
+ResponseStatus_ = _struct(f"{API}.ResponseStatus_", code=int32)
+ResponseHeader_ = _struct(f"{API}.ResponseHeader_", identity=RequestIdentity_, status=ResponseStatus_)
+Response_ = _struct(f"{API}.Response_", header=ResponseHeader_, data=str, binary=sequence[uint8])
 
 
 @cache

@@ -26,9 +26,13 @@ class Limits(Section):
     torque: float = Field(default=1.2, gt=0.0)
     """Highest estimated torque as a multiple of the motor's limit: saturation is allowed, the estimate has errors."""
     battery: float = Field(default=20.0, ge=0.0, le=100.0)
-    """Least charge to begin with [%]."""
+    """Least charge to begin with, below which a moving robot warns [%]."""
+    battery_empty: float = Field(default=10.0, ge=0.0, le=100.0)
+    """Least charge to move with [%]; an assumption, for the charge at which the robot turns off is not public."""
     temperature: float = Field(default=80.0, gt=0.0)
-    """Highest motor temperature to begin with [°C]."""
+    """Highest motor temperature to begin with, above which a moving robot warns [°C]."""
+    temperature_hot: float = Field(default=100.0, gt=0.0)
+    """Highest motor temperature to move with [°C]; an assumption, for the drives' own limit is not public."""
     standing_tilt: float = Field(default=0.35, gt=0.0)
     """Largest angle between pelvis and vertical at which Stand and Run begin [rad]."""
     standing_speed: float = Field(default=3.0, gt=0.0)

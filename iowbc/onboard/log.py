@@ -63,6 +63,7 @@ class LogWriter:
             seen={name: values.tolist() for name, values in wanted.seen.items()},
             seen_at=_finite(wanted.seen_at),
             others=given.others,
+            charge=given.charge,
         )
         for state in given.states:
             self._queue.put((TOPICS[messages.LOW_STATE], given.now, to_cdr(state)))
@@ -150,7 +151,7 @@ def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:
         seen={name: np.array(values) for name, values in logged["seen"].items()},
         seen_at=_never(logged["seen_at"]),
     )
-    return Inputs(logged["now"], tuple(states), wanted, logged["others"])
+    return Inputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
 
 
 def _finite(time: float) -> float | None:

@@ -38,6 +38,8 @@ class State(StrEnum):
 
 BEFORE = {State.STAND: (State.DAMPING,), State.RUN: (State.STAND,)}
 """States from which one is entered; the others are entered from everywhere."""
+MOVING = tuple(BEFORE)
+"""States that end in damping where something is wrong."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class Inputs:
     wanted: Wanted
     others: int = 0
     """Low-level commands that others sent since the last turn."""
+    charge: float | None = None
+    """Of the battery, where its state arrived since the last turn [%]."""
 
 
 class Machine:
@@ -82,25 +86,29 @@ class Machine:
         self.sensors = Sensors(self._joints)
         self.state = State.ZERO_TORQUE
         self.events: list[str] = []
-        """Events of the last turn: states entered and requests refused, with the reason."""
+        """Events of the last turn: states entered, requests refused, and warnings, with the reason."""
         self._kp, self._kd = np.array(contract.kp), np.array(contract.kd)
         self._turns = round(FREQUENCY / contract.control_frequency)
         """Turns of the loop for each step of the policy."""
         self._turn = 0
         self._last = -np.inf
         self._entered = 0.0
+        self._charge: float | None = None
+        self._warned: set[str] = set()
         self._from = self._goal = self._target = np.array(contract.default_position)
 
     def turn(self, given: Inputs) -> Record:
         """The command to send."""
         self.events = []
         self.sensors.take(given.states, given.now)
-        moving = self.state in (State.STAND, State.RUN)
-        reason = self._danger(given) if moving else None
+        self._charge = self._charge if given.charge is None else given.charge
+        reason = self._danger(given) if self.state in MOVING else None
         if reason is not None:
             self._enter(State.DAMPING, given, reason)
         elif given.wanted.request not in (None, self.state):
             self._request(given.wanted.request, given)
+        if self.state in MOVING:
+            self._warn()
         self._last = given.now
         if self.state is State.RUN:
             self._act(given)
@@ -109,16 +117,33 @@ class Machine:
     def _danger(self, given: Inputs) -> str | None:
         """The reason to damp, if there is one."""
         limits = self.limits
-        assert self.sensors.posture is not None
         if given.others:
             return f"second publisher: {given.others} low-level commands of another program"
         if (gap := given.now - self._last) > limits.overrun:
             return f"loop overrun: {1e3 * gap:.1f} ms since the last turn"
         if self.state is State.RUN and (reason := self._uninformed(given)) is not None:
             return reason
-        return watchdogs.stale(self.sensors, given.now, limits) or watchdogs.beyond(
-            self.sensors.posture, self._contract, limits
+        return self._unfit(given.now)
+
+    def _unfit(self, now: float) -> str | None:
+        """The reason for which a robot that has sent states may not move."""
+        limits, posture = self.limits, self.sensors.posture
+        assert posture is not None
+        return (
+            watchdogs.stale(self.sensors, now, limits)
+            or watchdogs.beyond(posture, self._contract, limits)
+            or next(iter(self._exhausted(limits.battery_empty, limits.temperature_hot).values()), None)
         )
+
+    def _exhausted(self, least: float, most: float) -> dict[str, str]:
+        assert self.sensors.posture is not None
+        return watchdogs.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
+
+    def _warn(self) -> None:
+        """Tells once after each Stand that the battery is low, or that a motor is warm."""
+        found = self._exhausted(self.limits.battery, self.limits.temperature)
+        self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
+        self._warned |= found.keys()
 
     def _request(self, wanted: State, given: Inputs) -> None:
         """Enters the state that is asked for, or says why not."""
@@ -136,8 +161,7 @@ class Machine:
             return f"it follows {' or '.join(BEFORE[wanted])}, and the robot is in {self.state}"
         if now is None:
             return "no state has arrived"
-        reason = watchdogs.stale(self.sensors, given.now, limits) or watchdogs.beyond(now, self._contract, limits)
-        if reason is not None:
+        if (reason := self._unfit(given.now)) is not None:
             return reason
         if now.tilt > limits.standing_tilt:
             return f"the pelvis leans by {now.tilt:.2f} rad, more than {limits.standing_tilt:g}"
@@ -167,6 +191,7 @@ class Machine:
         self.state, self._entered, self._turn = state, given.now, 0
         self.events.append(f"{state}: {why}")
         if state is State.STAND:
+            self._warned.clear()
             assert self.sensors.posture is not None
             self._from = self.sensors.posture.position
             self._goal = self.controller.settled_posture(given.wanted.command)[0]

@@ -8,7 +8,7 @@ import socket
 import struct
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -163,7 +163,7 @@ class Udp:
         try:
             self._socket.bind(("127.0.0.1", port))
         except OSError as error:
-            raise UsageError(f"--commands udp:{port}: {error}; choose another port") from error
+            raise UsageError(f"udp:{port}: {error}; choose another port") from error
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
         self.refused = ""
@@ -201,6 +201,19 @@ class Udp:
         return Wanted(command, now, None, seen or self._wanted.seen, now if seen else self._wanted.seen_at)
 
 
+@dataclass(frozen=True)
+class Seeing:
+    """An operator beside whom another source delivers the object's pose."""
+
+    operator: Operator
+    poses: Udp
+    """Of its datagrams only `seen` counts."""
+
+    def wanted(self, now: float, state: Record | None) -> Wanted:
+        pose = self.poses.wanted(now, state)
+        return replace(self.operator.wanted(now, state), seen=pose.seen, seen_at=pose.seen_at)
+
+
 def operator(kind: str, contract: Contract) -> Remote | Keyboard | Udp:
     """The operator that `--commands` names. Raises UsageError."""
     ranges = Ranges(contract)
@@ -208,7 +221,16 @@ def operator(kind: str, contract: Contract) -> Remote | Keyboard | Udp:
         return Remote(ranges)
     if kind == "keyboard":
         return Keyboard(ranges)
+    return _udp(kind, ranges, f"--commands {kind}: valid: remote, keyboard, udp:PORT")
+
+
+def object_poses(kind: str, contract: Contract) -> Udp:
+    """The source of the object's pose that `--object-pose` names. Raises UsageError."""
+    return _udp(kind, Ranges(contract), f"--object-pose {kind}: valid: udp:PORT")
+
+
+def _udp(kind: str, ranges: Ranges, refusal: str) -> Udp:
     name, _, port = kind.partition(":")
     if name == "udp" and port.isdecimal() and 0 <= int(port) < 65536:
         return Udp(ranges, int(port))
-    raise UsageError(f"--commands {kind}: valid: remote, keyboard, udp:PORT")
+    raise UsageError(refusal)

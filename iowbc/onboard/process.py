@@ -149,7 +149,9 @@ def drive(
             leaving = now
         if leaving is not None:
             wanted = replace(wanted, request=State.DAMPING)
-        given = Inputs(now, states, wanted, others)
+        batteries = bus.take(messages.BATTERY_STATE)
+        charge = float(batteries[-1]["soc"]) if batteries else None
+        given = Inputs(now, states, wanted, others, charge)
         command = machine.turn(given)
         bus.publish(command)
         for event in machine.events:

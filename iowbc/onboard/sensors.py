@@ -23,6 +23,8 @@ class Posture:
     """(joints,) [rad/s]."""
     torque: Array
     """Estimated by the motors' drives, (joints,) [N·m]."""
+    temperature: Array
+    """Of the warmer of a motor's two sensors, (joints,) [°C]."""
     gravity: Array
     """Direction of gravity, base frame, (3,)."""
     turning: Array
@@ -46,6 +48,7 @@ def posture(state: Record, joints: int) -> Posture:
         position=motors["q"].astype(np.float64),
         velocity=motors["dq"].astype(np.float64),
         torque=motors["tau_est"].astype(np.float64),
+        temperature=motors["temperature"].max(axis=1).astype(np.float64),
         gravity=-rotation[2],
         turning=imu["gyroscope"].astype(np.float64),
         yaw=float(np.arctan2(rotation[1, 0], rotation[0, 0])),

@@ -38,6 +38,16 @@ def beyond(now: Posture, contract: Contract, limits: Limits) -> str | None:
     return None
 
 
+def exhausted(now: Posture, charge: float | None, joints: tuple[str, ...], least: float, most: float) -> dict[str, str]:
+    """Complaints about a battery below `least` and a motor above `most` [°C]; `charge`: None where unknown [%]."""
+    found = {}
+    if charge is not None and charge < least:
+        found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"
+    if now.temperature[hottest := int(np.argmax(now.temperature))] > most:
+        found["temperature"] = f"temperature: {joints[hottest]} at {now.temperature[hottest]:.0f} °C, above {most:g}"
+    return found
+
+
 def _worst(name: str, excess: Array, value: Array, unit: str, joints: tuple[str, ...]) -> str | None:
     joint = int(np.argmax(excess))
     return f"{name} limit: {joints[joint]} at {value[joint]:.2f} {unit}" if excess[joint] > 0.0 else None

@@ -15,12 +15,12 @@ from iowbc.onboard.messages import Record
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.sim.rendering.forces import Force
 from iowbc.sim.simulation import Simulation
 from iowbc.twin.support import HOOK, Support
 
 TIMESTEP = 0.001
 """Physics step [s], and period of the motors' PD control."""
-
 
 SILENCE = 0.1
 """Time without commands after which the motors brake [s]; an assumption, for the drives' behaviour is not public."""
@@ -80,6 +80,7 @@ class Twin:
         )
         self.simulation.reset(np.zeros(1, np.int64), posture[None])
         self._start = self._hook = self._hook_position()
+        self.band = Force("band", self._hook, np.zeros(3))
         self._object = self.simulation.state.object_position[0].copy()
         self.periods = 0
         self._silent = 0
@@ -113,6 +114,7 @@ class Twin:
             self.simulation.clock[:] = 0
         before, self._hook = self._hook, self._hook_position()
         force = self.support.force(self._hook - self._start, FREQUENCY * (self._hook - before))
+        self.band = Force("band", self._hook, force)
         self._pull[:] = *force, *rotations.cross(self._hook - self._centre, force)
         self.simulation.step()
 
@@ -128,10 +130,16 @@ class Twin:
         simulation.target[0] = np.where(np.isfinite(target), target, simulation.target[0])
 
     @property
+    def time(self) -> float:
+        """Since the simulation began [s]."""
+        return self.periods / FREQUENCY
+
+    @property
     def state(self) -> Record:
         """The state that the robot sends."""
-        time = round(1e3 * self.periods / FREQUENCY)
-        return low_state(time, Measured.of(self.simulation.measured), self.simulation.state.joint_torque[0])
+        return low_state(
+            round(1e3 * self.time), Measured.of(self.simulation.measured), self.simulation.state.joint_torque[0]
+        )
 
     @property
     def battery(self) -> Record:
@@ -150,9 +158,9 @@ class Twin:
     @property
     def verdict(self) -> str:
         """What became of robot and object."""
-        state, time = self.simulation.state, self.periods / FREQUENCY
+        state = self.simulation.state
         way = float(np.linalg.norm(state.base_position[0, :2]))
-        parts = [f"{time:.1f} s", "fallen" if self.fallen else "upright", f"pelvis {way:.2f} m from its start"]
+        parts = [f"{self.time:.1f} s", "fallen" if self.fallen else "upright", f"pelvis {way:.2f} m from its start"]
         if state.has_object[0]:
             moved = float(np.linalg.norm(state.object_position[0, :2] - self._object[:2]))
             hands = int(state.grasped[0].sum())

@@ -28,17 +28,27 @@ class Support:
         self.kind, self._release = kind, release
         self._time = 0.0
         self.just_released = False
+        self._was_rigid = self.rigid
 
     def advance(self, period: float, stiff: bool) -> None:
         """A period [s]; `stiff`: the joints have their full gains. Once released, it stays so."""
-        before = self._time
-        self._time += period if stiff or before >= self._release else 0.0
-        self.just_released = self.kind == "fixture" and before < self._release <= self._time
+        self._time += period if stiff or self._time >= self._release else 0.0
+        self.just_released = self._was_rigid and not self.rigid
+        self._was_rigid = self.rigid
+
+    def let_go(self) -> None:
+        """Releases the robot now, whatever its gains; a band still lowers it and slackens first."""
+        self._release = min(self._release, self._time)
+
+    @property
+    def waits(self) -> bool:
+        """Whether it has not begun to release the robot."""
+        return self.kind != "none" and self._time < self._release
 
     @property
     def rigid(self) -> bool:
         """Whether nothing moves."""
-        return self.kind == "fixture" and self._time < self._release
+        return self.kind == "fixture" and self.waits
 
     def force(self, away: Array, velocity: Array) -> Array:
         """Force on the hook, world frame, (3,) [N]; `away` from where it began (3,) [m], `velocity` (3,) [m/s]."""

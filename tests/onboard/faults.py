@@ -126,6 +126,8 @@ class Fault:
     """Commands of another program in each turn."""
     hang: float = 0.0
     """How long the loop hangs once [s]."""
+    charge: float | None = None
+    """Of the battery, where its state arrives [%]."""
     silent: bool = False
     """The operator falls silent."""
 
@@ -142,6 +144,8 @@ FAULTS = {
     "joint position beyond its limit": Fault("position limit", states=lambda: joint("q", 1.0)),
     "joint speed beyond its limit": Fault("velocity limit", states=lambda: joint("dq", 80.0)),
     "torque beyond its limit": Fault("torque limit", states=lambda: joint("tau_est", 90.0)),
+    "battery at 9 %": Fault("battery", charge=9.0),
+    "motor at 101 °C": Fault("temperature", states=lambda: joint("temperature", 101)),
     "30 % of commands lost": Fault(None, commands=lambda: dropping(0.3)),
     "all commands lost": Fault("tilt", within=END, commands=lambda: dropping(1.0)),
     "second publisher": Fault("second publisher", others=1),
@@ -181,7 +185,8 @@ def play(folder: Path, fault: Fault) -> Outcome:
         request = next((requests.pop(when) for when in list(requests) if now >= when), None)
         at = at if broken and fault.silent else now
         wanted = Wanted(standing, at, request)
-        command = machine.turn(Inputs(now, tuple(arrived), wanted, fault.others * broken))
+        charge = fault.charge if broken else None
+        command = machine.turn(Inputs(now, tuple(arrived), wanted, fault.others * broken, charge))
         if broken and machine.state is State.DAMPING and not reason:
             reason, time = machine.events[-1].partition(": ")[2], turn * PERIOD - ONSET
         for each in commands([command], since) if broken else [command]:

@@ -49,12 +49,12 @@ class Still:
         return low_state(round(1e3 * self.now), measured, np.zeros(29))
 
     def turn(self, request: State | None = None, *, states: tuple[Record, ...] | None = None, **other: float) -> Record:
-        """A turn of the loop; `other`: `at` of the command [s], `others`, `late` by which the turn begins [s]."""
+        """A turn of the loop; `other`: `at` of the command, `late` by which it begins [s], `others`, `charge` [%]."""
         self.turns += 1
         given = (self.state(),) if states is None else states
         now = self.now + other.get("late", 0.0)
         wanted = Wanted(self.standing, other.get("at", now), request, self.seen, now)
-        return self.machine.turn(Inputs(now, given, wanted, int(other.get("others", 0))))
+        return self.machine.turn(Inputs(now, given, wanted, int(other.get("others", 0)), other.get("charge")))
 
     def until(self, state: State) -> Record:
         """Goes through the states up to one of them; the last command."""

@@ -89,6 +89,7 @@ def broken(still: Still, name: str, value: float) -> tuple[Record, ...]:
         ("dq", 21.0, "velocity limit: left_knee_joint"),
         ("tau_est", -170.0, "torque limit: left_knee_joint"),
         ("quaternion", 1.1, "tilt"),
+        ("temperature", 101, "temperature: left_knee_joint at 101 °C"),
         ("quaternion", np.nan, "not finite"),
     ],
 )
@@ -125,13 +126,48 @@ def test_states_that_repeat_damp_within_20_ms(still: Still) -> None:
 
 @pytest.mark.parametrize(
     ("other", "reason"),
-    [({"others": 1}, "second publisher"), ({"late": 0.012}, "loop overrun"), ({"at": 0.0}, "stale command")],
+    [
+        ({"others": 1}, "second publisher"),
+        ({"late": 0.012}, "loop overrun"),
+        ({"at": 0.0}, "stale command"),
+        ({"charge": 9.0}, "battery at 9 %, less than 10"),
+    ],
 )
 def test_what_else_goes_wrong_damps_a_running_robot(still: Still, other: dict[str, float], reason: str) -> None:
     still.until(State.RUN)
     still.turn(**other)
     assert still.machine.state is State.DAMPING
     assert reason in still.machine.events[0]
+
+
+def test_a_low_battery_is_warned_of_once_and_damps_when_it_is_empty(still: Still) -> None:
+    still.until(State.RUN)
+    told = []
+    for charge in (20.0, 19.0, 18.0, 10.0):
+        still.turn(charge=charge)
+        told += still.machine.events
+        still.turn()
+        assert (still.machine.state, still.machine.events) == (State.RUN, [])
+    assert told == ["warning: battery at 19 %, less than 20"]
+    still.turn(charge=9.0)
+    assert still.machine.state is State.DAMPING
+    still.turn(State.STAND)
+    assert "stand refused: battery at 9 %" in still.machine.events[0]
+
+
+def test_a_warm_motor_is_warned_of_once_after_each_stand(still: Still) -> None:
+    def warm() -> tuple[str, ...]:
+        still.turns += 1
+        states = broken(still, "temperature", 90)
+        still.turns -= 1
+        still.turn(states=states)
+        return tuple(still.machine.events)
+
+    for _ in range(2):
+        still.until(State.RUN)
+        assert warm() == ("warning: temperature: left_knee_joint at 90 °C, above 80",)
+        assert warm() == ()
+        still.turn(State.DAMPING)
 
 
 def test_a_damped_robot_runs_again_by_way_of_stand(still: Still) -> None:

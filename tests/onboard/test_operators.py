@@ -15,7 +15,7 @@ from iowbc.errors import UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.machine import State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import BUTTONS, Ranges, Remote, Udp, operator
+from iowbc.onboard.operators import BUTTONS, Ranges, Remote, Seeing, Udp, object_poses, operator
 
 
 @pytest.fixture
@@ -90,7 +90,19 @@ def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:
     assert source.wanted(0.0, None).request is State.DAMPING
 
 
+def test_object_poses_of_another_source_leave_the_command_alone(ranges: Ranges, source: Udp) -> None:
+    both = Seeing(Remote(ranges), source)
+    pose = {"object_position": [0.3, 0.0, 0.1]}
+    send(source, json.dumps({"velocity": [0.2, 0.0], "request": "run", "seen": pose}).encode())
+    wanted = both.wanted(3.0, remote("X"))
+    assert (wanted.command[0], wanted.request, wanted.seen_at) == (0.0, State.STAND, 3.0)
+    assert wanted.seen["object_position"].tolist() == [pose["object_position"]]
+    assert both.wanted(4.0, remote()).seen_at == 3.0
+
+
 @pytest.mark.parametrize("kind", ["joystick", "udp", "udp:x", "udp:70000"])
 def test_an_unknown_source_is_refused(blind: Path, kind: str) -> None:
     with pytest.raises(UsageError, match="valid: remote, keyboard, udp:PORT"):
         operator(kind, read_contract(blind))
+    with pytest.raises(UsageError, match=f"--object-pose {kind}: valid: udp:PORT"):
+        object_poses(kind, read_contract(blind))

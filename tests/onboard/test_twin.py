@@ -1,15 +1,20 @@
 """The simulated robot: what it does with commands, and without."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from iowbc.commands.robot import _show
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.exported import exported_world
+from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges
+from iowbc.sim.rendering.forces import Force
 from iowbc.twin.robot import SILENCE, Twin
 from iowbc.twin.support import Support
 
@@ -71,3 +76,46 @@ def test_the_state_tells_what_the_sensors_deliver(twin: Twin) -> None:
     assert state["crc"] == messages.checksum(state)
     np.testing.assert_allclose(state["motor_state"]["q"][:29], seen.joint_position[0], atol=1e-6)
     np.testing.assert_allclose(state["imu_state"]["gyroscope"], seen.base_angular_velocity[0], atol=1e-6)
+
+
+def test_a_fixture_is_released_when_asked_and_a_band_lowers_the_robot_and_slackens() -> None:
+    fixture, band = Support("fixture", np.inf), Support("band", np.inf)
+    released = []
+    for turn in range(4000):
+        if turn == 10:
+            fixture.let_go()
+            band.let_go()
+        for support in (fixture, band):
+            support.advance(0.002, stiff=False)
+        released.append(fixture.just_released)
+        if turn in (5, 1000):
+            assert band.force(np.zeros(3), np.zeros(3))[2] > 200.0
+            assert band.waits == fixture.rigid == (turn == 5)
+    assert np.flatnonzero(released).tolist() == [10]
+    assert not band.force(np.zeros(3), np.zeros(3)).any()
+
+
+class View:
+    """A page whose visitor releases the robot and pulls at it."""
+
+    def __init__(self) -> None:
+        self.answers: list[tuple[float, str, bool]] = []
+
+    def asked(self) -> Asked:
+        return Asked(True, {"robot": np.array([0.0, 30.0, 0.0]), "object": np.ones(3)})
+
+    def answer(self, seconds: float, beside: Sequence[Force], status: str, supported: bool) -> None:
+        assert [force.kind for force in beside] == ["band"]
+        self.answers.append((seconds, status, supported))
+
+
+def test_a_visitor_of_the_page_releases_the_robot_and_pulls_at_it(twin: Twin) -> None:
+    view: Any = View()
+    for _ in range(10):
+        twin.step()
+    _show(twin, view)
+    assert twin.simulation.planned_push[0].tolist() == [0.0, 30.0, 0.0]
+    assert not twin.simulation.planned_impulse.any()
+    ((seconds, status, supported),) = view.answers
+    assert (seconds, supported) == (0.02, False)
+    assert "upright" in status

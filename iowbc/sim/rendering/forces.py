@@ -17,8 +17,10 @@ COLOURS = {
     "push": (0.85, 0.1, 0.1, 1.0),
     "grip": (0.95, 0.55, 0.1, 1.0),
     "ground": (0.2, 0.4, 0.85, 1.0),
+    "band": (0.55, 0.3, 0.7, 1.0),
 }
-"""By kind: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet."""
+"""By kind: of the partner, of pushes and impulses, of the object on the hands, of the ground on the feet, of the band
+from which a robot hangs."""
 BESIDE = 0.09
 """Forces on hands and feet are drawn this far outside of them, where the limbs do not hide them [m]."""
 

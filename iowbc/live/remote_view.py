@@ -1,0 +1,112 @@
+"""A simulation in the browser, drawn by a process of its own, for which the simulation never waits."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+import viser
+
+from iowbc.arrays import Array
+from iowbc.live.drawing import Drawing, ShownParts
+from iowbc.live.moment import Moment, SimulationWitness
+from iowbc.live.page import AIM, PICTURES, VIEW
+from iowbc.live.server import serving
+from iowbc.live.session import Pushed
+from iowbc.robot.description import Robot
+from iowbc.sim.rendering.forces import Force
+from iowbc.sim.simulation import Simulation
+
+NICENESS = 10
+"""Added to that of the page's process: where cores are short, the simulation goes first."""
+STARTING = 120.0
+"""Time that the page is given to begin before the simulation does [s]."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A page's request for a picture, with what its visitor did since the last one."""
+
+    release: bool
+    """The button was pressed."""
+    pulls: dict[Pushed, Array]
+    """Forces of the mouse, world frame, (3,) each [N]."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The answer to a request."""
+
+    moment: Moment
+    status: str
+    supported: bool
+    """There is a support to release."""
+
+
+class RemoteView:
+    """The page of a simulation. It asks for each picture, so that the simulation makes none that nobody draws."""
+
+    def __init__(self, simulation: Simulation, port: int) -> None:
+        """Begins to serve at a free port of this machine."""
+        self._witness = SimulationWitness(simulation)
+        self._requests, theirs = multiprocessing.Pipe()
+        given = theirs, port, simulation.robot, self._witness.model
+        process = multiprocessing.get_context("spawn").Process(target=_serve, args=given, daemon=True)
+        process.start()
+        theirs.close()
+        self._requests.poll(STARTING)
+
+    def asked(self) -> Asked | None:
+        """The page's request, if there is one. Raises EOFError once the page has ended."""
+        try:
+            return self._requests.recv() if self._requests.poll() else None
+        except ConnectionResetError as error:  # of a page that left an answer unread
+            raise EOFError from error
+
+    def answer(self, seconds: float, beside: Sequence[Force], status: str, supported: bool) -> None:
+        """Sends the simulation as it is now, `seconds` since its start, with other forces `beside` its own."""
+        moment = self._witness.look(seconds)
+        shown = replace(moment, forces=(*moment.forces, *beside))
+        with contextlib.suppress(BrokenPipeError):  # of a page that has ended, which `asked` tells
+            self._requests.send(Picture(shown, status, supported))
+
+    def close(self) -> None:
+        """Ends the page."""
+        self._requests.close()
+
+
+def _serve(requests: Connection, port: int, robot: Robot, model: Any) -> None:
+    """The process of the page, until the simulation's end of the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches both processes; the simulation ends this one
+    os.nice(NICENESS)
+    with serving(port) as server, contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        draw(server, requests, robot, model)
+
+
+def draw(server: viser.ViserServer, requests: Connection, robot: Robot, model: Any) -> None:
+    """Draws one picture after the other. Raises EOFError or OSError once the simulation has ended."""
+    pulls: dict[Pushed, Array] = {"robot": np.zeros(3), "object": np.zeros(3)}
+    pressed = threading.Event()
+    drawing = Drawing(server.scene, robot, lambda what, force: pulls.update({what: force}))
+    server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    status = server.gui.add_markdown("")
+    button = server.gui.add_button("Release the robot", hint="From its band or fixture")
+    button.on_click(lambda _: pressed.set())
+    while True:
+        begin = time.monotonic()
+        release = pressed.is_set()
+        pressed.clear()
+        requests.send(Asked(release, dict(pulls)))
+        picture: Picture = requests.recv()
+        with server.atomic():
+            drawing.show(model, picture.moment, ShownParts())
+            status.content, button.visible = picture.status, picture.supported
+        time.sleep(max(0.0, begin + PICTURES - time.monotonic()))

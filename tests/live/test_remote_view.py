@@ -1,0 +1,89 @@
+"""The page of a simulation in another process."""
+
+import multiprocessing
+import threading
+import time
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+
+import numpy as np
+import psutil
+import pytest
+import viser
+
+from iowbc.live.moment import SimulationWitness
+from iowbc.live.remote_view import Asked, Picture, RemoteView, draw
+from iowbc.live.server import LocalServer, serving
+from iowbc.live.session import Session
+from iowbc.sim.rendering.forces import Force
+
+
+@pytest.fixture
+def page(session: Session) -> Iterator[tuple[LocalServer, Connection, SimulationWitness]]:
+    """A page that is drawn in a thread, the pipe on which it asks, and what it is shown."""
+    witness = SimulationWitness(session.environment.batch.simulation)
+    ours, theirs = multiprocessing.Pipe()
+
+    def drawing() -> None:
+        with pytest.raises((EOFError, OSError)):
+            draw(server, theirs, session.environment.batch.robot, witness.model)
+
+    with serving(0) as server:
+        thread = threading.Thread(target=drawing)
+        thread.start()
+        yield server, ours, witness
+        ours.close()
+        thread.join()
+
+
+def test_a_page_draws_what_it_is_sent_and_asks_for_more(
+    page: tuple[LocalServer, Connection, SimulationWitness],
+) -> None:
+    server, requests, witness = page
+    asked: Asked = requests.recv()
+    assert not asked.release
+    moment = witness.look(1.0)
+    requests.send(Picture(moment, "held by band", True))
+    requests.recv()
+    frame = server.scene._handle_from_node_name["/world/bodies/pelvis"]
+    assert frame.position == pytest.approx(moment.bodies[witness.model.body("pelvis").id, :3], abs=1e-6)
+    (button,) = (
+        each for each in server.gui._gui_input_handle_from_uuid.values() if isinstance(each, viser.GuiButtonHandle)
+    )
+    for call in button._impl.update_cb:
+        call(None)
+    requests.send(Picture(moment, "held by band", False))
+    assert requests.recv().release
+    assert not button.visible
+    requests.send(Picture(moment, "", False))
+    assert not requests.recv().release
+
+
+@pytest.mark.integration
+def test_the_process_of_a_page_asks_for_pictures_and_ends_with_the_simulation(session: Session) -> None:
+    with serving(0) as other:
+        port = other.get_port()
+    view = RemoteView(session.environment.batch.simulation, port)
+    (child,) = (each for each in psutil.Process().children() if "spawn_main" in " ".join(each.cmdline()))
+    for _ in range(3):
+        while (asked := view.asked()) is None:
+            time.sleep(0.002)
+        assert asked.pulls["robot"] == pytest.approx(np.zeros(3))
+        view.answer(1.0, (Force("band", np.ones(3), np.full(3, 100.0)),), "", True)
+    view.close()
+    child.wait(60)
+
+
+@pytest.mark.integration
+def test_a_simulation_is_told_that_its_page_has_ended(session: Session) -> None:
+    with serving(0) as other:
+        port = other.get_port()
+    view = RemoteView(session.environment.batch.simulation, port)
+    (child,) = (each for each in psutil.Process().children() if "spawn_main" in " ".join(each.cmdline()))
+    child.kill()
+    child.wait(60)
+    view.answer(1.0, (), "", True)
+    first_request = view.asked()
+    assert first_request is not None
+    with pytest.raises(EOFError):
+        view.asked()
