@@ -10,12 +10,11 @@ from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
-from iowbc.evaluation.trials.rollout import RECORDED
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.rendering.appearance import Appearance
 from iowbc.sim.rendering.forces import Force, forces
-from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.batch import Batch
 
 
 @dataclass(frozen=True)
@@ -36,15 +35,16 @@ class Moment:
     command: Array
     """In force in the step to come, (11,)."""
     signals: Mapping[str, Array]
-    """Those that a trial records, of the step just made, each (k,)."""
+    """Figures of the step just made, each (k,); in an environment those that a trial records."""
 
 
 class Witness:
-    """Takes down the moments of the first environment of an in-process vector environment, in its present episode."""
+    """Takes down the moments of the first environment of a batch, in its present episode."""
 
-    def __init__(self, environment: VectorEnv) -> None:
-        self.environment = environment
-        self._simulation = simulation = environment.batch.simulation
+    def __init__(self, batch: Batch, signals: Mapping[str, Array]) -> None:
+        """`signals`: by name, (n, k), which are written anew in every step."""
+        self.batch, self._signals = batch, signals
+        self._simulation = simulation = batch.simulation
         self._appearance = Appearance(simulation, 0)
         self.model = self._appearance.model
         """As it is drawn: with looks, and the object in the size of the present episode."""
@@ -68,7 +68,7 @@ class Witness:
 
     def look(self, seconds: float) -> Moment:
         """The environment as it is now."""
-        data, batch = self._appearance.update(), self.environment.batch
+        data = self._appearance.update()
         return Moment(
             seconds=seconds,
             bodies=_poses(data),
@@ -76,12 +76,12 @@ class Witness:
             forces=tuple(forces(self._simulation, 0)),
             balance=self._balance(),
             support=self._support(data),
-            command=np.array(batch.command[0]).reshape(len(COMMAND)),
-            signals={name: self.environment.signals[name][0].copy() for name in RECORDED},
+            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
+            signals={name: values[0].copy() for name, values in self._signals.items()},
         )
 
     def _posture(self, data: Any) -> Array:
-        robot, memory, reference = self._simulation.robot, self.environment.batch.memory, self._reference
+        robot, memory, reference = self._simulation.robot, self.batch.memory, self._reference
         reference.qpos[:] = data.qpos
         joints = reference.qpos[self._world.layout.joints]
         joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
