@@ -60,6 +60,6 @@ class Drags:
             self._held.pop(event.client_id, None)
             places = np.array([event.start_position, event.end_position, event.client.camera.position])
             if event.phase != "end" and (np.abs(places) < FARTHEST).all():
-                self._held[event.client_id] = Drag(body, *places, shift=event.modifier is not None)
+                self._held[event.client_id] = Drag(body, places[0], places[1], places[2], event.modifier is not None)
 
         return moved
