@@ -7,7 +7,7 @@ import numpy as np
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
-from iowbc.control.skill_observation import joined, object_yaw, robot_observation
+from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
@@ -194,9 +194,8 @@ class GameBatch:
         lower = self.lower
         return situation(lower.simulation, lower.moved, self.origin, self.paths, self.drawn.task, covered)
 
-    def _command(self) -> Array:
-        """Nominal commands, (n, 11)."""
-        yaw = object_yaw(self.lower.measured) * self._sees_object
+    def _command(self, yaw: Array) -> Array:
+        """Nominal commands, (n, 11); `yaw` (n,) of the objects as measured [rad]."""
         nominal = self._nominal
         by_rule = {
             "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
@@ -258,8 +257,9 @@ class GameBatch:
         """Writes what agents and critic see."""
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
         path = seen.waypoints(self.paths, now, ahead, now.heading)
+        thing = of_object(lower.measured, self._sees_object)
         robot = robot_observation(
-            *(lower.command, lower.measured, self._wrist_error, self._sees_object),
+            *(lower.command, lower.measured, self._wrist_error, thing),
             *(self._pushing, drawn.known, path, self._felt),
         )
         force = self.origin.turned(lower.simulation.state.partner_force)
@@ -267,7 +267,7 @@ class GameBatch:
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         human = joined(felt)
-        self._nominals = self._command()
+        self._nominals = self._command(thing[:, YAW])
         self.buffers[f"{time}/robot"][:], self.buffers[f"{time}/human"][:] = robot, human
         self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
 
