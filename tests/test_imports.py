@@ -38,7 +38,7 @@ MAY_IMPORT = {
     "task": WORLD | {"rollouts"},
     "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters", "results"},
     "skill": WORLD | {"task", "rollouts", "learning", "evaluation", "results"},
-    "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation"},
+    "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation", "skill"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
     "report": {"learning", "pipeline", "recipe", "results", "stages", "errors", "control", "onboard"},
@@ -48,7 +48,7 @@ MAY_IMPORT = {
     | {"skill", "results"},
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
-    | {"live", "web", "stages", "results", "onboard", "twin", "adapters"},
+    | {"live", "web", "stages", "results", "onboard", "twin", "adapters", "skill"},
     "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""

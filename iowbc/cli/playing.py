@@ -35,14 +35,8 @@ def play(
     port: Port = None,
     runs: RunsFolder = None,
 ) -> None:
-<<<<<<< HEAD
     """Watch a trained policy in the viewer, drive it in the browser, or record a film."""
-    from iowbc.commands.play import PORT, PlayRequest, play_on_web, play_word
-    from iowbc.errors import UsageError
-=======
-    """Watch a trained policy in the viewer, drive it in the browser, or make a film of it."""
     from iowbc.commands.play import PlayRequest, play_on_web, play_word
->>>>>>> twin
 
     page = page_port(web, port)
     request = PlayRequest(

@@ -34,11 +34,16 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.finding import SUFFIXES
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.recipe import Recipe
+from iowbc.stages.inputs import policy_stage
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
+    from iowbc.evaluation.side_by_side import Actor
+    from iowbc.live.game import GameSession
 
+SKILL = "skill"
 NOTHING: Mapping[str, Artifact] = MappingProxyType({})
 
 
@@ -69,6 +74,63 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
     require_viewer()
     require_free(port)
     close_on_termination()
+
+    from iowbc.live.page import Page
+    from iowbc.live.server import serving
+
+    def ready() -> None:
+        console.print("Drive it in the browser; Ctrl-C ends it:", highlight=False)
+        tell(console, f"http://{HOST}:{port}")
+        there = f"ssh -L {port}:{HOST}:{port} THIS_MACHINE"
+        console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
+
+    skill = skill_to_play(store, word, stage)
+    if skill is not None:
+        from iowbc.live.game_panel import GamePanel
+
+        with _game(store, console, skill, request) as game, serving(port) as server:
+            Page(server, game, panel=GamePanel).run(ready)
+        return
+    source, actor = _driven(store, console, word, stage)
+
+    from iowbc.live.session import Session
+
+    with Session(source, request) as session, serving(port) as server:
+        Page(server, session, actor).run(ready)
+
+
+def skill_to_play(store: Store, word: str, stage: str | None) -> Artifact | None:
+    """The skill that a word and `--stage` name; None where they name no skill, or another stage. Raises `RecipeError`
+    for a recipe's file that is none."""
+    if stage not in (None, SKILL) or Path(word).is_dir():
+        return None
+    if (loaded := _recipe_in(word)) is not None:
+        return _planned(store, loaded).get(SKILL) if SKILL in loaded.recipe.stages else None
+    with contextlib.suppress(UsageError):  # of a first training, of which nothing is finished yet
+        return named(store, word).usable.get(SKILL)
+    return None
+
+
+def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest) -> "GameSession":
+    """The games of a skill, beginning with the first task of the requested scene. Raises `UsageError`."""
+    from iowbc.learning.storage import read_teacher
+    from iowbc.live.game import GameRequest, GameSession
+    from iowbc.skill.student import load_student
+
+    recipe = Recipe.model_validate(skill.recipe)
+    generator, student = (input_of(store, skill, name) for name in ("rg-fit", policy_stage(recipe)))
+    if student is None:
+        raise UsageError(f"{skill.folder}: this skill read no controller; run its recipe again")
+    require_whole(store.runs, [skill, student, *([generator] if generator else [])])
+    first = {getattr(recipe.skill.tasks, name).scene: name for name in reversed(recipe.skill.tasks.names)}
+    require_known(request.scene, "scene with a transport task", first)
+    tell(console, f"skill of {skill.manifest.recipe}: you are its partner")
+    robot, asked = read_teacher(skill.folder, "robot"), GameRequest(first[request.scene], request.seed)
+    return GameSession(world_of(skill.recipe, generator).deployed, load_student(student.folder), robot, asked)
+
+
+def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tuple[Source, Actor | None]":
+    """The policy to drive by hand, and the trials of its evaluation."""
     evaluation = None
     if not Path(word).is_dir():
         with contextlib.suppress(UsageError):  # of a first training, of which nothing is finished yet
@@ -79,24 +141,12 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
         source = _whole_source(store, played)
     else:
         source = named_source(store, console, word, stage)
-
-    from iowbc.live.page import play_on_page
-    from iowbc.live.server import serving
-    from iowbc.live.session import Session
-
-    def ready() -> None:
-        console.print("Drive it in the browser; Ctrl-C ends it:", highlight=False)
-        tell(console, f"http://{HOST}:{port}")
-        there = f"ssh -L {port}:{HOST}:{port} THIS_MACHINE"
-        console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
-
     actor = None
     try:
         actor = None if evaluation is None else evaluated_actor(store, evaluation)
     except UsageError as error:
         tell(console, f"no trials to look through: {error}")
-    with Session(source, request) as session, serving(port) as server:
-        play_on_page(server, session, actor, ready)
+    return source, actor
 
 
 def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
@@ -114,7 +164,7 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
     if training is not None and training.recipe is not None:
         tell(console, training.text)
         return _training_source(store, training)
-    loaded = load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
+    loaded = _recipe_in(word)
     try:
         artifact = playable(store, word, stage, NOTHING if loaded is None else _planned(store, loaded))
     except UsageError:
@@ -133,6 +183,10 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
     source = _whole_source(store, artifact)
     return source if asked is None else asked_by(source, asked)
+
+
+def _recipe_in(word: str) -> LoadedRecipe | None:
+    return load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
 
 
 def _evaluation(store: Store, word: str) -> Evaluation | None:

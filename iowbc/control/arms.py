@@ -53,17 +53,15 @@ class ArmKinematics(Constants):
         self._grip = robot.grip_offset.T[:, :, None]
         self._identity = np.eye(3)[:, :, None, None]
 
-    def forward(self, arm_position: Array) -> tuple[Array, Array]:
-        """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one)."""
-        wrist, columns = self._wrists(by_arm(arm_position))
+    def forward(self, arm_position: Array, frames: Frames | None = None) -> tuple[Array, Array]:
+        """Wrist positions (n, 2, 3) [m] in the torso frame, their Jacobian (n, 2, 3, joints of one); `frames` of
+        `arm_position`, where they are known."""
+        wrist, columns = self._reached(frames or self.frames(arm_position))
         xp = namespace(wrist)
         return xp.moveaxis(wrist, (0, 1, 2), (2, 1, 0)), xp.moveaxis(columns, (0, 1, 2, 3), (2, 3, 1, 0))
 
-    def _wrists(self, position: Array) -> tuple[Array, Array]:
-        """Wrists (3, 2, n) [m] and their Jacobian (3, joints, 2, n), of positions (joints, 2, n) [rad]."""
-        return self._reached(self._chain.frames(position))
-
     def _reached(self, frames: Frames) -> tuple[Array, Array]:
+        """Wrists (3, 2, n) [m] and their Jacobian (3, joints, 2, n)."""
         wrist = frames.end(self._grip)
         return wrist, frames.jacobian(wrist)
 

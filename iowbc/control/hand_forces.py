@@ -35,8 +35,10 @@ class HandForces:
         self._sum[:], self._count = 0.0, 0
         own, waist = self._robot.interaction, position[:, self._robot.waist]
         torque = self._robot.kp[own] * (target - position)[:, own] - self._robot.kd[own] * velocity[:, own]
-        missing = (self._gravity.torque(position[:, own], waist, gravity) - torque).reshape(len(position), 2, -1)
-        wrists, jacobian = self._arms.forward(position[:, own])
+        frames = self._arms.frames(position[:, own])
+        borne = self._gravity.torque(position[:, own], waist, gravity, frames=frames)
+        missing = (borne - torque).reshape(len(position), 2, -1)
+        wrists, jacobian = self._arms.forward(position[:, own], frames)
         square = jacobian @ jacobian.swapaxes(2, 3) + DAMPING * np.eye(3)
         force = np.linalg.solve(square, jacobian @ missing[..., None])[..., 0]
         pitch = np.arcsin(gravity[:, 0].clip(-1.0, 1.0))

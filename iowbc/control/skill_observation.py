@@ -26,7 +26,7 @@ def robot_observation(
     command: Array,
     measured: Measured,
     wrist_error: Array,
-    sees_object: bool,
+    thing: Array,
     pushing: Mask,
     known: Mask,
     path: Array,
@@ -34,11 +34,11 @@ def robot_observation(
 ) -> Array:
     """The robot's observation, (n, SENSED + 6 history) float32.
 
-    `command` (n, 11): in force; `wrist_error` (n, 2, 3) [m]; `pushing`, `known` (n,): whether there is a crate, and
-    whether the path is known; `path` (n, 9): its next waypoints; `felt` (n, history, 2, 3): estimated forces on the
-    hands, the newest last [N].
+    `command` (n, 11): in force; `wrist_error` (n, 2, 3) [m]; `thing` (n, OBJECT): see `of_object`; `pushing`, `known`
+    (n,): whether there is a crate, and whether the path is known; `path` (n, 9): its next waypoints; `felt`
+    (n, history, 2, 3): estimated forces on the hands, the newest last [N].
     """
-    parts = sensed(command, measured, wrist_error, sees_object)
+    parts = sensed(command, measured, wrist_error, thing)
     parts |= {"pushing": pushing, "known": known, "waypoints": path * known[:, None]}
     return joined(parts | {"forces": felt.reshape(len(felt), -1) / FORCE})
 
@@ -49,34 +49,28 @@ def joined(parts: Mapping[str, Array]) -> Array:
     return np.concatenate(columns, axis=1).astype(np.float32)
 
 
-def sensed(command: Array, measured: Measured, wrist_error: Array, sees_object: bool) -> dict[str, Array]:
-    """Measurements of the robot, heading frame: `command` (n, 11), `wrist_error` (n, 2, 3) [m]; the object's part
-    is zero without `sees_object`."""
-    parts = {
+def sensed(command: Array, measured: Measured, wrist_error: Array, thing: Array) -> dict[str, Array]:
+    """Measurements of the robot, heading frame: `command` (n, 11), `wrist_error` (n, 2, 3) [m], `thing` (n, OBJECT)."""
+    return {
         "command": command,
         "gravity": measured.projected_gravity,
         "rates": measured.base_angular_velocity,
         "wrist_error": 10.0 * wrist_error.reshape(-1, 6),
+        "object": thing,
     }
-    return parts | {"object": of_object(measured) if sees_object else np.zeros((len(command), OBJECT))}
 
 
-def of_object(measured: Measured) -> Array:
+def of_object(measured: Measured, sees_object: bool) -> Array:
     """Measured object in the heading frame, (n, OBJECT): its place from the base, yaw, upward axis, velocity and yaw
-    rate relative to the base. Raises ValueError where there is no measurement of it."""
-    quaternion = _given(measured, "object_quaternion")
-    forward, up = (rotations.rotate(quaternion, np.tile(axis, (len(quaternion), 1))) for axis in np.eye(3)[::2])
+    rate relative to the base; zero without `sees_object`. Raises ValueError where there is no measurement of it."""
+    if not sees_object:
+        return np.zeros((len(measured.projected_gravity), OBJECT))
     names = ("object_position", "object_linear_velocity", "object_angular_velocity")
-    level, vectors = leveling(measured.projected_gravity), [forward, up, *(_given(measured, name) for name in names)]
-    forward, up, place, velocity, rates = (np.einsum("nij,nj->ni", level, vector) for vector in vectors)
+    axes = rotations.rotate(_given(measured, "object_quaternion")[:, None], np.eye(3)[::2])
+    vectors = np.concatenate([axes, np.stack([_given(measured, name) for name in names], axis=1)], axis=1)
+    forward, up, place, velocity, rates = np.einsum("nij,nkj->kni", leveling(measured.projected_gravity), vectors)
     yaw = np.arctan2(forward[:, 1], forward[:, 0])
     return np.concatenate([place, yaw[:, None], up[:, :2], velocity, rates[:, 2:]], axis=1)
-
-
-def object_yaw(measured: Measured) -> Array:
-    """Measured yaw of the object in the heading frame, (n,) [rad]."""
-    yaw: Array = of_object(measured)[:, YAW]
-    return yaw
 
 
 def _given(measured: Measured, name: str) -> Array:

@@ -160,7 +160,8 @@ class Controller:
         after[held, action] = state[held, action]
         whole: Mask = np.asarray(np.isfinite(after).all(axis=1))
         after[~whole] = state[~whole]
-        refused = np.isin(np.arange(self.robots), list(refusals))
+        refused = np.zeros(self.robots, np.bool_)
+        refused[list(refusals)] = True
         self._state = np.where(refused[:, None], self._state, after)
         self._starts = self._starts & refused
         self.inputs, self.outputs = inputs, outputs

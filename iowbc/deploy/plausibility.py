@@ -87,7 +87,7 @@ class Plausibility:
         values = [given[name] for name in self.names]
         rows = np.column_stack([*values, *(np.sqrt(np.vecdot(given[n], given[n])) for n in self._unit_length)])
         inside = (rows >= self._low) & (rows <= self._high)
-        old = self._old(np.column_stack(values[1:]) if measured_at is None else measured_at[:, None])
+        old = self._old(rows[:, values[0].shape[1] :] if measured_at is None else measured_at[:, None])
         refusals = {}
         for robot in np.flatnonzero(old | ~inside.all(axis=1)).tolist():
             column = int(np.argmin(inside[robot]))

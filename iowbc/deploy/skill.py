@@ -17,7 +17,7 @@ from iowbc.control.hand_forces import HandForces
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.control.skill_command import SkillCommand
-from iowbc.control.skill_observation import WAYPOINTS, object_yaw, robot_observation
+from iowbc.control.skill_observation import WAYPOINTS, YAW, of_object, robot_observation
 from iowbc.deploy.contract import readable
 from iowbc.deploy.controller import Controller, base_grasp
 from iowbc.deploy.session import open_session, run
@@ -74,6 +74,7 @@ class Skill:
         self._felt = np.zeros((n, self.contract.robot.history, 2, 3))
         self._wrist_error = np.zeros((n, 2, 3))
         self._passed = 0
+        self._yaw: Array | None = None
         self._command = self._rule.standing()
 
     def step(self, measured: Measured) -> Array:
@@ -82,33 +83,36 @@ class Skill:
 
         A robot whose measurements are no numbers keeps its command. Raises ValueError for a missing quantity.
         """
+        if self._yaw is not None:
+            self._decide(self._yaw)
         if self._passed:
             target = self._controller.outputs["target"].astype(np.float64)
             self._hands.add(target, measured.joint_position, measured.joint_velocity)
-        command = self._command
-        if self._passed % self._every == 0:
-            self._decide(measured)
+        self._yaw = self._sense(measured) if self._passed % self._every == 0 else None
         self._passed += 1
-        return command.copy()
+        return self._command.copy()
 
-    def _decide(self, measured: Measured) -> None:
-        state = self._controller.state
+    def _sense(self, measured: Measured) -> Array:
+        """Observes for the decision that the step to come makes, so that no step has all of the work; yaw of the
+        objects (n,) [rad]."""
+        command, thing = self._command, of_object(measured, self.contract.sees_object)
         if self._passed:
+            state = self._controller.state
+            posture, last = (state[name].astype(np.float64) for name in ("posture", "command"))
             force, wrists = self._hands.read(measured.projected_gravity)
             self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
-            posture, last = (state[name].astype(np.float64) for name in ("posture", "command"))
-            wanted = self._references.wrist_target(posture, last, self._grasp)
-            self._wrist_error = wrists - wanted
-        command = self._command
-        if self._passed:
-            command = approach(state["command"].astype(np.float64), command, self._largest_step)
-        n, sees_object = len(command), self.contract.sees_object
+            self._wrist_error = wrists - self._references.wrist_target(posture, last, self._grasp)
+            command = approach(last, command, self._largest_step)
+        n = len(command)
         unknown, no_path = np.zeros(n, np.bool_), np.zeros((n, WAYPOINTS))
         self.observation = robot_observation(
-            command, measured, self._wrist_error, sees_object, self._pushing, unknown, no_path, self._felt
+            command, measured, self._wrist_error, thing, self._pushing, unknown, no_path, self._felt
         )
+        yaw: Array = thing[:, YAW]
+        return yaw
+
+    def _decide(self, yaw: Array) -> None:
         action = run(self._session, {"observation": self.observation})["action"]
-        yaw = object_yaw(measured) if sees_object else np.zeros(n)
         decided = self._rule.with_action(self._rule.following(self._felt[:, -1].sum(axis=1), yaw), action)
         whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
         self._command = np.where(whole, decided, self._command)

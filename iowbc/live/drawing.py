@@ -1,6 +1,5 @@
-"""The scene in the browser: the bodies of a model, forces, the support polygon, the reference posture."""
+"""The scene in the browser: the bodies of a model, forces, the support polygon, the reference posture, a path."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,8 +7,8 @@ import numpy as np
 import viser
 
 from iowbc.arrays import Array
+from iowbc.live.drag import Drags
 from iowbc.live.moment import Moment
-from iowbc.live.session import Pushed
 from iowbc.live.shapes import BodyMesh, collision_shapes, looks
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
@@ -25,12 +24,10 @@ FOLLOWING = 0.1
 """Part of the way to the robot that the view follows with each picture."""
 LEFT_BEHIND = 1.0
 """Farther away than this, it jumps there [m]."""
-STIFFNESS = 150.0
-"""Of the spring between what is dragged and the mouse [N/m]."""
-STRONGEST = 300.0
-"""Force of that spring at most [N]."""
-
-Pull = Callable[[Pushed, Array], None]
+HANDLE, HANDLE_RADIUS = (25, 150, 65), 0.06
+"""Colour and radius [m] of the handle that a person takes hold of."""
+LINE = 0.02
+"""Thickness of lines on the ground [m]."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +41,22 @@ class ShownParts:
     follow: bool = True
 
 
+@dataclass(frozen=True)
+class GameMarks:
+    """What is drawn of a game, once for its model."""
+
+    lines: tuple[tuple[Array, tuple[float, ...]], ...]
+    """The path and its walls: points (k, 3) [m], world frame, with a colour."""
+    handle: Array
+    """The far handle, frame of the object, (3,) [m]."""
+
+
 class Drawing:
     """The scene of a server. `build` it for a model, then `show` its moments."""
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, pull: Pull) -> None:
-        """`pull` is told what is dragged and with what force, world frame, (3,) [N]; at last with zero."""
-        self._scene, self._robot, self._pull = scene, robot, pull
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene, self._robot = scene, robot
+        self.drags = Drags()
         self._model: Any = None
         self._at = np.zeros(2)
         self._bodies: dict[int, viser.FrameHandle] = {}
@@ -68,15 +75,17 @@ class Drawing:
             head_radius=2.0 * ARROW_RADIUS,
             head_length=4.0 * ARROW_RADIUS,
         )
+        self._newtons = scene.add_label("/world/beneath/newtons", "", anchor="bottom-center")
+        self._marks: list[Any] = []
         flat = np.zeros((3, 3)), np.array([[0, 1, 2]])
         self._support = scene.add_mesh_simple(
             "/world/beneath/support", *flat, color=SUPPORT, opacity=0.5, side="double", cast_shadow=False
         )
         self._balance = scene.add_cylinder("/world/balance", radius=DOT, height=ABOVE_GROUND, color=BALANCE)
 
-    def build(self, model: Any) -> None:
-        """Puts the bodies of a model in place of those before."""
-        for handle in [*self._bodies.values(), *self._ghosts.values()]:
+    def build(self, model: Any, marks: GameMarks | None = None) -> None:
+        """Puts the bodies of a model, and what marks a game, in place of those before."""
+        for handle in [*self._marks, *self._bodies.values(), *self._ghosts.values()]:
             handle.remove()
         self._model = model
         links = set(self._robot.tree.bodies)
@@ -95,6 +104,15 @@ class Drawing:
         for n, shape in enumerate(primitive):
             if shape.body in links:
                 self._mesh(f"reference/{shape.body}/shape{n}", shape, ghost=True)
+        self._marks = []
+        if marks is not None:
+            for n, (points, colour) in enumerate(marks.lines):
+                ends, shade = np.stack([points[:-1], points[1:]], axis=1), tuple(round(255 * c) for c in colour[:3])
+                self._marks.append(self._scene.add_line_segments(f"/world/path{n}", ends, shade, thickness=LINE))
+            grip = self._scene.add_icosphere(
+                "/world/bodies/object/handle", HANDLE_RADIUS, color=HANDLE, position=marks.handle
+            )
+            self.drags.follow(grip, "object")
 
     def _mesh(self, name: str, shape: BodyMesh, ghost: bool = False) -> viser.MeshHandle:
         handle = self._scene.add_mesh_simple(
@@ -108,24 +126,18 @@ class Drawing:
             receive_shadow=not ghost,
         )
         if not ghost:
-            handle.on_drag("left")(self._dragged(shape.body))
+            self.drags.follow(handle, shape.body)
         return handle
 
-    def _dragged(self, body: str) -> Any:
-        what: Pushed = "object" if body == "object" else "robot"
+    @property
+    def away(self) -> Array:
+        """How far the view has followed the robot, (3,) [m]."""
+        return np.array([*self._at, 0.0])
 
-        async def pull(event: viser.SceneNodeDragEvent[viser.MeshHandle]) -> None:
-            """In order, as only asynchronous callbacks are."""
-            force = STIFFNESS * (np.array(event.end_position) - np.array(event.start_position))
-            force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), STRONGEST))
-            self._pull(what, force if event.phase != "end" and np.isfinite(force).all() else np.zeros(3))
-
-        return pull
-
-    def show(self, model: Any, moment: Moment, shown: ShownParts) -> None:
+    def show(self, model: Any, moment: Moment, shown: ShownParts, marks: GameMarks | None = None) -> None:
         """Everything as it is at a moment of a model, which is built if it is another one than before."""
         if model is not self._model:
-            self.build(model)
+            self.build(model, marks)
         for body, frame in self._bodies.items():
             frame.position, frame.wxyz = moment.bodies[body, :3], moment.bodies[body, 3:]
         for body, frame in self._ghosts.items():
@@ -149,6 +161,11 @@ class Drawing:
             self._forces.points = (ends - beneath).astype(np.float32)
             colours = np.array([COLOURS[force.kind][:3] for force in moment.forces])
             self._forces.colors = (255 * colours).astype(np.uint8)
+        partner = next((force for force in moment.forces if force.kind == "partner"), None)
+        self._newtons.visible = wanted and partner is not None
+        if partner is not None:
+            self._newtons.text = f"{np.linalg.norm(partner.force):.0f} N"
+            self._newtons.position = partner.end - beneath
 
     def _show_support(self, moment: Moment, beneath: Array, wanted: bool) -> None:
         corners = len(moment.support)

@@ -10,13 +10,12 @@ from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
-from iowbc.evaluation.trials.rollout import RECORDED
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
 from iowbc.sim.rendering.appearance import Appearance
 from iowbc.sim.rendering.forces import Force, forces
 from iowbc.sim.simulation import Simulation
-from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.batch import Batch
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Moment:
     command: Array
     """In force in the step to come, (11,)."""
     signals: Mapping[str, Array]
-    """Those that a trial records, of the step just made, each (k,)."""
+    """Figures of the step just made, each (k,); in an environment those that a trial records."""
 
 
 class SimulationWitness:
@@ -101,11 +100,12 @@ class SimulationWitness:
 
 
 class Witness(SimulationWitness):
-    """Takes down the moments of the first environment of an in-process vector environment, in its present episode."""
+    """Takes down the moments of the first environment of a batch, in its present episode."""
 
-    def __init__(self, environment: VectorEnv) -> None:
-        super().__init__(environment.batch.simulation)
-        self.environment = environment
+    def __init__(self, batch: Batch, signals: Mapping[str, Array]) -> None:
+        """`signals`: by name, (n, k), which are written anew in every step."""
+        super().__init__(batch.simulation)
+        self.batch, self._signals = batch, signals
         self._reference = mujoco.MjData(self.model)
 
     def look(self, seconds: float) -> Moment:
@@ -113,12 +113,12 @@ class Witness(SimulationWitness):
         return replace(
             super().look(seconds),
             reference=self._posture(),
-            command=np.array(self.environment.batch.command[0]).reshape(len(COMMAND)),
-            signals={name: self.environment.signals[name][0].copy() for name in RECORDED},
+            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
+            signals={name: values[0].copy() for name, values in self._signals.items()},
         )
 
     def _posture(self) -> Array:
-        robot, memory, reference = self._simulation.robot, self.environment.batch.memory, self._reference
+        robot, memory, reference = self._simulation.robot, self.batch.memory, self._reference
         reference.qpos[:] = self._appearance.data.qpos
         joints = reference.qpos[self._world.layout.joints]
         joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]

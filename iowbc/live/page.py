@@ -1,17 +1,17 @@
 """The page: runs the session at the pace that the controls ask for, and shows it, or a trial, in the browser."""
 
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import Any
 
 import viser
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.live.drawing import Drawing
-from iowbc.live.panel import LIVE, PAST, ControlPanel, figures
-from iowbc.live.session import Pushed, Session
+from iowbc.live.panel import LIVE, ControlPanel, DrivingPanel
+from iowbc.live.played import PAST, Played
 from iowbc.live.track import Track, played_again, trial_titles
 
 PICTURES = 1.0 / 25.0
@@ -26,21 +26,23 @@ CHECKPOINTS = 2.0
 """Time between two looks for a newer checkpoint [s]."""
 BEHIND = 0.2
 """A simulation that is further behind its pace lets the time go [s]."""
-VIEW = (1.7, -1.4, 1.2)
-"""First position of a camera [m]."""
-AIM = (0.1, 0.0, 0.6)
-"""At what it looks [m]."""
 
 
 class Page:
     """The page of a session, and of the trials of an evaluation where there is one."""
 
-    def __init__(self, server: viser.ViserServer, session: Session, evaluated: Actor | None = None) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Played,
+        evaluated: Actor | None = None,
+        panel: Callable[[viser.GuiApi, Any, Sequence[str]], ControlPanel] = DrivingPanel,
+    ) -> None:
+        """`panel`: makes the controls that fit the session, with the titles of the evaluated trials."""
         self.server, self.session, self._evaluated = server, session, evaluated
-        recipe, robot = session.source.world.recipe, session.environment.batch.robot
-        self.panel = ControlPanel(server.gui, recipe, session.request, self._trials)
-        self.drawing = Drawing(server.scene, robot, session.pull)
-        server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
+        self.panel = panel(server.gui, session, self._trials)
+        self.drawing = Drawing(server.scene, session.robot)
+        server.initial_camera.position, server.initial_camera.look_at = session.view
         self.paused = False
         self.track: Track = session.track
         """The track that is shown: the session's own, or a trial."""
@@ -57,8 +59,10 @@ class Page:
     def _trials(self) -> list[str]:
         return [] if self._evaluated is None else trial_titles(self._evaluated.trials)
 
-    def run(self) -> None:
-        """Runs until interrupted."""
+    def run(self, ready: Callable[[], None]) -> None:
+        """Runs until interrupted; `ready` is called when the page is complete."""
+        self.turn(time.monotonic())
+        ready()
         while True:
             self.turn(time.monotonic())
             time.sleep(max(0.0, min(self._due, self._drawn + PICTURES) - time.monotonic()))
@@ -86,8 +90,7 @@ class Page:
             elif button == "reset":
                 self._reset()
             elif self._showing == LIVE:
-                what: Pushed = "robot" if button == "push robot" else "object"
-                self.session.push(what, self.panel.direction.value, self.panel.impulse.value)
+                self.panel.press(button)
 
     def _pause(self, paused: bool) -> None:
         self.paused = paused
@@ -142,9 +145,10 @@ class Page:
                 self.paused = True
                 panel.label_pause(True)
         if not self.paused and now >= self._due:
-            session.wanted[:] = panel.command
+            panel.steer()
+            session.drag(self.drawing.drags.now(self.drawing.away))
             session.step()
-            self._due = max(self._due + session.environment.period / panel.speed.value, now - BEHIND)
+            self._due = max(self._due + session.period / panel.speed.value, now - BEHIND)
         elif self.paused:
             self._due = now + PICTURES
         self._get_up(now)
@@ -153,7 +157,7 @@ class Page:
 
     def _begin_anew(self, now: float) -> None:
         """A new episode where other conditions are asked for, and no longer being changed."""
-        wish = replace(self.panel.conditions, sequence=self.session.request.sequence)
+        wish = self.panel.conditions
         if wish != self._wish:
             self._wish, self._wished = wish, now
         elif wish != self.session.request and now >= self._wished + SETTLED:
@@ -181,10 +185,11 @@ class Page:
     def _draw(self, now: float) -> None:
         moment = self.track.moments[self.place]
         with self.server.atomic():
-            self.drawing.show(self.track.model, moment, self.panel.shown)
+            marks = self.session.marks if self._showing == LIVE else None
+            self.drawing.show(self.track.model, moment, self.panel.shown, marks)
         if now >= self._read + READING:
             self.panel.status.content = self._status(now)
-            self.panel.figures.content = figures(moment, self.track.readings(self.place))
+            self.panel.figures.content = self.panel.figures_at(self.track, self.place)
             self._read = now
 
     def _status(self, now: float) -> str:
@@ -199,16 +204,6 @@ class Page:
                 words.append(f"{(track.end - before) / max(now - at, READING):.1f} × real time")
         if track.ending and self.place == len(track.moments) - 1:
             words.append(f"ended: {track.ending}")
-        if self.session.source.key:
-            words.append(time.strftime("checkpoint of %H:%M:%S", time.localtime(self.session.written)))
+        if self.session.checkpoint:
+            words.append(self.session.checkpoint)
         return " · ".join(words)
-
-
-def play_on_page(
-    server: viser.ViserServer, session: Session, evaluated: Actor | None, ready: Callable[[], None]
-) -> None:
-    """Shows a session until interrupted; `ready` is called when the page is complete."""
-    page = Page(server, session, evaluated)
-    page.turn(time.monotonic())
-    ready()
-    page.run()

@@ -1,11 +1,12 @@
 """Controls and figures beside the scene; the page that runs the simulation reads the controls turn by turn."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 from math import isnan
 from queue import SimpleQueue
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import viser
@@ -16,15 +17,14 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drawing import ShownParts
 from iowbc.live.moment import Moment
-from iowbc.live.track import WINDOW, TrackFigures
-from iowbc.recipe.recipe import Recipe
+from iowbc.live.played import PAST, Played
+from iowbc.live.session import Pushed, Session
+from iowbc.live.track import WINDOW, Track, TrackFigures
 from iowbc.recipe.task.commands import Commands
 
-Button = Literal["pause", "reset", "push robot", "push object"]
+Button = Literal["pause", "reset", "push robot", "push object", "next task"]
 
 LIVE = "live"
-PAST = 60.0
-"""Length of the past of a live episode that can be looked at [s]."""
 HEAVIEST = 2.0
 """Largest mass on the slider, in nominal masses of the scene's object."""
 LIGHTEST = 1.0
@@ -42,12 +42,12 @@ LABELS = {
 }
 
 
-class ControlPanel:
-    """Controls of the page; all tabs of the browser share them."""
+class ControlPanel(ABC):
+    """Controls of every page; all tabs of the browser share them."""
 
-    def __init__(self, gui: viser.GuiApi, recipe: Recipe, request: PlayRequest, trials: Sequence[str]) -> None:
+    def __init__(self, gui: viser.GuiApi, session: Played, trials: Sequence[str]) -> None:
         """`trials`: titles of recorded trials to choose from; none are offered where there are none."""
-        self._gui, self._recipe, self._request = gui, recipe, request
+        self._gui = gui
         self._pressed: SimpleQueue[Button] = SimpleQueue()
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
@@ -58,18 +58,7 @@ class ControlPanel:
         self.time = gui.add_slider("Time [s]", -PAST, 0.0, 0.02, 0.0, hint="Drag to look at what has been")
         self.speed = gui.add_slider("Speed", 0.1, 1.0, 0.1, 1.0, hint="1 is real time")
         tabs = gui.add_tab_group()
-        with tabs.add_tab("Command"):
-            self._command = self._commands(recipe.task.commands)
-            gui.add_button("Stand still").on_click(lambda _: self._stand())
-        with tabs.add_tab("Push"):
-            gui.add_markdown("Drag the robot or the object with the mouse, or:")
-            self.impulse = gui.add_slider("Size [N·s]", 1.0, STRONGEST_PUSH, 1.0, 15.0)
-            self.direction = gui.add_dropdown("Direction", tuple(DIRECTIONS), initial_value="forward")
-            self._button(gui.add_button("Push the robot"), "push robot")
-            self._button(gui.add_button("Push the object"), "push object")
-        with tabs.add_tab("Episode"):
-            gui.add_markdown("Every change begins a new episode.")
-            self._conditions()
+        self._add_tabs(tabs)
         with tabs.add_tab("View"):
             usual = ShownParts()
             self._shown = {
@@ -81,9 +70,80 @@ class ControlPanel:
             }
         self.figures = gui.add_html("")
 
+    @abstractmethod
+    def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
+        """Adds the session's own tabs."""
+
+    @property
+    @abstractmethod
+    def conditions(self) -> Any:
+        """The episode that is asked for, as `Played.begin` takes it."""
+
+    @abstractmethod
+    def steer(self) -> None:
+        """Hands the controls over to the session before a step."""
+
+    @abstractmethod
+    def press(self, button: Button) -> None:
+        """Carries out what a button of the session's own tabs asks for."""
+
+    @abstractmethod
+    def figures_at(self, track: Track, place: int) -> str:
+        """Figures of the moment at an index of a track, as HTML."""
+
     def _button(self, handle: viser.GuiButtonHandle, name: Button) -> viser.GuiButtonHandle:
         handle.on_click(lambda _: self._pressed.put(name))
         return handle
+
+    @property
+    def shown(self) -> ShownParts:
+        """Parts that are to be drawn."""
+        return ShownParts(**{name: box.value for name, box in self._shown.items()})
+
+    def pressed(self) -> list[Button]:
+        """The buttons that were pressed since this was asked last."""
+        return [self._pressed.get() for _ in range(self._pressed.qsize())]
+
+    def label_pause(self, paused: bool) -> None:
+        """Says what the button would do."""
+        self._pause.label = "Go on" if paused else "Pause"
+
+
+class DrivingPanel(ControlPanel):
+    """Controls of a policy that is driven by hand: command, pushes, conditions of the episode."""
+
+    def __init__(self, gui: viser.GuiApi, session: Session, trials: Sequence[str]) -> None:
+        self._session, self._recipe = session, session.source.world.recipe
+        self._request: PlayRequest = session.request
+        super().__init__(gui, session, trials)
+
+    def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
+        gui = self._gui
+        with tabs.add_tab("Command"):
+            self._command = self._commands(self._recipe.task.commands)
+            gui.add_button("Stand still").on_click(lambda _: self._stand())
+        with tabs.add_tab("Push"):
+            gui.add_markdown("Drag the robot or the object with the mouse, or:")
+            self.impulse = gui.add_slider("Size [N·s]", 1.0, STRONGEST_PUSH, 1.0, 15.0)
+            self.direction = gui.add_dropdown("Direction", tuple(DIRECTIONS), initial_value="forward")
+            self._button(gui.add_button("Push the robot"), "push robot")
+            self._button(gui.add_button("Push the object"), "push object")
+        with tabs.add_tab("Episode"):
+            gui.add_markdown("Every change begins a new episode.")
+            self._conditions()
+
+    def steer(self) -> None:
+        """See `ControlPanel`."""
+        self._session.wanted[:] = self.command
+
+    def press(self, button: Button) -> None:
+        """See `ControlPanel`."""
+        what: Pushed = "robot" if button == "push robot" else "object"
+        self._session.push(what, self.direction.value, self.impulse.value)
+
+    def figures_at(self, track: Track, place: int) -> str:
+        """See `ControlPanel`."""
+        return figures(track.moments[place], track.readings(place))
 
     def _commands(self, commands: Commands) -> list[viser.GuiSliderHandle]:
         """A slider for each entry of the command, over what training commands."""
@@ -142,19 +202,6 @@ class ControlPanel:
             disturbances=self.disturbances.value,
         )
 
-    @property
-    def shown(self) -> ShownParts:
-        """Parts that are to be drawn."""
-        return ShownParts(**{name: box.value for name, box in self._shown.items()})
-
-    def pressed(self) -> list[Button]:
-        """The buttons that were pressed since this was asked last."""
-        return [self._pressed.get() for _ in range(self._pressed.qsize())]
-
-    def label_pause(self, paused: bool) -> None:
-        """Says what the button would do."""
-        self._pause.label = "Go on" if paused else "Pause"
-
 
 UNITS = {"E_v": "m/s", "E_psi": "rad", "E_alpha": "rad", "E_h": "m"}
 SYMBOLS = {"E_v": "E<sub>v</sub>", "E_psi": "E<sub>ψ</sub>", "E_alpha": "E<sub>α</sub>", "E_h": "E<sub>h</sub>"}
@@ -172,18 +219,18 @@ def figures(moment: Moment, readings: TrackFigures) -> str:
         ("height", signals["height_command"][0], signals["pelvis_height"][0], "m"),
         ("lean", signals["torso_pitch_command"][0], signals["torso_pitch"][0], "rad"),
     ]
-    asked = [_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
-    errors = [_row(SYMBOLS[name], f"{readings.errors[name]:.3f} {unit}") for name, unit in UNITS.items()]
+    asked = [table_row(name, f"{first:+.2f}", f"{second:+.2f} {unit}") for name, first, second, unit in rows]
+    errors = [table_row(SYMBOLS[name], f"{readings.errors[name]:.3f} {unit}") for name, unit in UNITS.items()]
     hands = "–" if isnan(readings.weight_in_hands) else f"{100 * readings.weight_in_hands:.0f} %"
     worst = sorted(readings.saturated.items(), key=lambda pair: -pair[1])
     limits = ", ".join(f"{escape(name.removesuffix('_joint'))} {100 * share:.0f} %" for name, share in worst)
     return (
-        f"<div style='padding:0 1em;font-size:0.8em'><table>{_row('', 'command', 'is')}{''.join(asked)}</table>"
+        f"<div style='padding:0 1em;font-size:0.8em'><table>{table_row('', 'command', 'is')}{''.join(asked)}</table>"
         f"<p style='margin:0.4em 0'>Means of the last {WINDOW:g} s:</p><table>{''.join(errors)}"
-        f"{_row('weight in the hands', hands)}</table>"
+        f"{table_row('weight in the hands', hands)}</table>"
         f"<p style='margin:0.4em 0'>Joints at their torque limit: {limits or 'none'}</p></div>"
     )
 
 
-def _row(name: str, *values: str) -> str:
+def table_row(name: str, *values: str) -> str:
     return f"<tr><td style='{NAME}'>{name}</td>" + "".join(f"<td style='{CELL}'>{v}</td>" for v in values) + "</tr>"

@@ -1,5 +1,7 @@
 """A policy that is driven by hand: one environment, commands, pushes, and what happened in the last minute."""
 
+import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -11,22 +13,26 @@ from iowbc.errors import Damaged
 from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
+from iowbc.live.drag import Drag
 from iowbc.live.moment import Witness
-from iowbc.live.track import track_of
+from iowbc.live.played import PAST, Played
+from iowbc.live.track import recorded, track_of
 from iowbc.recipe.evaluation.segment import Segment
 
 Pushed = Literal["robot", "object"]
 
 AN_HOUR = (Segment(duration=600.0),) * 6
 """The longest that an episode lasts."""
-REMEMBERED = 60.0
-"""Length of the past that is kept [s]."""
 BLOW = 0.1
 """Length of a push [s]; as long as those of `eval.robustness.pushes`."""
+STIFFNESS = 150.0
+"""Of the spring between what is dragged and the mouse [N/m]."""
+STRONGEST = 300.0
+"""Force of that spring at most [N]."""
 
 
-class Session:
-    """One episode after another in the world of a source. Close it, or use it as a context manager."""
+class Session(Played):
+    """One episode after another in the world of a source."""
 
     def __init__(self, source: Source, request: PlayRequest) -> None:
         """Begins an episode. Raises ContractBroken for a damaged export, Damaged for a damaged checkpoint."""
@@ -40,6 +46,7 @@ class Session:
         self.request = replace(request, sequence=AN_HOUR)
         self.environment = self.source.environment(requested_episode(self.source.world.recipe, self.request))
         self.environment.batch.guidance.commander.steer(self.wanted)
+        self.robot, self.period = self.environment.batch.robot, self.environment.period
         self._load()
         self._witness: Witness | None = None
         self.reset()
@@ -47,6 +54,8 @@ class Session:
     def _load(self) -> None:
         self.written = self.source.policy.stat().st_mtime
         """When the policy was written, as a time stamp; a checkpoint is written again and again."""
+        if self.source.key:
+            self.checkpoint = time.strftime("checkpoint of %H:%M:%S", time.localtime(self.written))
         self._policy = open_policy(self.source, self.environment)
 
     def begin(self, request: PlayRequest) -> None:
@@ -61,9 +70,9 @@ class Session:
         self._policy.reset(np.ones(1, np.bool_))
         self._steps = 0
         self._blow = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
-        self._witness = witness = self._witness or Witness(environment)
+        self._witness = witness = self._witness or Witness(environment.batch, recorded(environment))
         title = f"{self.request.scene}, {self.request.object_mass:g} kg"
-        self.track = track_of(witness, self.source.world, title, round(REMEMBERED / environment.period))
+        self.track = track_of(witness, self.source.world, title, round(PAST / environment.period))
         self._look = witness.look
         self.track.moments.append(self._look(0.0))
 
@@ -104,6 +113,16 @@ class Session:
         along = np.array([cosine * forward - sine * left, sine * forward + cosine * left, 0.0])
         self._blow[what] = (force * along, steps)
 
+    def drag(self, drags: Sequence[Drag]) -> None:
+        """Pulls at what mice drag, by a spring of bounded force, and at nothing else."""
+        pulls: dict[Pushed, Array] = {"robot": np.zeros(3), "object": np.zeros(3)}
+        for drag in drags:
+            force = STIFFNESS * (drag.end - drag.start)
+            force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), STRONGEST))
+            pulls["object" if drag.body == "object" else "robot"] += force
+        for what, force in pulls.items():
+            self.pull(what, force)
+
     def pull(self, what: Pushed, force: Array) -> None:
         """A steady force, world frame, (3,) [N], until another is told."""
         self._pull[what] = np.asarray(force, np.float64)
@@ -123,9 +142,3 @@ class Session:
     def close(self) -> None:
         """Ends the simulation."""
         self.environment.close()
-
-    def __enter__(self) -> "Session":
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()

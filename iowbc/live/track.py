@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from iowbc.arrays import Array
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
@@ -88,16 +89,20 @@ class Track:
         )
 
 
+def recorded(environment: VectorEnv) -> dict[str, Array]:
+    """The signals of an environment that a trial records, by name, (1, k)."""
+    return {name: environment.signals[name] for name in RECORDED}
+
+
 def track_of(witness: Witness, world: Specification, title: str, kept: int | None = None) -> Track:
     """An empty track of a witness's present episode in a world."""
-    environment = witness.environment
     return Track(
         title=title,
         model=witness.model,
-        period=environment.period,
+        period=witness.batch.period,
         gait_period=1.0 / world.recipe.task.references.gait.frequency,
         held_weight=witness.held_weight,
-        joints=environment.batch.robot.joints,
+        joints=witness.batch.robot.joints,
         kept=kept,
     )
 
@@ -129,7 +134,7 @@ def played_again(
 
     def look(seconds: float) -> None:
         if not witness:
-            witness.append(Witness(environment))
+            witness.append(Witness(environment.batch, recorded(environment)))
         seen.append(witness[0].look(seconds))
 
     try:

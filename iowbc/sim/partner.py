@@ -59,6 +59,9 @@ class Partner:
         """Partners whose feed is their own: velocity of the handle in the frame of the heading at the start, yaw rate
         of the object, and height of the handle from any origin; from the next reset on, (n,). Not part of
         snapshots."""
+        self.loose = np.zeros(n, np.bool_)
+        """Steered partners that exert no horizontal force: they bear their share and follow the handle, (n,). Not part
+        of snapshots."""
         self._turning_inertia = np.array([measured(thing).about_axes[2] if thing else 0.0 for thing in things])
         self._yaw_stiffness, self._yaw_damping, self._yaw_lead = np.zeros(n), np.zeros(n), np.zeros(n)
         self._present, self._height = np.zeros(n), np.full(n, np.nan)
@@ -163,6 +166,7 @@ class Partner:
         lead = self._aim + velocity * self._period - self._at
         lead[:, :2] *= np.minimum(1.0, self._recipe.leash / (_length(lead) + TINY))[:, None]
         lead[:, 2] = lead[:, 2].clip(-self._recipe.leash, self._recipe.leash)
+        lead[self.loose, :2] = 0.0
         np.add(self._at, lead, out=self._aim)
         force = self._force
         np.multiply(lead, self._stiffness[:, None], out=force)
@@ -177,6 +181,7 @@ class Partner:
         force[:, :2] += along * (state.partner_share * self._resistance)[:, None]
         force[:, 2] += state.partner_share * self._weight
         self._tug(force)
+        force[self.loose, :2] = 0.0
         force *= self._present[:, None]
         self._steps += 1
         out[:, :3] = force
@@ -307,6 +312,11 @@ class Partner:
     def at(self) -> Array:
         """The objects' far handles, (n, 3) [m]."""
         return self._at.copy()
+
+    @property
+    def aim(self) -> Array:
+        """Where the partners' springs pull the handles, (n, 3) [m]."""
+        return self._aim.copy()
 
     def arrays(self) -> dict[str, Array]:
         """The partners' memory, by name."""

@@ -172,6 +172,16 @@ class Simulation:
         return self._partner.steered
 
     @property
+    def loose(self) -> NDArray[np.bool_]:
+        """Steered partners that exert no horizontal force, to be written, (n,); see `Partner.loose`."""
+        return self._partner.loose
+
+    @property
+    def partner_aim(self) -> Array:
+        """Where the partners' springs pull the handles, (n, 3) [m]."""
+        return self._partner.aim
+
+    @property
     def handle_position(self) -> Array:
         """The objects' far handles, (n, 3) [m]."""
         return self._partner.at

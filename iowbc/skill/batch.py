@@ -7,7 +7,7 @@ import numpy as np
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
-from iowbc.control.skill_observation import joined, object_yaw, robot_observation
+from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
@@ -17,7 +17,7 @@ from iowbc.skill.human import Human
 from iowbc.skill.lower_layer import LowerLayer
 from iowbc.skill.nominal import NominalCommand
 from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, RULES, Plan
+from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, Plan
 from iowbc.skill.pursuit import Wanted, by_the_clock, pursue
 from iowbc.skill.reward import GameEnding, ending, potential, reward
 from iowbc.skill.situation import Origin, Situation, situation, turned
@@ -61,7 +61,8 @@ class GameBatch:
             block,
         )
         n, period, own = self.n, self.lower.period, list(tasks.values())
-        self._substeps = round(1.0 / (self._skill.frequency * period))
+        self.substeps = round(1.0 / (self._skill.frequency * period))
+        """Control steps of a decision."""
         worlds = [getattr(recipe.simulation.scenes, scene) for scene in scenes]
         self._pushing = np.array([world.kind == "push" for world in worlds])
         self._corners = np.array([shape_of(world.object).high[:2] for world in worlds])[:, None] * CORNERS
@@ -71,7 +72,7 @@ class GameBatch:
         self._nominal = NominalCommand(self._skill, recipe.task.commands, self._pushing)
         self._human = Human(self._skill, n, period)
         self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n)
-        self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self._substeps)
+        self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self.substeps)
         self._sees_object = recipe.task.observation.observe_object and recipe.distill.observe_object
         self.origin = Origin.blank(n)
         self._episode, self._decisions, self._touched = np.zeros((3, n), np.int64)
@@ -80,6 +81,9 @@ class GameBatch:
         """Estimated forces on the hands, the newest last [N]."""
         self._wrist_error = np.zeros((n, 2, 3))
         self._action = {"robot": np.zeros((n, ROBOT_ACTIONS)), "human": np.zeros((n, HUMAN_ACTIONS))}
+        self._costs, self._jerk = np.zeros((3, n)), np.zeros(n)
+        self.hand = np.full((n, 3), np.nan)
+        """Where persons have their hands, which pull the handle there, world frame, (n, 3) [m]; NaN lets go."""
         self.now: Situation
         """The games after the last control step."""
         self.watch: Callable[[], None] = lambda: None
@@ -102,24 +106,42 @@ class GameBatch:
         self._observe("now")
 
     def step(self) -> None:
-        """One decision of every game; those that end begin anew."""
-        lower, simulation = self.lower, self.lower.simulation
+        """One decision of every game, with `substeps` control steps; those that end begin anew."""
+        self.decide()
+        for _ in range(self.substeps):
+            self.control()
+        self.conclude()
+
+    def decide(self) -> None:
+        """Takes over the actions."""
         action = {name: self.buffers[f"action/{name}"].astype(np.float64).clip(-1.0, 1.0) for name in self._action}
-        jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
+        self._jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
         self._action = action
-        lower.wanted[:] = self._nominal.with_action(self._nominals, action["robot"])
+        self.lower.wanted[:] = self._nominal.with_action(self._nominals, action["robot"])
         self._human.intend(self._intentions(action["human"]))
-        costs = np.zeros((3, self.n))
-        for _ in range(self._substeps):
-            lower.human[:] = self._human.advance()
-            lower.control()
-            self._hands.add(simulation.target, simulation.measured.joint_position, simulation.measured.joint_velocity)
-            self.now = self._situation(self.now.covered)
-            costs += self._costs()
-            self.watch()
+        self._costs[:] = 0.0
+
+    def control(self) -> None:
+        """One control step."""
+        lower, simulation = self.lower, self.lower.simulation
+        person = self.drawn.kind == KINDS.index(PERSON)
+        if person.any():
+            holding = np.isfinite(self.hand).all(axis=1)
+            simulation.loose[:] = person & ~holding
+            away = np.nan_to_num(self.hand - simulation.partner_aim)
+            self._human.reach(person, self.origin.turned(away), self.now)
+        lower.human[:] = self._human.advance()
+        lower.control()
+        self._hands.add(simulation.target, simulation.measured.joint_position, simulation.measured.joint_velocity)
+        self.now = self._situation(self.now.covered)
+        self._costs += self._costs_now()
+        self.watch()
+
+    def conclude(self) -> None:
+        """Judges the decision."""
         self._decisions += 1
         self._feel()
-        self._judge(costs * lower.period, jerk)
+        self._judge(self._costs * self.lower.period, self._jerk)
 
     def _judge(self, costs: Array, jerk: Array) -> None:
         """Reward and endings of the decision just made; begins anew where a game has ended."""
@@ -172,9 +194,8 @@ class GameBatch:
         lower = self.lower
         return situation(lower.simulation, lower.moved, self.origin, self.paths, self.drawn.task, covered)
 
-    def _command(self) -> Array:
-        """Nominal commands, (n, 11)."""
-        yaw = object_yaw(self.lower.measured) * self._sees_object
+    def _command(self, yaw: Array) -> Array:
+        """Nominal commands, (n, 11); `yaw` (n,) of the objects as measured [rad]."""
         nominal = self._nominal
         by_rule = {
             "lead": nominal.leading(pursue(self._skill.pursuit, self.paths, self.now), self.now),
@@ -198,7 +219,7 @@ class GameBatch:
     def _by_the_clock(self, pace: Array | float) -> Wanted:
         return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
 
-    def _costs(self) -> Array:
+    def _costs_now(self) -> Array:
         """Internal force [N], size of the human's power beyond its share [W] and tilt [rad], (3, n)."""
         state, drawn = self.lower.simulation.state, self.lower.simulation.drawn
         partner = state.partner_force
@@ -236,8 +257,9 @@ class GameBatch:
         """Writes what agents and critic see."""
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
         path = seen.waypoints(self.paths, now, ahead, now.heading)
+        thing = of_object(lower.measured, self._sees_object)
         robot = robot_observation(
-            *(lower.command, lower.measured, self._wrist_error, self._sees_object),
+            *(lower.command, lower.measured, self._wrist_error, thing),
             *(self._pushing, drawn.known, path, self._felt),
         )
         force = self.origin.turned(lower.simulation.state.partner_force)
@@ -245,7 +267,7 @@ class GameBatch:
         left = (self._limit[drawn.task] - self._decisions) / self._skill.frequency
         secret = seen.hidden(lower.simulation, lower.moved, left, drawn.acts)
         human = joined(felt)
-        self._nominals = self._command()
+        self._nominals = self._command(thing[:, YAW])
         self.buffers[f"{time}/robot"][:], self.buffers[f"{time}/human"][:] = robot, human
         self.buffers[f"{time}/state"][:] = np.concatenate([robot, human, joined(secret)], axis=1)
 

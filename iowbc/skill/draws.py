@@ -8,11 +8,13 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.skill.task import TransportTask
-from iowbc.skill.plan import ABSENT, AGENT, KINDS, RULES, Plan
+from iowbc.skill.plan import ABSENT, AGENT, KINDS, PERSON, RULES, Plan
 
 CLOCK_PACE = (0.5, 1.5)
 """Range of the pace of a human who ignores the robot: the simulation's leaders go half as fast again at most."""
 FOLLOWER = BEHAVIOURS.index("follower")
+ZERO_FOR_A_PERSON = ("partner_delay", "partner_noise", "partner_share_drift", "start_yaw")
+"""Imperfections that are drawn for scripted humans, as a person has its own, and the robot's heading in its view."""
 
 
 class EpisodeDraws:
@@ -73,11 +75,12 @@ class EpisodeDraws:
         slow, fast = CLOCK_PACE
         self.pace[which] = slow + (fast - slow) * chance[:, 5]
         self.acts[which] = kind == KINDS.index(AGENT)
-        scripted = kind < len(BEHAVIOURS)
+        scripted, person = kind < len(BEHAVIOURS), kind == KINDS.index(PERSON)
         return {
             "object_mass": mass,
             "partner_share": np.where(kind == KINDS.index(ABSENT), 0.0, share),
             "partner_behaviour": np.where(scripted, kind, 0).astype(np.float64),
             "partner_pace": np.where(scripted, np.nan, 1.0),
             "object_ground_friction": self._resistance[task],
+            **{name: np.where(person, 0.0, np.nan) for name in ZERO_FOR_A_PERSON},
         }

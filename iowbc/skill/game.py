@@ -137,13 +137,21 @@ class TransportGame:
     def step(self, actions: Mapping[str, Array]) -> Outcome:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
         finite."""
+        self.act(actions)
+        self._call(MakeStep())
+        return self.outcome()
+
+    def act(self, actions: Mapping[str, Array]) -> None:
+        """Hands over actions for the next decision; see `step`."""
         for agent in self.agents:
             buffer, given = self._buffers[f"action/{agent}"], np.asarray(actions[agent], np.float32)
             if given.shape != buffer.shape or not np.isfinite(given).all():
                 text = f"shape {given.shape}" if given.shape != buffer.shape else "values that are not finite"
                 raise ValueError(f"actions of {agent} have {text}; expected finite ones of shape {buffer.shape}")
             buffer[:] = given
-        self._call(MakeStep())
+
+    def outcome(self) -> Outcome:
+        """What came of the last decision."""
         buffers = self._buffers
         terminated, truncated = buffers["terminated"].copy(), buffers["truncated"].copy()
         return Outcome(

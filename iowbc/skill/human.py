@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, Mask
 from iowbc.recipe.skill.skill import Skill
 from iowbc.skill.pursuit import Wanted
 from iowbc.skill.situation import Situation, turned, wrapped
@@ -45,6 +45,16 @@ class Human:
     def intend(self, intentions: Array) -> None:
         """Takes over intentions (n, 5) until the next decision."""
         self._velocity, self._offset = intentions[:, :4], intentions[:, 4]
+
+    def reach(self, which: Mask, away: Array, now: Situation) -> None:
+        """Lets some humans, (n,), lead their springs to hands that are `away` (n, 3) [m] (frame of the start), no
+        faster than the human of the actions; they leave the object's yaw to the robot."""
+        s = self._settings
+        velocity, fastest = away / s.hand_time, self._pursuit.speed + s.velocity
+        velocity[:, :2] *= fastest / np.linalg.norm(velocity[:, :2], axis=1).clip(fastest)[:, None]
+        velocity[:, 2] = velocity[:, 2].clip(-s.vertical_velocity, s.vertical_velocity)
+        self._velocity[which] = np.column_stack([velocity, now.yaw_rate])[which]
+        self._offset[which] = 0.0
 
     def advance(self) -> Array:
         """What the partner of the simulation is fed in the control step to come, (n, 4): see `Partner.steered`."""

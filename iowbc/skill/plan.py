@@ -5,9 +5,10 @@ from typing import Literal, get_args
 
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 
-AGENT, ABSENT, CLOCK = "agent", "absent", "clock"
-KINDS = (*BEHAVIOURS, AGENT, ABSENT, CLOCK)
-"""Humans: scripted ones with a behaviour; the one of the actions; nobody; one who walks the path by the clock."""
+AGENT, ABSENT, CLOCK, PERSON = "agent", "absent", "clock", "person"
+KINDS = (*BEHAVIOURS, AGENT, ABSENT, CLOCK, PERSON)
+"""Humans: scripted ones with a behaviour; the one of the actions; nobody; one who walks the path by the clock; a person
+whose hand leads the handle (`GameBatch.hand`)."""
 Rule = Literal["lead", "follow", "clock", "stand"]
 RULES: tuple[Rule, ...] = get_args(Rule)
 """Nominal commands of the robot: along the path; with the forces on its hands; along the path by the clock, whatever

@@ -18,6 +18,7 @@ from websockets.typing import Subprotocol
 from iowbc.live import server as border
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import HOST, serving
+from iowbc.live.session import STIFFNESS
 
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 HANDSHAKE = (
@@ -172,16 +173,74 @@ def test_other_messages_of_a_browser_keep_nothing_and_end_nothing(page: Page) ->
     assert panel.speed.value == 0.6
 
 
-@pytest.mark.parametrize("place", [float("nan"), float("inf"), 1e300])
-def test_a_drag_to_nowhere_is_no_force(page: Page, place: float) -> None:
+LOOKING = {"wxyz": (1, 0, 0, 0), "position": (0, -3, 2), "look_at": (0, 0, 0), "up_direction": (0, 0, 1), "fov": 1.0}
+LOOKING |= {"near": 0.1, "far": 100.0, "image_height": 100, "image_width": 100}
+HELD = (0.1, 0.0, 0.8)
 
-    class Drag:
-        phase, start_position, end_position = "update", (0.0, 0.0, 0.0), (place, 0.0, 0.0)
 
-    pulling = page.drawing._dragged("pelvis")(Drag())
-    with np.errstate(over="ignore", invalid="ignore"), pytest.raises(StopIteration):
-        pulling.send(None)
-    assert np.isfinite(page.session._pull["robot"]).all()
+def drag(client: ClientConnection, phase: str, end: Any, start: Any = HELD, body: str = "pelvis") -> None:
+    say(
+        client,
+        type="SceneNodeDragMessage",
+        name=f"/world/bodies/{body}/looks0",
+        phase=phase,
+        instance_index=None,
+        button="left",
+        modifier=None,
+        owner="",
+        start_position=start,
+        start_screen_pos=(0, 0),
+        end_position=end,
+        end_screen_pos=(0, 0),
+    )
+
+
+def test_what_a_mouse_drags_is_pulled_until_it_lets_go_or_its_browser_disconnects(page: Page) -> None:
+    turned(page, 0.1)
+    with visitor(page) as client:
+        say(client, type="ViewerCameraMessage", **LOOKING)
+        for ending in ("end", "disconnect"):
+            drag(client, "start", HELD)
+            drag(client, "update", (0.1, 0.2, 0.8))
+            turned(page, 60.0, until=lambda: bool(page.session._pull["robot"].any()))
+            assert page.session._pull["robot"] == pytest.approx([0.0, STIFFNESS * 0.2, 0.0], abs=1e-6)
+            assert not page.session._pull["object"].any()
+            drag(client, "end", (0.1, 0.2, 0.8)) if ending == "end" else client.close()
+            turned(page, 60.0, until=lambda: not page.session._pull["robot"].any())
+            assert not page.session._pull["robot"].any()
+
+
+@pytest.mark.parametrize("place", [(float("nan"), 0, 0), (0, float("-inf"), 0), (1e300, 0, 0)])
+def test_a_drag_to_nowhere_is_no_force_and_the_next_one_is(page: Page, place: Any) -> None:
+    turned(page, 0.1)
+    with visitor(page) as client:
+        say(client, type="ViewerCameraMessage", **LOOKING)
+        drag(client, "start", HELD)
+        drag(client, "update", place)
+        drag(client, "update", HELD, start=place)
+        update(client, page.panel.speed, value=0.4)
+        turned(page, 60.0, until=lambda: bool(page.panel.speed.value == 0.4))
+        assert page.drawing.drags.now(np.zeros(3)) == []
+        drag(client, "update", (0.1, 0.2, 0.8))
+        turned(page, 60.0, until=lambda: bool(page.session._pull["robot"].any()))
+        assert np.linalg.norm(page.session._pull["robot"]) == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("place", [(0.1, 0.2), "xyz", None, [[1.0]] * 3])
+def test_who_drags_to_no_point_at_all_is_cut_off_and_the_others_go_on(page: Page, place: Any) -> None:
+    turned(page, 0.1)
+    with suppress(ConnectionClosed), visitor(page) as client:
+        say(client, type="ViewerCameraMessage", **LOOKING)
+        drag(client, "start", HELD)
+        drag(client, "update", place)
+        for _ in client:
+            """What the server had sent before."""
+    turned(page, 60.0, until=lambda: not page.drawing.drags.now(np.zeros(3)))
+    assert page.drawing.drags.now(np.zeros(3)) == []
+    with visitor(page) as client:
+        update(client, page.panel.speed, value=0.6)
+        turned(page, 60.0, until=lambda: bool(page.panel.speed.value == 0.6))
+    assert page.panel.speed.value == 0.6
 
 
 def test_no_more_pages_are_opened_than_can_be_served(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,7 +40,7 @@ def test_the_robot_leads_along_a_path_that_it_knows_and_stands_where_nobody_pull
     plans = [Plan("lift_straight", "path", known, mass=7.0, share=0.5, seed=1) for known in (True, False)]
     game = make(n=2, plans=plans)
     game.reset()
-    lead, follow = game.batch._command()
+    lead, follow = game.batch._nominals
     assert lead[0] == pytest.approx(game.setup.skill.pursuit.speed)
     assert (follow[:YAW_RATE] == 0.0).all()
     assert abs(follow[YAW_RATE]) < 0.05  # the measured yaw of the object is noisy

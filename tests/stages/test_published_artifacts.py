@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from iowbc.cli import app
 from iowbc.commands.lookup import named
-from iowbc.commands.play import playable
+from iowbc.commands.play import playable, skill_to_play
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.evaluation.report.aggregate import aggregate
@@ -80,6 +80,17 @@ def test_a_fresh_clone_has_a_controller_to_try(tmp_path: Path, monkeypatch: pyte
     folders = list((ROOT / "runs" / "published" / "export").iterdir())
     metrics = [json.loads((folder / "summary.json").read_text())["metrics"] for folder in folders]
     assert min(one["acceptance_survived"] for one in metrics) >= 4
+
+
+def test_a_fresh_clone_has_a_skill_whose_partner_one_can_be(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "published").symlink_to(ROOT / "runs" / "published")
+    store = Store(Runs(tmp_path / "runs"))
+    asked = [("transport", None), ("transport/skill", None), ("transport", "skill")]
+    found = [skill_to_play(store, *one) for one in asked]
+    assert all(one is not None and (one.manifest.stage, one.manifest.recipe) == ("skill", "transport") for one in found)
+    for other in (("transport", "teacher"), ("full", None), ("compliant", None), ("nothing", None)):
+        assert skill_to_play(store, *other) is None
 
 
 def test_a_fresh_clone_has_a_controller_that_needs_no_sight_of_the_object(

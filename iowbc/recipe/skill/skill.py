@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.skill.evaluation import SkillEvaluation
 from iowbc.recipe.skill.learning import SkillLearning
@@ -57,6 +57,9 @@ class HumanAgent(Section):
     """Largest offset of the handle's height from what the vertical velocity has led to [m]."""
     yaw_rate: float = Field(default=0.3, gt=0.0)
     """Largest change of the yaw rate that the human gives the object [rad/s]."""
+    hand_time: float = Field(default=0.15, gt=0.0, json_schema_extra=LATER)
+    """Time in which the spring of a person who plays by hand follows the mouse [s]; events of a browser come every
+    0.05 s."""
 
 
 class Pursuit(Section):

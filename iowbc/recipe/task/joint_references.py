@@ -132,7 +132,9 @@ class GaitPrior(Section):
     @model_validator(mode="after")
     def _feet_are_moved(self) -> Self:
         if self.placement is not None and not self.enabled:
-            raise ValueError("placement: moves the feet of the gait prior, which `enabled: false` leaves out; empty one")
+            raise ValueError(
+                "placement: moves the feet of the gait prior, which `enabled: false` leaves out; empty one"
+            )
         return self
 
 

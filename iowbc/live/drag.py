@@ -1,0 +1,65 @@
+"""What the mice of the browsers hold: points of bodies, and where the pointers are."""
+
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import viser
+
+from iowbc.arrays import Array
+
+FARTHEST = 1e3
+"""Points are no farther away than this [m]; what a browser sends beyond is no place."""
+
+
+@dataclass(frozen=True)
+class Drag:
+    """A body that a mouse drags, world frame, (3,) [m]."""
+
+    body: str
+    start: Array
+    """The point that was taken hold of, where it was when the mouse moved last."""
+    end: Array
+    """The pointer, on a plane through that point parallel to the screen."""
+    camera: Array
+    shift: bool
+    """Whether the shift key is held."""
+
+    def on_plane(self, height: float) -> Array | None:
+        """Where the pointer's ray meets the horizontal plane of a height [m], (3,); None where it does not."""
+        down = self.end[2] - self.camera[2]
+        part = (height - self.camera[2]) / down if down else -1.0
+        point: Array = self.camera + part * (self.end - self.camera)
+        return point if part > 0.0 and np.abs(point).max() < FARTHEST else None
+
+
+class Drags:
+    """The drags that are under way, one a browser. A browser that disconnects ends its own."""
+
+    def __init__(self) -> None:
+        self._held: dict[int, Drag] = {}
+
+    def now(self, away: Array) -> list[Drag]:
+        """Drags as seen from a view that has moved by `away` (3,) [m] since the world's origin."""
+        return [
+            Drag(drag.body, drag.start + away, drag.end + away, drag.camera + away, drag.shift)
+            for drag in list(self._held.values())
+        ]
+
+    def follow(self, handle: Any, body: str) -> None:
+        """Lets a mesh of a body be dragged."""
+        for modifier in (None, "shift"):
+            handle.on_drag("left", modifier=modifier)(self.callback(body))
+
+    def callback(self, body: str) -> Callable[["viser.SceneNodeDragEvent[Any]"], Coroutine[Any, Any, None]]:
+        """Takes notice of the events of one body. Values that are no places end a drag."""
+
+        async def moved(event: "viser.SceneNodeDragEvent[Any]") -> None:
+            """In order, as only asynchronous callbacks are."""
+            self._held.pop(event.client_id, None)
+            places = np.array([event.start_position, event.end_position, event.client.camera.position])
+            if event.phase != "end" and (np.abs(places) < FARTHEST).all():
+                self._held[event.client_id] = Drag(body, places[0], places[1], places[2], event.modifier is not None)
+
+        return moved

@@ -1,0 +1,137 @@
+"""A game of the skill layer whose human is a person: the mouse leads a spring and damper at the object's far handle."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from iowbc.arrays import Array
+from iowbc.learning.networks import TeacherNetwork
+from iowbc.live.drag import Drag
+from iowbc.live.drawing import GameMarks
+from iowbc.live.moment import Moment, Witness
+from iowbc.live.played import PAST, Played
+from iowbc.live.track import track_of
+from iowbc.robot import rotations
+from iowbc.sim.rendering.forces import Force
+from iowbc.skill.evaluation.games import acted
+from iowbc.skill.films import path_lines
+from iowbc.skill.game import COUNTED, TransportGame
+from iowbc.skill.plan import PERSON, Plan, Rule
+from iowbc.skill.student import Student
+from iowbc.task.specification import Specification
+
+UNHURRIED = 600.0
+"""Time limit of a game [s]: a person looks about first."""
+ROBOTS: dict[str, Rule | None] = {"skill": None, "admittance follower": "follow", "stands": "stand"}
+"""Robots that a person can compare: the trained skill, and the rule of one without."""
+
+
+@dataclass(frozen=True)
+class GameRequest:
+    """One game."""
+
+    task: str
+    seed: int = 0
+    robot: str = "skill"
+    """One of `ROBOTS`."""
+
+
+class GameSession(Played):
+    """One game after another; the robot does not know the path."""
+
+    view = ((-1.6, -2.2, 2.4), (0.6, 0.0, 0.6))
+
+    def __init__(self, world: Specification, student: Student, skill: TeacherNetwork, request: GameRequest) -> None:
+        """`skill`: the robot's policy. Raises UsageError for an unknown task."""
+        recipe = world.recipe
+        tasks = recipe.skill.tasks
+        slow = {name: getattr(tasks, name).model_copy(update={"duration": UNHURRIED}) for name in tasks.names}
+        section = recipe.skill.model_copy(update={"tasks": tasks.model_copy(update=slow)})
+        self.world, self._student = replace(world, recipe=recipe.model_copy(update={"skill": section})), student
+        self._skill = skill
+        self._grip: tuple[Array, bool] | None = None
+        self._open(request)
+
+    def _open(self, request: GameRequest) -> None:
+        plan = Plan(request.task, PERSON, known=False, seed=request.seed, rule=ROBOTS[request.robot])
+        self.request, self._game = request, TransportGame(self.world, self._student, n=1, plans=(plan,))
+        self._lower = self._game.batch.lower
+        self.robot, self.period = self._lower.robot, self._lower.period
+        self._witness: Witness | None = None
+        self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
+        self.reset()
+
+    def begin(self, request: GameRequest) -> None:
+        """See `Played`."""
+        self._game.close()
+        self._open(request)
+
+    def reset(self) -> None:
+        """See `Played`."""
+        self._seen = self._game.reset().observations["robot"]
+        batch, state = self._game.batch, self._lower.simulation.state
+        self._steps, self._grip, batch.hand[:] = 0, None, np.nan
+        away = self._lower.simulation.handle_position - state.object_position
+        handle = rotations.rotate_inverse(state.object_quaternion, away)[0]
+        self.marks = GameMarks(tuple(path_lines(batch, 0)), handle)
+        self._witness = self._witness or Witness(self._lower, self._signals)
+        mass = self._lower.simulation.drawn["object_mass"][0]
+        title = f"{self.request.task}, {mass:.0f} kg"
+        self.track = track_of(self._witness, self.world, title, round(PAST / self.period))
+        self.track.moments.append(self._look())
+
+    def step(self) -> None:
+        """See `Played`."""
+        if self.track.ending:
+            return
+        batch = self._game.batch
+        if self._steps % batch.substeps == 0:
+            network = self._skill if ROBOTS[self.request.robot] is None else None
+            sizes = self._game.action_sizes
+            self._game.act(
+                {"robot": acted(network, self._seen, sizes["robot"]), "human": np.zeros((1, sizes["human"]))}
+            )
+            batch.decide()
+        batch.control()
+        self._steps += 1
+        self.track.moments.append(self._look())
+        if self._steps % batch.substeps == 0:
+            batch.conclude()
+            outcome = self._game.outcome()
+            self._seen = outcome.observed.observations["robot"]
+            if outcome.terminated[0] or outcome.truncated[0]:
+                self.track.ending = next((name for name in COUNTED[:-1] if outcome.figures[name][0]), "touched")
+
+    def drag(self, drags: Sequence[Drag]) -> None:
+        """Leads the hand at the handle to the pointer: on its level, and upward with the shift key. The newest drag
+        counts; without any the hand lets go."""
+        simulation, hand = self._lower.simulation, self._game.batch.hand[0]
+        drag = next((drag for drag in reversed(drags) if drag.body == "object"), None)
+        if drag is None:
+            self._grip, hand[:] = None, np.nan
+            return
+        if self._grip is None or self._grip[1] != drag.shift:
+            self._grip = drag.start - simulation.handle_position[0], drag.shift
+            hand[:] = *simulation.handle_position[0, :2], simulation.partner_aim[0, 2]
+        beside = self._grip[0]
+        if drag.shift:
+            hand[2] = drag.end[2] - beside[2]
+        elif (point := drag.on_plane(drag.start[2])) is not None:
+            hand[:2] = (point - beside)[:2]
+
+    def close(self) -> None:
+        """See `Played`."""
+        self._game.close()
+
+    def _look(self) -> Moment:
+        """The present moment; of the partner's force the arrow shows the horizontal part, which the mouse makes."""
+        now, simulation, signals = self._game.batch.now, self._lower.simulation, self._signals
+        force = simulation.state.partner_force[0]
+        signals["covered"][:], signals["length"][:] = now.covered, now.covered + now.left
+        signals["lateral"][:], signals["share"][:] = now.lateral, force[2]
+        assert self._witness is not None
+        moment = self._witness.look(self._steps * self.period)
+        pull = Force("partner", simulation.partner_handle(0), force * [1.0, 1.0, 0.0])
+        others = tuple(force for force in moment.forces if force.kind != "partner")
+        return replace(moment, forces=(pull, *others))
