@@ -53,7 +53,9 @@ def test_the_skill_sees_the_object_above_a_student_that_does_not(world: Specific
     assert set(seen) == {size}
 
 
-def test_what_a_controller_lacks_is_named(world: Specification, student: Student) -> None:
+def test_what_a_controller_lacks_is_named_and_what_it_has_beyond_the_games_is_left_out(
+    world: Specification, student: Student
+) -> None:
     unseen = Specification(with_changes(world.recipe, BLIND), world.robot)
     with pytest.raises(StageFailed, match=r"controllers\.other: its student observes \d+ numbers, these games show"):
         on_controller(unseen, "other", world.recipe.task, student, None)
@@ -64,3 +66,5 @@ def test_what_a_controller_lacks_is_named(world: Specification, student: Student
     further = Specification(Recipe.model_validate(values), world.robot)
     with pytest.raises(StageFailed, match=r"other: cannot act in these games: .*barrel: has no base grasp"):
         on_controller(further, "other", world.recipe.task, student, None)
+    played = on_controller(world, "other", further.recipe.task, student, None)
+    assert played.recipe.task.references == world.recipe.task.references

@@ -28,9 +28,12 @@ def on_controller(world: Specification, label: str, own: Task, student: Student,
     if student.observation > shown:
         text = f"its student observes {student.observation} numbers, these games show {shown}"
         raise StageFailed(f"{where}: {text}; set task.observation.observe_object in the recipe of the games")
-    task = recipe.task.model_copy(update={name: getattr(own, name) for name in OF_CONTROLLER})
+    task, scenes = own.model_dump(include=set(OF_CONTROLLER)), recipe.simulation.scenes.names
+    for kind in ("grasps", "loads"):  # those of scenes that only its own recipe has are of no use here
+        entries = task["references"][kind].items()
+        task["references"][kind] = {scene: entry for scene, entry in entries if scene in scenes}
     try:
-        played = Recipe.model_validate(recipe.model_dump() | {"task": task.model_dump()})
+        played = Recipe.model_validate(recipe.model_dump() | {"task": recipe.task.model_dump() | task})
     except ValidationError as error:
         reasons = "; ".join(problem["msg"] for problem in error.errors())
         text = f"{where}: cannot act in these games: {reasons}; leave it out, or train one whose recipe has this"
