@@ -94,7 +94,8 @@ def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -
 
 
 def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    planned = [Case(Plan("lift_straight", kind, False, mass=12.0, seed=3), 0) for kind in ("path", "agent")]
+    kinds = ("path", "agent")
+    planned = [Case(Plan("lift_straight", kind, False, mass=12.0, seed=3), number) for number, kind in enumerate(kinds)]
     stop = False
 
     def evaluation() -> Evaluation:
@@ -107,6 +108,7 @@ def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(ma
     played = {one.label: pd.concat(evaluation().batches(one, planned)) for one in (own, rival)}
     for rows in played.values():
         assert rows["partner"].tolist() == ["path", "agent"]
+        assert rows["episode"].tolist() == [0, 1]
         np.testing.assert_allclose(rows["mass"], 12.0)
     assert not np.allclose(played["MAPPO"]["partner_force_p90"], played["follower"]["partner_force_p90"])
     stop = True

@@ -114,8 +114,8 @@ class Evaluation:
                 {
                     "label": competitor.label,
                     "training": competitor.training,
-                    "episode": case.episode,
                     **rows[number],
+                    "episode": case.episode,
                     "partner": case.plan.partner,
                     "known": case.plan.known,
                 }
