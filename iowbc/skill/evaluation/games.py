@@ -1,25 +1,22 @@
 """The games of `skill-eval`: every skill and rival plays the same episodes."""
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import torch
 
 from iowbc.arrays import Array
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.skill.skill import Skill
-from iowbc.skill.game import TransportGame
-from iowbc.skill.plan import Plan, Rule
-
-AGENT = "agent"
-"""Name of the learnt human among partners."""
+from iowbc.skill.episodes import play_once
+from iowbc.skill.game import Observed, TransportGame
+from iowbc.skill.plan import AGENT, Plan, Rule
 
 
 @dataclass(frozen=True)
@@ -94,33 +91,23 @@ class Evaluation:
     def _played(self, competitor: Competitor, planned: Sequence[Case]) -> pd.DataFrame:
         """The first episode of a game of each case."""
         plans = [replace(case.plan, rule=competitor.rule) for case in planned]
-        rows: dict[int, dict[str, Any]] = {}
         with closing(self._make(competitor.controller, plans)) as game:
             _require_fitting(competitor, game.observation_sizes["robot"])
-            observed = game.reset()
-            while len(rows) < len(plans):
-                if self._interrupted():
-                    raise Interrupted("stopped between two decisions")
-                actions = {
-                    "robot": acted(competitor.robot, observed.observations["robot"], game.action_sizes["robot"]),
-                    "human": acted(self._human, observed.observations["human"], game.action_sizes["human"]),
+            networks = {"robot": competitor.robot, "human": self._human}
+
+            def act(observed: Observed) -> dict[str, Array]:
+                return {
+                    agent: acted(network, observed.observations[agent], game.action_sizes[agent])
+                    for agent, network in networks.items()
                 }
-                outcome = game.step(actions)
-                for row in _rows(outcome.figures):
-                    rows.setdefault(int(row["environment"]), row)
-                observed = outcome.observed
-        return pd.DataFrame(
-            [
-                {
-                    "label": competitor.label,
-                    "training": competitor.training,
-                    **rows[number],
-                    "episode": case.episode,
-                    "partner": case.plan.partner,
-                    "known": case.plan.known,
-                }
-                for number, case in enumerate(planned)
-            ]
+
+            figures = play_once(game, act, self._interrupted)
+        return pd.DataFrame(figures).assign(
+            label=competitor.label,
+            training=competitor.training,
+            episode=[case.episode for case in planned],
+            partner=[case.plan.partner for case in planned],
+            known=[case.plan.known for case in planned],
         )
 
 
@@ -138,8 +125,3 @@ def acted(network: TeacherNetwork | None, observation: Array, size: int) -> Arra
         return np.zeros((len(observation), size), np.float32)
     with torch.inference_mode():
         return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())
-
-
-def _rows(figures: Mapping[str, Array]) -> Iterator[dict[str, Any]]:
-    for values in zip(*figures.values(), strict=True):
-        yield dict(zip(figures, values, strict=True))
