@@ -50,6 +50,8 @@ Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
 """An artifact of another recipe: that recipe's file, or eight or more first characters of the artifact's key."""
+RecipeFile = Annotated[str, Field(pattern=r".+\.ya?ml$", max_length=300)]
+"""The file of another recipe."""
 DEEPEST = 16
 """Hidden layers of the deepest network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
+from iowbc.recipe.ppo import PPO
 from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Section, Width, in_order
 from iowbc.recipe.simulation.holding import ObjectScene
 
@@ -98,7 +99,7 @@ class Restart(Section):
     """Environment steps in which the largest standard deviation halves from there on, down to `std_end`."""
 
 
-class Teacher(Section):
+class Teacher(PPO):
     """PPO with privileged information."""
 
     steps: int = Field(default=30_000_000, ge=1, le=10**12)
@@ -108,10 +109,6 @@ class Teacher(Section):
     """Parallel environments (paper: 2048). Few environments with many updates learn from fewer samples."""
     rollout: int = Field(default=48, ge=2, le=10_000)
     """Control steps that each environment contributes to one update."""
-    minibatches: int = Field(default=4, ge=1, le=100_000)
-    """Parts into which a rollout is split for the gradient steps; must divide environments x rollout."""
-    epochs: int = Field(default=5, ge=1, le=1000)
-    """Passes over a rollout."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
@@ -124,20 +121,12 @@ class Teacher(Section):
     """Least and largest step size, where `desired_kl` moves it."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
-    gae_lambda: float = Field(default=0.95, ge=0, le=1)
-    """Decay of the generalised advantage estimate (paper Table I)."""
-    clip: float = Field(default=0.2, gt=0)
-    """PPO's clip range of the probability ratio."""
-    entropy: float = Field(default=0.0, ge=0)
-    """Weight of the entropy bonus."""
     smoothness: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
     """Weight of the KL divergence of the policy from the mean of what it did one step before and after: half of the
     action's second difference, in standard deviations. A reward for smoothness sees the exploration as well, whose
     jitter outweighs the policy's own; this term does not (temporal smoothness of CAPS, Mysore et al. 2021)."""
     value_weight: float = Field(default=0.5, ge=0)
     """Weight of the value loss."""
-    gradient_norm: float = Field(default=1.0, gt=0)
-    """Largest norm of a gradient step."""
     initial_std: float = Field(default=0.5, gt=0)
     """Initial standard deviation of the action, in units of the action (before the action scale); 0.3 learnt slower."""
     std_learning_rate: float = Field(default=1.5e-4, gt=0)
@@ -154,10 +143,6 @@ class Teacher(Section):
     """Environment steps in which the weight of a policy halves in a running mean of all of them. With it that mean is
     what checks score and the stage leaves: the newest policy has also learnt what the last rollouts happened to hold.
     Empty takes the newest."""
-    std_floor: float = Field(default=0.05, gt=0)
-    """Least standard deviation: a policy that arrives here explores no longer."""
-    activation: Literal["elu", "relu", "tanh"] = "elu"
-    """Activation of the hidden layers."""
     symmetry: Literal["construction", "augment", "none"] = "construction"
     """Use of the left-right symmetry of robot and task. `construction`: the networks commute with the mirror,
     exactly, with half the multiplications. `augment`: dense networks that also see mirror images of their samples.

@@ -28,17 +28,29 @@ def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
         yield "stages", "names skill-eval, and no stage of the recipe trains a student to act below; add `distill`"
     if "skill" not in recipe.stages and "agent" in asked.partners:
         yield "skill.eval.partners", "agent: no stage of the recipe trains a human; add `skill` to its stages"
+    if "skill" not in recipe.stages and asked.controllers:
+        yield "skill.eval.controllers", "no stage of the recipe trains a skill; add `skill` to its stages"
+    tasks = {name: getattr(recipe.skill.tasks, name) for name in recipe.skill.tasks.names}
     for name in asked.tasks:
-        if name not in recipe.skill.tasks.names:
-            yield "skill.eval.tasks", f"no task {name!r}; valid: {', '.join(recipe.skill.tasks.names)}"
+        if name not in tasks:
+            yield "skill.eval.tasks", f"no task {name!r}; valid: {', '.join(tasks)}"
+    scenes = dict.fromkeys(task.scene for name, task in tasks.items() if name in (asked.tasks or tasks))
+    for scene in asked.masses:
+        if scene not in scenes:
+            yield f"skill.eval.masses.{scene}", f"no task of the evaluation has this scene; valid: {', '.join(scenes)}"
 
 
 def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
-    """Skills that other recipes train."""
-    return {
+    """Skills that other recipes train, and controllers with their reference generators."""
+    skills = {
         f"{label}/{place}": Borrowed(f"skill.eval.others.{label}", named, "skill")
         for label, several in recipe.skill.eval.others.items()
         for place, named in enumerate(several)
+    }
+    return skills | {
+        f"{label}/{stage}": Borrowed(f"skill.eval.controllers.{label}", named, stage)
+        for label, named in recipe.skill.eval.controllers.items()
+        for stage in ("rg-fit", "distill")
     }
 
 
@@ -48,8 +60,11 @@ def run(job: Job) -> None:
     import torch
 
     from iowbc.learning.storage import read_teacher
+    from iowbc.pipeline.store.artifact import RECIPE
+    from iowbc.pipeline.store.runs import read_yaml
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
+    from iowbc.skill.evaluation.controllers import on_controller
     from iowbc.skill.evaluation.games import Evaluation, cases
     from iowbc.skill.evaluation.tables import figure, headline, tables
     from iowbc.skill.game import TransportGame
@@ -61,8 +76,13 @@ def run(job: Job) -> None:
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit")).deployed
     student = load_student(job.inputs[policy_stage(recipe)])
     human = read_teacher(job.inputs["skill"], "human") if "skill" in job.inputs else None
+    lower = {"": (world, student)}
+    for label in skill.eval.controllers:
+        folder, rg = job.inputs[f"{label}/distill"], job.inputs[f"{label}/rg-fit"]
+        task, other = Recipe.model_validate(read_yaml(folder / RECIPE)).task, load_student(folder)
+        lower[label] = on_controller(world, label, task, other, rg), other
     evaluation = Evaluation(
-        lambda plans: TransportGame(world, student, n=len(plans), workers=job.workers, seed=0, plans=plans),
+        lambda label, plans: TransportGame(*lower[label], n=len(plans), workers=job.workers, seed=0, plans=plans),
         human,
         skill.eval.games,
         job.work,
@@ -91,13 +111,13 @@ def _competitors(job: Job) -> "list[Competitor]":
     from iowbc.skill.evaluation.games import Competitor
 
     asked = job.recipe.skill.eval
-    folders = {(asked.label, "own"): job.inputs["skill"]} if "skill" in job.inputs else {}
-    for name in borrows(job.recipe):
-        label, place = name.rsplit("/", 1)
-        folders[label, place] = job.inputs[name]
+    skills = [(asked.label, "own", "skill", "")] if "skill" in job.inputs else []
+    for label, several in asked.others.items():
+        skills += [(label, str(place), f"{label}/{place}", "") for place in range(len(several))]
+    skills += [(f"{asked.label} on {label}", "own", "skill", label) for label in asked.controllers]
     trained = [
-        Competitor(label, training, None, read_teacher(folder, "robot"))
-        for (label, training), folder in folders.items()
+        Competitor(label, training, None, read_teacher(job.inputs[name], "robot"), controller)
+        for label, training, name, controller in skills
     ]
     return trained + [Competitor(RIVALS[rule], "", None if rule == "nominal" else rule, None) for rule in asked.rivals]
 

@@ -23,7 +23,7 @@ def games(forces: dict[str, dict[str, float]], trainings: int = 2, episodes: int
         for (partner, force), known, training, episode in itertools.product(
             partners.items(), (True, False), range(trainings), range(episodes)
         ):
-            told = {"label": label, "training": str(training), "task": "lift_straight", "load": 0.5}
+            told = {"label": label, "training": str(training), "task": "lift_straight", "mass": 4.0}
             told |= {"known": known, "partner": partner, "episode": episode, "fallen": False, "dropped": False}
             told |= dict.fromkeys(COLUMNS, 1.0) | {"success": episode > 0, "partner_force_p90": force + episode}
             rows.append(told)
@@ -67,6 +67,19 @@ def test_tables_tell_held_out_partners_and_unknown_goals_apart() -> None:
     assert len(figure(games(FORCES)).axes) == 4
 
 
+def test_tables_by_mass_keep_partners_apart_and_compare_the_same_mass() -> None:
+    light, heavy = games(FORCES), games(FORCES).assign(mass=8.0)
+    heavy.loc[heavy["label"] == "MAPPO", "partner_force_p90"] += 100.0
+    found = {table.name: table.numbers for table in tables(pd.concat([light, heavy]), ("tugging",))}
+    loads = found["skill_loads"].set_index(["group", "label"])
+    assert loads.loc[("lift_straight 4 kg", "follower"), "P"] == 1.0
+    assert loads.loc[("lift_straight 8 kg", "follower"), "P"] == 0.0
+    cells = found["skill_cells"].set_index(["group", "label"])
+    force = cells.loc[("lift_straight 8 kg, tugging, only the human knows", "MAPPO"), "partner_force_p90"]
+    assert force == pytest.approx(122.5)
+    assert len(cells) == 2 * 2 * 2 * 2
+
+
 def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -> None:  # type: ignore[no-untyped-def]
     skill = make().setup.skill
     planned = cases(skill, learnt_human=True)
@@ -74,14 +87,19 @@ def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -
     assert len(planned) == len(skill.tasks.names) * (2 * len(kinds) - 1) * skill.eval.episodes
     assert not [case for case in planned if case.plan.partner == "follower" and not case.plan.known]
     assert {case.plan.mass for case in planned if case.plan.task == "lift_straight"} == {13.5}
+    named = cases(make(changes={"skill.eval.masses": {"lift": (0.5, 20.0)}}).setup.skill, learnt_human=False)
+    masses = {task: {case.plan.mass for case in named if case.plan.task == task} for task in skill.tasks.names}
+    assert masses["lift_slalom"] == {0.5, 20.0}
+    assert masses["push_straight"] == {65.0}
 
 
 def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    planned = [Case(Plan("lift_straight", kind, False, mass=12.0, seed=3), 0.5, 0) for kind in ("path", "agent")]
+    kinds = ("path", "agent")
+    planned = [Case(Plan("lift_straight", kind, False, mass=12.0, seed=3), number) for number, kind in enumerate(kinds)]
     stop = False
 
     def evaluation() -> Evaluation:
-        return Evaluation(lambda plans: make(len(plans), plans=plans), None, 1, tmp_path, lambda: stop)
+        return Evaluation(lambda controller, plans: make(len(plans), plans=plans), None, 1, tmp_path, lambda: stop)
 
     torch.manual_seed(0)
     size = make(1).observation_sizes["robot"]
@@ -90,6 +108,7 @@ def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(ma
     played = {one.label: pd.concat(evaluation().batches(one, planned)) for one in (own, rival)}
     for rows in played.values():
         assert rows["partner"].tolist() == ["path", "agent"]
+        assert rows["episode"].tolist() == [0, 1]
         np.testing.assert_allclose(rows["mass"], 12.0)
     assert not np.allclose(played["MAPPO"]["partner_force_p90"], played["follower"]["partner_force_p90"])
     stop = True

@@ -61,6 +61,7 @@ COSMETIC = {
     "export.timing_steps",
     "skill.learning.checkpoint_every",
     "skill.eval.others",
+    "skill.eval.controllers",
     "skill.eval.games",
 }
 """Parts that move no key: they say how it is shown or carried out. (The robot's files count, not their folder.)"""

@@ -33,6 +33,7 @@ PUBLISHED_TO = {
     "compliant": "export",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
+    "transport_controllers": "skill-eval",
 }
 
 

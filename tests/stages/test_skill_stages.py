@@ -18,6 +18,7 @@ from iowbc.stages import distill, skill, skill_eval, teacher
 from iowbc.stages.registry import STAGES
 
 GAMES, ROLLOUT = 4, 10
+PUBLISHED = Path(__file__).parents[2] / "runs" / "published"
 
 
 def transport(**changes: Any) -> Recipe:
@@ -84,6 +85,27 @@ def test_the_comparison_leaves_games_and_tables(inputs: dict[str, Path], tmp_pat
     assert (tmp_path / "out" / "figures" / "skill_partners.png").is_file()
 
 
+def test_the_skill_also_plays_on_the_published_controller_of_another_recipe(
+    inputs: dict[str, Path], tmp_path: Path
+) -> None:
+    changes = {"skill.eval.controllers": {"WBC": "wbc.yaml"}, "skill.eval.masses": {"lift": (1.0, 4.0)}}
+    recipe = transport(**changes | {"skill.eval.rivals": (), "skill.eval.known": (False,)})
+    assert {name: one.stage for name, one in skill_eval.borrows(recipe).items()} == {
+        "WBC/rg-fit": "rg-fit",
+        "WBC/distill": "distill",
+    }
+    manifests = PUBLISHED.glob("distill/*/manifest.json")
+    (wbc,) = (file.parent for file in manifests if json.loads(file.read_text())["recipe"] == "wbc")
+    borrowed = {"WBC/distill": wbc, "WBC/rg-fit": next(PUBLISHED.glob("rg-fit/*"))}
+    skill_eval.STAGE.run(make_job(tmp_path, recipe, inputs=inputs | borrowed, workers=0))
+    games = pd.read_parquet(tmp_path / "out" / "games.parquet")
+    assert games.groupby(["label", "mass"]).size().to_dict() == {
+        (label, mass): 2 for label in ("MAPPO", "MAPPO on WBC") for mass in (1.0, 4.0)
+    }
+    own, other = (games[games["label"] == label]["tilt"].to_numpy() for label in ("MAPPO", "MAPPO on WBC"))
+    assert (own != other).all()
+
+
 def test_a_graph_that_differs_from_the_network_fails_the_stage(inputs: dict[str, Path], tmp_path: Path) -> None:
     strict = transport(**{"export.parity_tolerance": 1e-12})
     with pytest.raises(StageFailed, match="parity: the action differs"):
@@ -98,3 +120,6 @@ def test_what_no_student_or_nobody_carries_out_is_said_before_anything_runs() ->
     assert len(found) == 2
     assert "learnt_share" in found[0]
     assert "no task 'lift_strait'" in found[1]
+    unfit = transport(**{"stages": ("teacher", "distill", "skill-eval"), "skill.eval.masses": {"push": (10.0,)}})
+    unfit = with_changes(unfit, {"skill.eval.controllers": {"WBC": "wbc.yaml"}, "skill.eval.partners": ("path",)})
+    assert [path for path, _ in skill_eval.problems(unfit)] == ["skill.eval.controllers", "skill.eval.masses.push"]

@@ -4,7 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import COSMETIC, ArtifactName, Section
+from iowbc.recipe.section import COSMETIC, LATER, ArtifactName, Ascending, RecipeFile, Section
+from iowbc.recipe.simulation.holding import ObjectScene
 
 Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
 """Rules of `iowbc.skill.plan.Plan` that act without a skill."""
@@ -22,6 +23,10 @@ class SkillEvaluation(Section):
     others: dict[str, tuple[ArtifactName, ...]] = Field(default_factory=dict, json_schema_extra=COSMETIC)
     """By label: recipes whose trained skills play, too, or keys of theirs. Under this recipe's own label they are
     further trainings of it, such as other seeds. What they are is part of the key, not what they are called."""
+    controllers: dict[str, RecipeFile] = Field(default_factory=dict, json_schema_extra=COSMETIC)
+    """By label: recipes with `distill` whose student this recipe's skill also commands, in place of the controller that
+    it was trained with. Each brings its references, command ranges, action scale, control frequency and reference
+    generator; the world and the skill's observation stay those of this recipe."""
     tasks: tuple[str, ...] = ()
     """Tasks of `skill.tasks`; all where it is empty."""
     known: tuple[bool, ...] = (True, False)
@@ -31,6 +36,8 @@ class SkillEvaluation(Section):
     one where it is empty."""
     loads: tuple[float, ...] = Field(default=(0.5,), min_length=1)
     """Masses as places in the range of the task: 0 is its least, 1 its greatest."""
+    masses: dict[ObjectScene, Ascending] = Field(default_factory=dict, json_schema_extra=LATER)
+    """Masses of the tasks of a scene [kg], which may lie outside the range of the task; in place of `loads`."""
     episodes: int = Field(default=2, ge=1, le=1000)
     """Episodes of each combination."""
     seed: int = Field(default=7000, ge=0, lt=2**32)

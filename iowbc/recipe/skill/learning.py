@@ -4,13 +4,14 @@ from typing import Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from iowbc.recipe.section import COSMETIC, DEEPEST, Section, Width
+from iowbc.recipe.ppo import PPO
+from iowbc.recipe.section import COSMETIC, DEEPEST, Width
 
 LARGEST_ROLLOUT = 1_000_000
 """Decisions that are kept in memory for one update."""
 
 
-class SkillLearning(Section):
+class SkillLearning(PPO):
     """Multi-agent PPO: decentralised policies of robot and human, a centralised value network in training."""
 
     algorithm: Literal["mappo", "happo", "ppo"] = "mappo"
@@ -32,18 +33,12 @@ class SkillLearning(Section):
     learnt_share: float = Field(default=0.5, ge=0, le=1)
     """Part of the episodes in which the learnt human acts afterwards; the robot goes on meeting scripted ones in the
     others, so that it does not learn to rely on one partner."""
-    minibatches: int = Field(default=4, ge=1, le=100_000)
-    """Parts into which a rollout is split for the gradient steps; must divide games x rollout."""
-    epochs: int = Field(default=5, ge=1, le=1000)
-    """Passes over a rollout."""
     imitation_gradient_steps: int = Field(default=200, ge=1, le=100_000)
     """Gradient steps of the imitation after each rollout."""
     imitation_rate: float = Field(default=1e-3, gt=0)
     """Adam's step size of the imitation."""
     hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
     """Hidden layers of the policies and of the value network."""
-    activation: Literal["elu", "relu", "tanh"] = "elu"
-    """Activation of the hidden layers."""
     normalization_clip: float = Field(default=5.0, gt=0)
     """Normalised inputs are clipped to this many standard deviations."""
     learning_rate: float = Field(default=6e-5, gt=0)
@@ -57,18 +52,8 @@ class SkillLearning(Section):
     """Least and largest step size, where `desired_kl` moves it."""
     gamma: float = Field(default=0.98, gt=0, lt=1)
     """Discount factor of a decision; 0.98 looks ten seconds ahead at 5 Hz."""
-    gae_lambda: float = Field(default=0.95, ge=0, le=1)
-    """Decay of the generalised advantage estimate."""
-    clip: float = Field(default=0.2, gt=0)
-    """PPO's clip range of the probability ratio."""
-    entropy: float = Field(default=0.0, ge=0)
-    """Weight of the entropy bonus."""
-    gradient_norm: float = Field(default=1.0, gt=0)
-    """Largest norm of a gradient step."""
     initial_std: float = Field(default=0.4, gt=0)
     """Initial standard deviation of the actions, which range from -1 to 1."""
-    std_floor: float = Field(default=0.05, gt=0)
-    """Least standard deviation."""
     seed: int | None = Field(default=None, ge=0, lt=2**32)
     """Seed of this training alone; the recipe's `seed` when empty."""
     checkpoint_every: int = Field(default=5, ge=1, le=1_000_000, json_schema_extra=COSMETIC)

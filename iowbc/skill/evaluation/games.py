@@ -1,25 +1,22 @@
 """The games of `skill-eval`: every skill and rival plays the same episodes."""
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import torch
 
 from iowbc.arrays import Array
-from iowbc.errors import Interrupted, StageFailed
+from iowbc.errors import StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.skill.skill import Skill
-from iowbc.skill.game import TransportGame
-from iowbc.skill.plan import Plan, Rule
-
-AGENT = "agent"
-"""Name of the learnt human among partners."""
+from iowbc.skill.episodes import play_once
+from iowbc.skill.game import Observed, TransportGame
+from iowbc.skill.plan import AGENT, Plan, Rule
 
 
 @dataclass(frozen=True)
@@ -32,6 +29,8 @@ class Competitor:
     rule: Rule | None
     robot: TeacherNetwork | None
     """The trained policy; None acts as the rule says."""
+    controller: str = ""
+    """Label of the controller that it commands; empty for that of the recipe."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,6 @@ class Case:
     """An episode that every competitor plays."""
 
     plan: Plan
-    load: float
     episode: int
 
 
@@ -49,14 +47,13 @@ def cases(skill: Skill, learnt_human: bool) -> list[Case]:
     partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
     tasks = {name: getattr(skill.tasks, name) for name in asked.tasks or skill.tasks.names}
     found = []
-    for (name, task), known, partner, load, episode in itertools.product(
-        tasks.items(), asked.known, partners, asked.loads, range(asked.episodes)
-    ):
+    for (name, task), known, partner in itertools.product(tasks.items(), asked.known, partners):
         if partner == "follower" and not known:
             continue  # who follows tells nobody where to go
         low, high = task.mass
-        plan = Plan(name, partner, known, mass=low + load * (high - low), seed=asked.seed + episode)
-        found.append(Case(plan, load, episode))
+        masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
+        for mass, episode in itertools.product(masses, range(asked.episodes)):
+            found.append(Case(Plan(name, partner, known, mass=mass, seed=asked.seed + episode), episode))
     return found
 
 
@@ -65,13 +62,14 @@ class Evaluation:
 
     def __init__(
         self,
-        make: Callable[[Sequence[Plan]], TransportGame],
+        make: Callable[[str, Sequence[Plan]], TransportGame],
         human: TeacherNetwork | None,
         games: int,
         work: Path,
         interrupted: Callable[[], bool],
     ) -> None:
-        """`human`: the learnt one, the same for every competitor; `games`: in a batch."""
+        """`make`: games of plans on the controller with a label; `human`: the learnt one, the same for every
+        competitor; `games`: in a batch."""
         self._make, self._human, self._games, self._work, self._interrupted = make, human, games, work, interrupted
 
     def batches(self, competitor: Competitor, planned: Sequence[Case]) -> Iterator[pd.DataFrame]:
@@ -79,11 +77,12 @@ class Evaluation:
 
         Raises Interrupted where the job is asked to stop; finished batches are kept.
         """
-        for number, begin in enumerate(range(0, len(planned), self._games)):
-            place = f"{competitor.label} {competitor.training} {number}".replace("/", "-").replace(" ", "_")
-            path = self._work / f"{place}.parquet"
+        for begin in range(0, len(planned), self._games):
+            batch = planned[begin : begin + self._games]
+            place = f"{competitor.label} {competitor.training} {begin} {len(batch)}"
+            path = self._work / f"{place.replace('/', '-').replace(' ', '_')}.parquet"
             if not path.is_file():
-                rows = self._played(competitor, planned[begin : begin + self._games])
+                rows = self._played(competitor, batch)
                 partial = path.with_suffix(".part")
                 rows.to_parquet(partial, index=False)
                 partial.rename(path)
@@ -92,34 +91,23 @@ class Evaluation:
     def _played(self, competitor: Competitor, planned: Sequence[Case]) -> pd.DataFrame:
         """The first episode of a game of each case."""
         plans = [replace(case.plan, rule=competitor.rule) for case in planned]
-        rows: dict[int, dict[str, Any]] = {}
-        with closing(self._make(plans)) as game:
+        with closing(self._make(competitor.controller, plans)) as game:
             _require_fitting(competitor, game.observation_sizes["robot"])
-            observed = game.reset()
-            while len(rows) < len(plans):
-                if self._interrupted():
-                    raise Interrupted("stopped between two decisions")
-                actions = {
-                    "robot": acted(competitor.robot, observed.observations["robot"], game.action_sizes["robot"]),
-                    "human": acted(self._human, observed.observations["human"], game.action_sizes["human"]),
+            networks = {"robot": competitor.robot, "human": self._human}
+
+            def act(observed: Observed) -> dict[str, Array]:
+                return {
+                    agent: acted(network, observed.observations[agent], game.action_sizes[agent])
+                    for agent, network in networks.items()
                 }
-                outcome = game.step(actions)
-                for row in _rows(outcome.figures):
-                    rows.setdefault(int(row["environment"]), row)
-                observed = outcome.observed
-        return pd.DataFrame(
-            [
-                {
-                    "label": competitor.label,
-                    "training": competitor.training,
-                    "load": case.load,
-                    "episode": case.episode,
-                    **rows[number],
-                    "partner": case.plan.partner,
-                    "known": case.plan.known,
-                }
-                for number, case in enumerate(planned)
-            ]
+
+            figures = play_once(game, act, self._interrupted)
+        return pd.DataFrame(figures).assign(
+            label=competitor.label,
+            training=competitor.training,
+            episode=[case.episode for case in planned],
+            partner=[case.plan.partner for case in planned],
+            known=[case.plan.known for case in planned],
         )
 
 
@@ -137,8 +125,3 @@ def acted(network: TeacherNetwork | None, observation: Array, size: int) -> Arra
         return np.zeros((len(observation), size), np.float32)
     with torch.inference_mode():
         return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())
-
-
-def _rows(figures: Mapping[str, Array]) -> Iterator[dict[str, Any]]:
-    for values in zip(*figures.values(), strict=True):
-        yield dict(zip(figures, values, strict=True))

@@ -1,6 +1,7 @@
 """Tables and figure of the skill layer's games: forces and the worst partner first, then success."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from iowbc.results.picture import COLOURS
 from iowbc.results.table import ABSENT, Cell, Table, heads
 
 FORCE, SUCCESS = "partner_force_p90", "success"
-UNIT = ["task", "known", "partner", "load", "episode"]
+UNIT = ["task", "known", "partner", "mass", "episode"]
 """What makes an episode the same for every competitor."""
 COLUMNS = {
     FORCE: ("Partner force p90 [N]", ".1f"),
@@ -40,8 +41,10 @@ def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
         "skill_partners": (games["partner"] + ", " + pd.Series(goal, games.index), "partner"),
         "skill_tasks": (games["task"] + ", " + pd.Series(goal, games.index), "task"),
     }
-    if games["load"].nunique() > 1:
-        by["skill_loads"] = (games["load"].map("place {:g} in the task's range".format), "mass")
+    if games.groupby("task")["mass"].nunique().max() > 1:
+        loads = games["task"] + games["mass"].map(" {:g} kg".format)
+        by["skill_loads"] = (loads, "task and mass")
+        by["skill_cells"] = (loads + ", " + by["skill_partners"][0], "task, mass and partner")
     return [_table(name, games, group, told) for name, (group, told) in by.items()]
 
 
@@ -89,7 +92,7 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", told: str) -
 def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> tuple[float, float, float]:
     """Interquartile mean, or the mean where `whole`, with the ends of its interval."""
     values = by_training(games, figure)
-    drawn = np.stack([values[trainings][:, units].ravel() for trainings, units in _resamples(*values.shape)])
+    drawn = values[_resamples(*values.shape)].reshape(RESAMPLES, -1)
 
     def mean(rows: Values) -> Values:
         return np.asarray(rows.mean(axis=-1)) if whole else interquartile_mean(rows)
@@ -117,15 +120,17 @@ def improvement(first: pd.DataFrame, other: pd.DataFrame) -> tuple[float, float,
     own, theirs = by_training(first, FORCE), by_training(other, FORCE)
     wins = (own[:, None] < theirs[None]) + 0.5 * (own[:, None] == theirs[None])
     flat = wins.reshape(-1, wins.shape[-1])
-    drawn = np.array([flat[pairs][:, units].mean() for pairs, units in _resamples(*flat.shape)])
+    drawn = flat[_resamples(*flat.shape)].mean(axis=(1, 2))
     return float(wins.mean()), *percentile_interval(drawn)
 
 
-def _resamples(trainings: int, units: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Trainings and episodes of each resample, with replacement."""
+@cache
+def _resamples(trainings: int, units: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Trainings (RESAMPLES, trainings, 1) and episodes (RESAMPLES, 1, units) of each resample, with replacement."""
     generator = np.random.default_rng(SEEDS_OF_THE_BOOTSTRAP)
-    for _ in range(RESAMPLES):
-        yield generator.integers(trainings, size=trainings), generator.integers(units, size=units)
+    drawn = [[generator.integers(n, size=n) for n in (trainings, units)] for _ in range(RESAMPLES)]
+    chosen, episodes = (np.stack(rows) for rows in zip(*drawn, strict=True))
+    return chosen[:, :, None], episodes[:, None, :]
 
 
 def _cell(ends: tuple[float, ...], form: str) -> Cell:
