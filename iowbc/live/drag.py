@@ -1,14 +1,20 @@
 """What the mice of the browsers hold: points of bodies, and where the pointers are."""
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import viser
 
 from iowbc.arrays import Array
 
+Pushed = Literal["robot", "object"]
+
+STIFFNESS = 150.0
+"""Of the spring between what is dragged and the mouse [N/m]."""
+STRONGEST = 300.0
+"""Force of that spring at most [N]."""
 FARTHEST = 1e3
 """Points are no farther away than this [m]; what a browser sends beyond is no place."""
 
@@ -32,6 +38,16 @@ class Drag:
         part = (height - self.camera[2]) / down if down else -1.0
         point: Array = self.camera + part * (self.end - self.camera)
         return point if part > 0.0 and np.abs(point).max() < FARTHEST else None
+
+
+def spring_pulls(drags: Sequence[Drag]) -> dict[Pushed, Array]:
+    """Forces of springs of bounded force between what mice drag and the pointers, world frame, (3,) each [N]."""
+    pulls: dict[Pushed, Array] = {"robot": np.zeros(3), "object": np.zeros(3)}
+    for drag in drags:
+        force = STIFFNESS * (drag.end - drag.start)
+        force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), STRONGEST))
+        pulls["object" if drag.body == "object" else "robot"] += force
+    return pulls
 
 
 class Drags:

@@ -15,10 +15,11 @@ from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, VELOCITY, nominal_command
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
+from iowbc.live.drag import Pushed
 from iowbc.live.drawing import ShownParts
 from iowbc.live.moment import Moment
 from iowbc.live.played import PAST, Played
-from iowbc.live.session import Pushed, Session
+from iowbc.live.session import Session
 from iowbc.live.track import WINDOW, Track, TrackFigures
 from iowbc.recipe.task.commands import Commands
 

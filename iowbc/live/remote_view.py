@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
-import numpy as np
 import viser
 
 from iowbc.arrays import Array
+from iowbc.live.drag import Pushed, spring_pulls
 from iowbc.live.drawing import Drawing, ShownParts
 from iowbc.live.moment import Moment, SimulationWitness
-from iowbc.live.page import AIM, PICTURES, VIEW
+from iowbc.live.page import PICTURES
+from iowbc.live.played import Played
 from iowbc.live.server import serving
-from iowbc.live.session import Pushed
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import Force
 from iowbc.sim.simulation import Simulation
@@ -92,10 +92,9 @@ def _serve(requests: Connection, port: int, robot: Robot, model: Any) -> None:
 
 def draw(server: viser.ViserServer, requests: Connection, robot: Robot, model: Any) -> None:
     """Draws one picture after the other. Raises EOFError or OSError once the simulation has ended."""
-    pulls: dict[Pushed, Array] = {"robot": np.zeros(3), "object": np.zeros(3)}
     pressed = threading.Event()
-    drawing = Drawing(server.scene, robot, lambda what, force: pulls.update({what: force}))
-    server.initial_camera.position, server.initial_camera.look_at = VIEW, AIM
+    drawing = Drawing(server.scene, robot)
+    server.initial_camera.position, server.initial_camera.look_at = Played.view
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     status = server.gui.add_markdown("")
     button = server.gui.add_button("Release the robot", hint="From its band or fixture")
@@ -104,7 +103,7 @@ def draw(server: viser.ViserServer, requests: Connection, robot: Robot, model: A
         begin = time.monotonic()
         release = pressed.is_set()
         pressed.clear()
-        requests.send(Asked(release, dict(pulls)))
+        requests.send(Asked(release, spring_pulls(drawing.drags.now(drawing.away))))
         picture: Picture = requests.recv()
         with server.atomic():
             drawing.show(model, picture.moment, ShownParts())

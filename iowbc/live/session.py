@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -13,22 +12,16 @@ from iowbc.errors import Damaged
 from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
-from iowbc.live.drag import Drag
+from iowbc.live.drag import Drag, Pushed, spring_pulls
 from iowbc.live.moment import Witness
 from iowbc.live.played import PAST, Played
 from iowbc.live.track import recorded, track_of
 from iowbc.recipe.evaluation.segment import Segment
 
-Pushed = Literal["robot", "object"]
-
 AN_HOUR = (Segment(duration=600.0),) * 6
 """The longest that an episode lasts."""
 BLOW = 0.1
 """Length of a push [s]; as long as those of `eval.robustness.pushes`."""
-STIFFNESS = 150.0
-"""Of the spring between what is dragged and the mouse [N/m]."""
-STRONGEST = 300.0
-"""Force of that spring at most [N]."""
 
 
 class Session(Played):
@@ -115,12 +108,7 @@ class Session(Played):
 
     def drag(self, drags: Sequence[Drag]) -> None:
         """Pulls at what mice drag, by a spring of bounded force, and at nothing else."""
-        pulls: dict[Pushed, Array] = {"robot": np.zeros(3), "object": np.zeros(3)}
-        for drag in drags:
-            force = STIFFNESS * (drag.end - drag.start)
-            force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), STRONGEST))
-            pulls["object" if drag.body == "object" else "robot"] += force
-        for what, force in pulls.items():
+        for what, force in spring_pulls(drags).items():
             self.pull(what, force)
 
     def pull(self, what: Pushed, force: Array) -> None:

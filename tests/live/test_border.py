@@ -16,9 +16,9 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from iowbc.live import server as border
+from iowbc.live.drag import STIFFNESS
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import HOST, serving
-from iowbc.live.session import STIFFNESS
 
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 HANDSHAKE = (
