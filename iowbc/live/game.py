@@ -40,7 +40,7 @@ class GameRequest:
 class GameSession(Played):
     """One game after another; the robot does not know the path."""
 
-    view = ((-1.6, -2.2, 2.4), (0.6, 0.0, 0.6))
+    view = ((2.2, -1.7, 1.5), (0.4, 0.0, 0.6))
 
     def __init__(self, world: Specification, student: Student, skill: TeacherNetwork, request: GameRequest) -> None:
         """`skill`: the robot's policy. Raises UsageError for an unknown task."""

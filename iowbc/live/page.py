@@ -60,12 +60,15 @@ class Page:
         return [] if self._evaluated is None else trial_titles(self._evaluated.trials)
 
     def run(self, ready: Callable[[], None]) -> None:
-        """Runs until interrupted; `ready` is called when the page is complete."""
+        """Runs until interrupted, and stands still while nobody looks; `ready` is called when the page is complete."""
         self.turn(time.monotonic())
         ready()
         while True:
-            self.turn(time.monotonic())
-            time.sleep(max(0.0, min(self._due, self._drawn + PICTURES) - time.monotonic()))
+            if self.server.get_clients():
+                self.turn(time.monotonic())
+                time.sleep(max(0.0, min(self._due, self._drawn + PICTURES) - time.monotonic()))
+            else:
+                time.sleep(PICTURES)
 
     def turn(self, now: float) -> None:
         """Heeds the controls, moves on, and draws what is due at a time [s], no earlier than the last."""
