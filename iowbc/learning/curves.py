@@ -1,6 +1,5 @@
 """Learning curves: one line of JSON an update, kept beside the checkpoint, their table and their figure."""
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,10 +8,10 @@ from typing import Any
 from iowbc.files import write_whole
 from iowbc.learning.curve_titles import title_of
 
-TABLE, FIGURE = "tables/learning_curves.csv", "figures/learning_curves.png"
+TABLE, FIGURE = "tables/learning_curves.parquet", "figures/learning_curves.png"
 """Files of them in an artifact."""
 DIGITS = 6
-"""Significant digits that are kept: a training of a night then has 5 MB of curves."""
+"""Significant digits that are kept; those of single precision."""
 OUTLIERS = (1.0, 99.0)
 """Percentiles between which a panel's values always lie inside of it."""
 FLATTENED = 10.0
@@ -44,20 +43,22 @@ class Curves:
         with self.path.open("a") as file:
             file.write(json.dumps(row) + "\n")
 
-    def write_csv(self, path: Path) -> None:
-        """All rows as a table, one column a name."""
-        names = list(dict.fromkeys(name for row in self.rows for name in row))
-        with path.open("w", newline="") as file:
-            writer = csv.DictWriter(file, names, restval="")
-            writer.writeheader()
-            writer.writerows(self.rows)
+    def write_table(self, path: Path) -> None:
+        """All rows as a Parquet table of single precision, one column a name; a value that a row lacks is NaN."""
+        import pandas as pd
+
+        table = pd.DataFrame(self.rows, columns=list(dict.fromkeys(name for row in self.rows for name in row)))
+        table = table.astype({name: "float32" for name in table.columns if name != "step"})
+        table.to_parquet(path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
 
     @staticmethod
     def restore(table: Path, path: Path) -> None:
-        """Write the rows of a table that `write_csv` wrote to `path`, as `append` does."""
-        with table.open(newline="") as file:
-            rows = [{name: float(cell) for name, cell in row.items() if cell} for row in csv.DictReader(file)]
-        write_whole(path, "".join(json.dumps(row | {"step": int(row["step"])}) + "\n" for row in rows))
+        """Write the rows of a table that `write_table` wrote to `path`, as `append` does."""
+        import pandas as pd
+
+        again = Curves(path, 0)
+        for step, row in pd.read_parquet(table).set_index("step").iterrows():
+            again.append(int(step), row.dropna().to_dict())
 
     def write_figure(self, path: Path, title: str, panels: Sequence[str]) -> None:
         """One panel a name, those without values left out; an outlier that would flatten the rest lies outside."""
@@ -88,7 +89,7 @@ class Curves:
         """Table and figure (of `panels`, then `terms`); returns, of the last row, the metrics of a training stage."""
         for name in (TABLE, FIGURE):
             (out / name).parent.mkdir()
-        self.write_csv(out / TABLE)
+        self.write_table(out / TABLE)
         self.write_figure(out / FIGURE, title, [*panels, *terms])
         last = self.rows[-1] if self.rows else {}
         return {name: last[name] for name in ("step", *panels, "steps_per_second") if name in last}

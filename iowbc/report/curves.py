@@ -159,8 +159,8 @@ def learning_figure(panels: Sequence[CurvePanel], title: str) -> Figure:
 
 def _columns(folder: Path) -> dict[str, Values]:
     """The columns of an artifact's learning curves; a value that a row lacks is NaN."""
-    rows = _rows(folder / TABLE)
-    return {name: _numbers(rows, name) for name in rows[0]} if rows and "step" in rows[0] else {}
+    table = pd.read_parquet(folder / TABLE) if (folder / TABLE).is_file() else pd.DataFrame()
+    return {name: np.asarray(table[name], np.float64) for name in table.select_dtypes("number") if "step" in table}
 
 
 def _rows(path: Path) -> list[dict[str, str]]:

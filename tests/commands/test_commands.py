@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from function_calls import function_calls
 from rich.console import Console
@@ -134,7 +135,7 @@ def test_compare_shows_only_what_differs_and_by_how_much_and_the_learning_curves
         artifact = folder / "runs" / "store" / "teacher" / key(name, "teacher")
         summary = {"metrics": {"count": count, "same": 1.0}}
         (artifact / "summary.json").write_text(json.dumps(summary))
-        (artifact / "tables" / "learning_curves.csv").write_text(f"step,reward\n1,0\n2,{count}\n")
+        pd.DataFrame({"step": [1, 2], "reward": [0.0, count]}).to_parquet(artifact / "tables/learning_curves.parquet")
     done = command("compare", "first", "second")
     assert done.returncode == 0, done.stderr
     table = (folder / "runs" / "compare" / "metrics.md").read_text()

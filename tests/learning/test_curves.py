@@ -1,10 +1,11 @@
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
 from iowbc.learning.curve_titles import title_of
-from iowbc.learning.curves import Curves
+from iowbc.learning.curves import TABLE, Curves
 from iowbc.stages import distill, teacher
 
 
@@ -43,12 +44,12 @@ def test_curves_go_on_from_the_table_that_they_left(tmp_path: Path) -> None:
     curves = Curves(tmp_path / "curves.jsonl", 0)
     curves.append(10, {"reward": 0.123456789})
     curves.append(20, {"reward": 2.0, "late": 1e-12})
-    curves.write_csv(tmp_path / "curves.csv")
-    Curves.restore(tmp_path / "curves.csv", tmp_path / "again.jsonl")
+    curves.write_table(tmp_path / "curves.parquet")
+    Curves.restore(tmp_path / "curves.parquet", tmp_path / "again.jsonl")
     again = Curves(tmp_path / "again.jsonl", 20)
     assert again.rows == curves.rows == [{"step": 10, "reward": 0.123457}, {"step": 20, "reward": 2.0, "late": 1e-12}]
-    again.write_csv(tmp_path / "again.csv")
-    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "curves.csv").read_bytes()
+    again.write_table(tmp_path / "again.parquet")
+    assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / "curves.parquet").read_bytes()
 
 
 def test_panels_say_what_they_show_and_in_what_unit() -> None:
@@ -63,14 +64,15 @@ def test_the_figure_leaves_out_what_was_never_recorded(tmp_path: Path) -> None:
     curves.append(10, {"reward": 1.0})
     curves.append(20, {"reward": 2.0, "late": 1.0})
     curves.write_figure(tmp_path / "figure.png", "curves", ["reward", "absent"])
-    curves.write_csv(tmp_path / "curves.csv")
+    curves.write_table(tmp_path / "curves.parquet")
     assert (tmp_path / "figure.png").stat().st_size > 2000
-    assert (tmp_path / "curves.csv").read_text().splitlines() == ["step,reward,late", "10,1.0,", "20,2.0,1.0"]
+    table = pd.read_parquet(tmp_path / "curves.parquet")
+    assert table.to_csv(index=False).split() == ["step,reward,late", "10,1.0,", "20,2.0,1.0"]
 
 
 def test_every_figure_that_a_published_training_recorded_has_a_title() -> None:
-    for table in (Path(__file__).parents[2] / "runs" / "published").glob("*/*/tables/learning_curves.csv"):
-        names = table.read_text().splitlines()[0].split(",")[1:]
+    for table in (Path(__file__).parents[2] / "runs" / "published").glob(f"*/*/{TABLE}"):
+        names = pd.read_parquet(table).columns[1:]
         assert [name for name in names if title_of(name) == name] == []
 
 

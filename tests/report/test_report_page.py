@@ -10,9 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from iowbc.commands.results import split_tables
+from iowbc.learning.curves import TABLE
 from iowbc.pipeline.store.artifact import Manifest, write_manifest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -58,8 +60,9 @@ def make_run(root: Path, name: str, seed: int, gamma: float, score: float) -> Ru
         found = store.find(stage, key)
         assert found is not None
         artifacts[stage] = found
-    rows = "".join(f"{step},{score * step},{'' if step % 2 else 0.5}\n" for step in range(1, STEPS + 1))
-    (artifacts["teacher"].folder / "tables" / "learning_curves.csv").write_text("step,reward,check/score\n" + rows)
+    steps = np.arange(1, STEPS + 1)
+    curves = {"step": steps, "reward": score * steps, "check/score": np.where(steps % 2, np.nan, 0.5)}
+    pd.DataFrame(curves).to_parquet(artifacts["teacher"].folder / TABLE)
     (artifacts["eval"].folder / "tables" / "summary.csv").write_text(
         "suite,case,mass,rate,rate_low,rate_high,E_v,E_v_half\n"
         f"lifting,lifting,0,1,0.6,1,{score},0.01\nlifting,lifting,4,0.8,0.4,1,,\n"
@@ -123,8 +126,8 @@ def test_the_picture_of_learning_curves_has_a_line_for_each_recipe_and_a_band_of
 
 
 def test_every_curve_of_a_training_has_a_title_with_its_unit(runs: list[Run]) -> None:
-    table = runs[0].artifacts["teacher"].folder / "tables" / "learning_curves.csv"
-    table.write_text("step,reward,error/lift/walking/velocity,seconds/learning,own\n0,1,2,3,4\n")
+    names = ("step", "reward", "error/lift/walking/velocity", "seconds/learning", "own")
+    pd.DataFrame({name: [1.0] for name in names}).to_parquet(runs[0].artifacts["teacher"].folder / TABLE)
     _, others = learning_panels(grouped(runs[:1]), "teacher")
     assert [panel.title for panel in others] == [
         "error of velocity, lift, walking [m/s]",
@@ -191,9 +194,9 @@ def hostile(tmp_path: Path) -> list[Run]:
             (artifact.folder / "key.json").write_text(json.dumps({HOSTILE: HOSTILE}))
             (artifact.folder / "figures" / f"{name}.png").write_bytes(b"picture")
         cell = HOSTILE.replace('"', '""')
-        (run.artifacts["teacher"].folder / "tables" / "learning_curves.csv").write_text(
-            f'step,"{cell}","error/a/b/{cell.replace("/", "|")}",reward\n1,2,3,4\n2,3,"{cell}",5,6,7\n'
-        )
+        error = f"error/a/b/{HOSTILE.replace('/', '|')}"
+        curves = {"step": [1, 2], HOSTILE: [2, 3], error: ["3", HOSTILE], "reward": [4, 5]}
+        pd.DataFrame(curves).to_parquet(run.artifacts["teacher"].folder / TABLE)
         (run.artifacts["eval"].folder / "tables" / "summary.csv").write_text(
             "suite,case,mass,rate,E_v\n"
             + "".join(f'"{cell}","{cell}",{mass},"{cell}",0.1\n' for mass in (0, 1, f'"{cell}"'))

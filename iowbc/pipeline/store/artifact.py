@@ -121,7 +121,7 @@ class Artifact:
         """
         import pandas as pd
 
-        paths = [*self.folder.glob("*.parquet"), *(self.folder / "tables").glob("*.csv")]
+        paths = [*self.folder.rglob("*.parquet"), *(self.folder / "tables").glob("*.csv")]
         found = {path.stem: path for path in sorted(paths)}
         if name not in found:
             raise KeyError(f"{self.folder} has no table '{name}'; it has: {', '.join(found) or 'none'}")
