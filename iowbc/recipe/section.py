@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
@@ -46,6 +46,8 @@ Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Fie
 """Positive values that ascend without repetition."""
 Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
 """Masses [kg] that ascend without repetition."""
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
@@ -65,6 +67,16 @@ class Section(BaseModel):
     def idle(self) -> bool:
         """True where an entry of a mapping does nothing, so that it might as well not be there."""
         return False
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Values that do not fit each other: dotted path from here, empty for the section itself, and what is wrong."""
+        return iter(())
+
+    @model_validator(mode="after")
+    def _values_fit_each_other(self) -> Self:
+        if found := tuple(self.problems()):
+            raise Unfitting(found)
+        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -123,12 +135,11 @@ class Encoder(Section):
 
 
 class Unfitting(ValueError):
-    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value, from the section that
-    raises it, and what is wrong there."""
+    """Values of a section that do not fit each other; see `Section.problems`."""
 
-    def __init__(self, problems: Sequence[tuple[str, str]]) -> None:
-        self.problems = tuple(problems)
-        super().__init__("; ".join(f"{path}: {text}" for path, text in problems))
+    def __init__(self, problems: tuple[tuple[str, str], ...]) -> None:
+        self.problems = problems
+        super().__init__("; ".join(f"{path}: {text}" if path else text for path, text in problems))
 
 
 def deciding(section: Section) -> dict[str, Any]:

@@ -6,12 +6,12 @@ import json
 import math
 import random
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import Field, JsonValue, ValidationError, model_validator
+from pydantic import Field, JsonValue, ValidationError
 
 from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document, read_value
@@ -41,15 +41,13 @@ class Drawn(Section):
     whole: bool = False
     """Rounds it to an integer."""
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.high <= self.low:
-            raise ValueError(f"high {self.high} is not greater than low {self.low}")
+            yield "", f"high {self.high} is not greater than low {self.low}"
         if not math.isfinite(self.high - self.low):
-            raise ValueError(f"{self.low} to {self.high} is too wide to draw from")
+            yield "", f"{self.low} to {self.high} is too wide to draw from"
         if self.scale == "log" and self.low <= 0:
-            raise ValueError(f"low {self.low}: a logarithmic scale begins above 0")
-        return self
+            yield "", f"low {self.low}: a logarithmic scale begins above 0"
 
     def value(self, part: float) -> int | float:
         """The number for a part of the way from low to high, 0 to 1."""
