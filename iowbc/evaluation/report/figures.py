@@ -163,10 +163,6 @@ def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, li
     return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
 
 
-def _norm(errors: Sequence[float]) -> float:
-    return float(error_norm(np.array(errors)))
-
-
 def _with_paper(rows: pd.DataFrame) -> bool:
     return rows["kind"].iloc[0] in NUMBERS and asks_for_steps(rows)
 
