@@ -5,8 +5,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from iowbc.cli.options import BenchRecipe, BenchWorkers, RunsFolder, SceneName, runs_folder
+from iowbc.cli.options import RunsFolder, SceneName, runs_folder
 from iowbc.commands import completion
+
+BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
+BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worker processes (repeatable).", min=1)]
 
 
 def bench_simulation(
