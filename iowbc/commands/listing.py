@@ -136,9 +136,9 @@ def show(store: Store, console: Console, word: str, as_json: bool = False) -> No
         artifacts = [
             artifact_data(artifact) | {"ingredients": artifact.ingredients} for artifact in found.artifacts.values()
         ]
-        print_json(console, artifacts if found.recipe is None else {"recipe": found.recipe, "stages": artifacts})
+        print_json(console, {"recipe": found.recipe, "stages": artifacts} if found.recipe else artifacts)
         return
-    if found.recipe is not None:
+    if found.recipe:
         for stage, artifact in found.artifacts.items():
             manifest = artifact.manifest
             took = f"made {ago(manifest.made)}, took {duration(manifest.seconds)}"
