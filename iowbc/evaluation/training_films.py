@@ -5,9 +5,9 @@ from contextlib import closing
 from pathlib import Path
 
 from iowbc.errors import NoRenderer
-from iowbc.evaluation.films import EpisodeFilm, written_film
+from iowbc.evaluation.films import film_episode, written_film
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.rollout import Acting
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -39,9 +39,8 @@ class TrainingFilms:
             with (
                 closing(VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment,
                 written_film(path, SMALL.fps) as add,
-                closing(EpisodeFilm(environment, add, SMALL, [title])) as film,
             ):
-                play_in(environment, policy, look=film.look)
+                film_episode(environment, policy, add, SMALL, title)
         except NoRenderer as reason:
             say(f"no films: {reason}")
             self.parts = 0
