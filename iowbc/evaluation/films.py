@@ -12,7 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from iowbc.errors import NoRenderer
 from iowbc.evaluation.trials.batch_policy import in_batch
+from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
@@ -29,6 +31,8 @@ LINES_PER_FRAME = 26
 """Height of the text: this many lines would fill the frame."""
 UNSEEN = ("robustness", "pushes", "impedance", "map")
 """Kinds of trials that look like others, and are not filmed."""
+SMALL = Video(width=480, height=368, fps=10)
+"""Of films while training: 10 s take some 15 s to draw without a graphics card, and 0.4 MB."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
 
@@ -127,3 +131,36 @@ def film_trial(
     title = f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
     with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment:
         film_episode(environment, in_batch(policy, row), add, video, title, interrupted, progress)
+
+
+class TrainingFilms:
+    """Films of a policy while it trains: the same trial, each time a further part of the training is done. An existing
+    one is not made again."""
+
+    def __init__(self, world: Specification, trial: Trial, folder: Path, parts: int) -> None:
+        """`parts`: into which a training is divided; a film is due after each."""
+        self.world, self.trial, self.folder, self.parts = world, trial, folder, parts
+
+    def due(self, steps: int, planned: int) -> Path | None:
+        """The newest film that is due after so many of the planned steps, if it is missing."""
+        part = min(steps, planned) * self.parts // planned
+        if not part:
+            return None
+        path = self.folder / f"{part * planned // self.parts:010}_steps.mp4"
+        return None if path.exists() else path
+
+    def make(self, path: Path, policy: Acting, say: Callable[[str], None]) -> bool:
+        """Plays the trial and films it; where nothing can be drawn it says so once, and none is due any more."""
+        title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
+        episodes = (self.trial.episode,)
+        try:
+            with (
+                closing(VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment,
+                written_film(path, SMALL.fps) as add,
+            ):
+                film_episode(environment, policy, add, SMALL, title)
+        except NoRenderer as reason:
+            say(f"no films: {reason}")
+            self.parts = 0
+            return False
+        return True

@@ -1,7 +1,11 @@
 """The base of every recipe section, and which of its values decide results."""
 
+import ast
+import functools
+import inspect
 import itertools
 import re
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -17,8 +21,6 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
-
-from iowbc.recipe.sentences import sentences
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Extra of a field that changes how a stage is carried out or shown, and none of its results."""
@@ -132,6 +134,27 @@ class Encoder(Section):
     """Features to which one observation of the history is projected, with the same weights for all."""
     latent: int = Field(default=64, ge=1, le=16_384)
     """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
+
+
+@functools.cache
+def sentences(section: type[BaseModel]) -> dict[str, str]:
+    """The string below each field of a section and its bases, by the field's name.
+
+    For those who ask: pydantic's `use_attribute_docstrings` reads every section's source whenever a command starts.
+    """
+    bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
+    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
+    assert isinstance(definition, ast.ClassDef)
+    own = {
+        field.target.id: inspect.cleandoc(text.value.value)
+        for field, text in itertools.pairwise(definition.body)
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }
+    return {name: sentence for base in bases for name, sentence in sentences(base).items()} | own
 
 
 class Unfitting(ValueError):
