@@ -1,12 +1,12 @@
 """Results of a sweep: a table and a figure over its settings, seeds together, and every point's metrics."""
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
@@ -122,7 +122,4 @@ def _write_points(sweep: Sweep, found: Mapping[str, Run], states: Mapping[str, s
         for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
             row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
         rows.append(row)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
-        writer.writeheader()
-        writer.writerows(rows)
+    pd.DataFrame(rows).to_csv(path, index=False)
