@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import ALL_ERRORS, OF_ALL, STILL
+from iowbc.evaluation.report.aggregate import ALL_ERRORS, OVER_ALL_TRIALS, STILL
 from iowbc.evaluation.trials.metrics import Measure
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
@@ -105,7 +105,7 @@ def trials_of(
             "object_beside": 0.1 if suite.startswith("push") else np.nan,
             **dict.fromkeys(ALL_ERRORS, error + 0.1 * trial),
             **dict.fromkeys(STILL, 0.25),
-            **dict.fromkeys((*COSTS, *OF_ALL), 1.0),
+            **dict.fromkeys((*COSTS, *OVER_ALL_TRIALS), 1.0),
             "transport_robot": 0.9,
             "transport_object": 0.8,
             "commanded_distance": 4.0,

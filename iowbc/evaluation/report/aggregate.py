@@ -14,7 +14,7 @@ PARTS = ("", "_moving", "_clamped")
 ALL_ERRORS = tuple(f"{name}{part}" for part in PARTS for name in ERRORS)
 STILL = tuple(f"still_{name}{part}" for part in ("", "_moving") for name in ERRORS)
 """The errors of a robot that stands still, from the script alone."""
-OF_ALL = (
+OVER_ALL_TRIALS = (
     *("transport_robot", "transport_object", "hand_force_mean", "hand_force_p95", "hand_force_peak"),
     *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
 )
@@ -42,12 +42,13 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
 
     Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
     in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
-    `rate` of success with its Wilson interval `rate_low`, `rate_high`; every metric's mean, see `OF_ALL`, and of an
-    error `<error>_half`, half its 95 % interval; `norm`, the norm of the four errors; `torque_rms` of the worst joint
-    by the means of all, and its name `torque_rms_joint`. Intervals take `WORLD` as clusters. NaN where no trial
-    survived (or one alone, for the half widths): "Fails" in the tables. Trials of an earlier version lack metrics.
+    `rate` of success with its Wilson interval `rate_low`, `rate_high`; every metric's mean over the surviving trials,
+    or, see `OVER_ALL_TRIALS`, all; of an error `<error>_half`, half its 95 % interval; `norm`, the norm of the four
+    errors; `torque_rms` of the worst joint by the means of all, and its name `torque_rms_joint`. Intervals take `WORLD`
+    as clusters. NaN where no trial survived (or one alone, for the half widths): "Fails" in the tables. Metrics that
+    trials of an earlier version lack are missing here, too.
     """
-    missing = [name for name in (*RAW, *OF_ALL, *SETTINGS) if name not in trials]
+    missing = [name for name in (*RAW, *OVER_ALL_TRIALS, *SETTINGS) if name not in trials]
     trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
     numbers = [name for name in trials.select_dtypes("float") if name not in (*GROUP, *SETTINGS)]
     metrics = [name for name in numbers if not name.startswith("drawn_")]
@@ -84,7 +85,7 @@ def _row(key: dict[str, object], group: pd.DataFrame, metrics: list[str]) -> dic
         "rate_low": low,
         "rate_high": high,
         **survivors[metrics].mean().to_dict(),
-        **group[[*OF_ALL, *STILL]].mean().to_dict(),
+        **group[[*OVER_ALL_TRIALS, *STILL]].mean().to_dict(),
         **group[[*SETTINGS]].iloc[0].to_dict(),
     }
     for name in ALL_ERRORS:
