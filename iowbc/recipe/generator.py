@@ -5,22 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import DEEPEST, LATER, NonNegative, Positive, Section, Width
+from iowbc.recipe.section import DEEPEST, LATER, Interval, NonNegative, Positive, Section, Width
 
 Share = Annotated[float, Field(ge=0, le=1)]
-
-
-class Interval(Section):
-    """A closed range of values."""
-
-    low: float
-    """Smallest value."""
-    high: float
-    """Largest value."""
-
-    def problems(self) -> Iterator[tuple[str, str]]:
-        if self.low > self.high:
-            yield "", f"low ({self.low}) is above high ({self.high})"
 
 
 class WristRegion(Section):

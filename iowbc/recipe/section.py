@@ -91,6 +91,19 @@ class Section(BaseModel):
         return schema
 
 
+class Interval(Section):
+    """A closed range of values."""
+
+    low: float
+    """Smallest value."""
+    high: float
+    """Largest value."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        if self.low > self.high:
+            yield "", f"low ({self.low}) is above high ({self.high})"
+
+
 class NamedEntries(Section):
     """Entries by name: fields for those that every recipe has, and a recipe's own beside them, all of one type.
 
@@ -114,14 +127,12 @@ class NamedEntries(Section):
         """Annotation of the entries that a recipe adds."""
         return get_args(cls.__annotations__["__pydantic_extra__"])[1]
 
-    @model_validator(mode="after")
-    def _names_can_be_used(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         for name in self.own:
             if not re.fullmatch(OWN_NAME, name):
-                raise ValueError(f"{name!r} is no name: one begins with a letter and has up to 32 of a-z, 0-9 and _")
+                yield "", f"{name!r} is no name: one begins with a letter and has up to 32 of a-z, 0-9 and _"
             if hasattr(type(self), name):
-                raise ValueError(f"{name!r} is a word that sections have a use of their own for; take another")
-        return self
+                yield "", f"{name!r} is a word that sections have a use of their own for; take another"
 
 
 class Encoder(Section):

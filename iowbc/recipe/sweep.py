@@ -19,7 +19,7 @@ from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.reading.validation import descend
 from iowbc.recipe.recipe import NAME
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Interval, Section
 
 DIGITS = 4
 """Significant digits of a drawn value: it can be read and typed again, and no result hangs on the fifth."""
@@ -29,13 +29,9 @@ MOST_POINTS = 1_000
 """Points of a sweep at most, unless more are asked for: planning one takes some 10 ms and 200 kB."""
 
 
-class Drawn(Section):
+class Drawn(Interval):
     """A number drawn at random: x ~ U(low, high), or log x ~ U(log low, log high)."""
 
-    low: float
-    """Lower limit."""
-    high: float
-    """Upper limit."""
     scale: Literal["linear", "log"] = "linear"
     """`log` draws each order of magnitude alike often: for rates and weights whose size is not known."""
     whole: bool = False

@@ -5,16 +5,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from iowbc.recipe.section import LATER, Section
+from iowbc.recipe.section import LATER, Interval, Section
 
 
-class Distribution(Section):
+class Distribution(Interval):
     """x ~ U(low, high), or its logarithm uniform; or else the nominal value."""
 
-    low: float
-    """Lower end of the range."""
-    high: float
-    """Upper end of the range."""
     nominal: float
     """Value where the entry is disabled or not drawn."""
     shape: Literal["uniform", "log-uniform"] = "uniform"
@@ -25,8 +21,7 @@ class Distribution(Section):
     """Off always gives the nominal value."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
-        if self.low > self.high:
-            yield "", f"low {self.low} is above high {self.high}"
+        yield from super().problems()
         if self.shape == "log-uniform" and self.low <= 0.0:
             yield "", f"a log-uniform range must be positive, got low {self.low}"
 

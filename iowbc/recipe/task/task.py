@@ -93,6 +93,7 @@ class SceneShares(NamedEntries):
         return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
 
     def problems(self) -> Iterator[tuple[str, str]]:
+        yield from super().problems()
         if sum(share for _, share in self) <= 0.0:
             yield "", "every share is zero: give at least one scene a positive share"
 
