@@ -1,7 +1,7 @@
 """The whole recipe: one experiment, from the reference generator to the exported policy."""
 
 from collections.abc import Iterator
-from typing import Literal, Self, get_args
+from typing import Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator
 
@@ -88,3 +88,17 @@ class Recipe(Section):
         if repeated:
             raise ValueError(f"names {', '.join(repeated)} more than once")
         return tuple(sorted(stages, key=PIPELINE.index))
+
+
+def recipe_schema() -> dict[str, Any]:
+    """JSON Schema of a recipe file: the recipe's fields with their sentences, and `extends`.
+
+    No key is required, for a section may hold any part of its keys; `iowbc plan` names what an entry of a list lacks.
+    """
+    schema = Recipe.model_json_schema()
+    for definition in (schema, *schema["$defs"].values()):
+        definition.pop("required", None)
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    extends = {"type": "string", "description": "Recipe file, relative to this one, that this one changes."}
+    schema["properties"] = {"extends": extends, **schema["properties"]}
+    return schema
