@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.report.aggregate import ALL_ERRORS, COSTS, FORCES, STILL
+from iowbc.evaluation.report.aggregate import ALL_ERRORS, OVER_ALL_TRIALS, STILL
 from iowbc.evaluation.trials.metrics import Measure
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
@@ -22,6 +22,16 @@ MEASURE = Measure(
     efforts=JOINTS,
 )
 GAIT_STEPS = MEASURE.window
+COSTS = (
+    *("E_v_raw", "E_v_raw_moving", "E_v_partner", "distance", "saturation", "saturation_peak", "slip_share"),
+    *("partner_force_peak", "grip_force_peak", "link_object_force", "energy"),
+    *("foot_slip", "foot_slip_peak", "foot_slip_per_metre", "foot_drift", "foot_drift_per_metre"),
+    *("swing_clearance_left", "swing_clearance_right", "hand_weight_share", "partner_weight_share", "weight_in_hands"),
+    *("torso_jerk", "object_jerk", "touchdown_speed", "touchdown_speed_peak", "foot_force_peak"),
+    *("pressure_margin", "pressure_margin_low", "friction_use", "friction_use_high", "action_second_difference"),
+    *("push_force", "push_force_share", "impedance_real", "impedance_imag"),
+)
+"""Metrics beside the errors that are averaged over the surviving trials."""
 
 
 def script(seconds: float = 8.0, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> CommandScript:
@@ -95,7 +105,7 @@ def trials_of(
             "object_beside": 0.1 if suite.startswith("push") else np.nan,
             **dict.fromkeys(ALL_ERRORS, error + 0.1 * trial),
             **dict.fromkeys(STILL, 0.25),
-            **dict.fromkeys((*COSTS, *FORCES), 1.0),
+            **dict.fromkeys((*COSTS, *OVER_ALL_TRIALS), 1.0),
             "transport_robot": 0.9,
             "transport_object": 0.8,
             "commanded_distance": 4.0,

@@ -41,7 +41,7 @@ MAY_IMPORT = {
     "live": WORLD | {"task", "reference", "learning", "deploy", "evaluation", "skill"},
     "benchmarks": WORLD | {"task", "reference", "learning", "deploy"},
     "export": WORLD | {"task", "reference", "learning", "deploy"},
-    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors", "control", "onboard"},
+    "report": {"learning", "pipeline", "recipe", "results", "stages", "errors"},
     "web": WORLD | {"task", "deploy", "evaluation"},
     "stages": WORLD
     | {"task", "reference", "learning", "rollouts", "deploy", "pipeline", "evaluation", "benchmarks", "export"}
@@ -49,7 +49,7 @@ MAY_IMPORT = {
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
     | {"live", "web", "stages", "results", "onboard", "twin", "adapters", "skill"},
-    "cli": {"commands", "stages", "evaluation", "pipeline", "recipe", "errors", "processes"},
+    "cli": DESCRIPTIONS | {"commands", "stages", "evaluation", "pipeline", "benchmarks", "deploy"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
 ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "sklearn", "mlflow", "matplotlib"}

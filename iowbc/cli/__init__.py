@@ -9,51 +9,39 @@ from typing import Annotated
 
 import typer
 
-from iowbc.cli.driving import robot, robot_sim
-from iowbc.cli.listing import compare, diff, gc, list_, report, show, status, ui
-from iowbc.cli.measuring import (
-    bench_carry,
-    bench_control,
-    bench_engines,
-    bench_reference,
-    bench_simulation,
-    bench_training,
-)
-from iowbc.cli.playing import export, play
-from iowbc.cli.preparing import doctor, init, schema
-from iowbc.cli.running import plan, publish, run, sweep
+from iowbc.cli import listing, measuring, playing, preparing, running
 from iowbc.commands.process import described, leave, let_go, prepare_streams
 from iowbc.processes import name_glfw
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    "run": run,
-    "sweep": sweep,
-    "plan": plan,
-    "publish": publish,
-    "init": init,
-    "status": status,
-    "ls": list_,
-    "show": show,
-    "diff": diff,
-    "compare": compare,
-    "report": report,
-    "export": export,
-    "gc": gc,
-    "play": play,
-    "robot": robot,
-    "robot-sim": robot_sim,
-    "ui": ui,
-    "schema": schema,
-    "doctor": doctor,
+    "run": running.run,
+    "sweep": running.sweep,
+    "plan": running.plan,
+    "publish": running.publish,
+    "init": preparing.init,
+    "status": listing.status,
+    "ls": listing.list_,
+    "show": listing.show,
+    "diff": listing.diff,
+    "compare": listing.compare,
+    "report": listing.report,
+    "export": playing.export,
+    "gc": listing.gc,
+    "play": playing.play,
+    "robot": playing.robot,
+    "robot-sim": playing.robot_sim,
+    "ui": listing.ui,
+    "schema": preparing.schema,
+    "doctor": preparing.doctor,
 }
 """In the order of `iowbc --help`."""
 BENCHMARKS: dict[str, Callable[..., None]] = {
-    "sim": bench_simulation,
-    "train": bench_training,
-    "rg": bench_reference,
-    "control": bench_control,
-    "carry": bench_carry,
-    "engines": bench_engines,
+    "sim": measuring.bench_simulation,
+    "train": measuring.bench_training,
+    "rg": measuring.bench_reference,
+    "control": measuring.bench_control,
+    "carry": measuring.bench_carry,
+    "engines": measuring.bench_engines,
 }
 
 app = typer.Typer(

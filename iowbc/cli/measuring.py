@@ -1,12 +1,19 @@
 """Benchmarks of this machine, of two physics engines (`bench engines`) and of a public controller (`bench carry`)."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from iowbc.cli.options import BenchRecipe, BenchWorkers, RunsFolder, SceneName, runs_folder
+from iowbc.cli.options import RunsFolder, SceneName, runs_folder
 from iowbc.commands import completion
+
+if TYPE_CHECKING:
+    from iowbc.recipe.recipe import Recipe
+
+BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
+BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worker processes (repeatable).", min=1)]
 
 
 def bench_simulation(
@@ -18,9 +25,11 @@ def bench_simulation(
     runs: RunsFolder = None,
 ) -> None:
     """Measure the vector environment's speed against a bare MuJoCo loop; results go to MLflow."""
-    from iowbc.commands.bench import simulation
+    own, counts = _checked(runs, recipe, scene), tuple(workers or ())
+    from iowbc.benchmarks import simulation
 
-    simulation(runs_folder(runs), recipe, scene=scene, environments=environments, workers=workers or (), others=others)
+    figures = simulation.main(own, scene=scene, environments=environments, workers=counts, others=others)
+    _record(runs, "bench-sim", figures)
 
 
 def bench_training(
@@ -34,16 +43,18 @@ def bench_training(
     runs: RunsFolder = None,
 ) -> None:
     """Measure the teacher's training speed against plain stable-baselines3; results go to MLflow."""
-    from iowbc.commands.bench import training
+    own = _checked(runs, recipe, scene)
+    from iowbc.benchmarks import training
 
-    training(runs_folder(runs), recipe, scene=scene, turns=turns, others=others)
+    _record(runs, "bench-train", training.main(own, scene=scene, turns=turns, others=others))
 
 
 def bench_reference(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: RunsFolder = None) -> None:
     """Measure the speed of each labelling method of the reference generator; results go to MLflow."""
-    from iowbc.commands.bench import reference
+    own = _checked(runs, recipe)
+    from iowbc.benchmarks import reference
 
-    reference(runs_folder(runs), recipe, workers=workers or ())
+    _record(runs, "bench-rg", reference.main(own, workers=tuple(workers or ())))
 
 
 def bench_control(
@@ -56,9 +67,15 @@ def bench_control(
     steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
 ) -> None:
     """Measure the control step's time of an exported controller on one thread, without torch or a simulator."""
-    from iowbc.commands.bench import control
+    import numpy as np
 
-    control(what, steps)
+    from iowbc.deploy.timing import step_seconds
+
+    print(f"{what}: {steps:,} control steps of one robot on one thread")
+    print(f"{'':16}{'median':>12}{'99th percentile':>18}{'longest':>12}")
+    for name, taken in zip(("time", "processor time"), 1e3 * step_seconds(what, steps).T, strict=True):
+        median, late, longest = (f"{value:.3f} ms" for value in np.quantile(taken, (0.5, 0.99, 1.0)))
+        print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
 
 
 def bench_carry(
@@ -86,6 +103,40 @@ def bench_engines(
     robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
 ) -> None:
     """Compare MuJoCo and Drake in experiments where they must agree; needs the extra `drake`."""
-    from iowbc.commands.bench import engines
+    from iowbc.commands.needs import require_training
+    from iowbc.errors import IowbcError, UsageError
+    from iowbc.robot.description import robot_folder
 
-    engines(robot)
+    require_training("bench")
+    from iowbc.benchmarks import engines
+
+    try:
+        folder = robot_folder(robot)
+    except FileNotFoundError as error:
+        raise UsageError(str(error)) from None
+    differing = [row.name for row in engines.main(folder) if not row.agrees]
+    if differing:
+        raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
+
+
+def _checked(runs: Path | None, file: Path | None, scene: str | None = None) -> "Recipe | None":
+    """The recipe in a file, once everything that a benchmark needs is there; None for the default one. Raises
+    `UsageError`, also for a scene that it does not have."""
+    from iowbc.commands.needs import require_training
+    from iowbc.errors import require_known
+    from iowbc.pipeline.writability import require_writable_runs
+    from iowbc.recipe.reading.loading import load_recipe
+    from iowbc.recipe.simulation.holding import SCENES
+
+    recipe = load_recipe(file).recipe if file is not None else None
+    if scene is not None:
+        require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
+    require_training("bench")
+    require_writable_runs(runs_folder(runs))
+    return recipe
+
+
+def _record(runs: Path | None, name: str, figures: Mapping[str, float]) -> None:
+    from iowbc.pipeline.tracking.tracker import record_figures
+
+    record_figures(runs_folder(runs), name, figures)

@@ -3,7 +3,7 @@
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,55 +19,15 @@ if TYPE_CHECKING:
 
 PIPE_WIDTH = 160
 """Characters in a line of a table where the output is not a terminal."""
-RecipeFile = Annotated[
-    str,
-    typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes),
-]
-Overrides = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        help="Override a recipe value (repeatable).",
-        metavar="A.B.C=VALUE",
-        autocompletion=completion.paths,
-    ),
-]
 RunsFolder = Annotated[
     Path | None,
     typer.Option(
         "--runs", help="Folder of artifacts and tracking data (default: $IOWBC_RUNS or ./runs).", envvar="IOWBC_RUNS"
     ),
 ]
-SweepFile = Annotated[
-    Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
-]
-Until = Annotated[
-    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
-]
-Force = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=completion.stages
-    ),
-]
-Engine = Annotated[
-    Literal["local", "ray"] | None, typer.Option(help="Execution engine: local processes or a Ray cluster.")
-]
-Address = Annotated[
-    str | None,
-    typer.Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"),
-]
-Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
-BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
-BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worker processes (repeatable).", min=1)]
-OnCodeChange = Annotated[
-    Literal["report", "rerun"], typer.Option(help="Policy for cached stages whose code has changed.")
-]
 Web = Annotated[bool, typer.Option("--web", help="Interactive viewer in the browser (no display needed).")]
 Port = Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)]
+SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Named = Annotated[
     str,

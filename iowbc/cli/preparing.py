@@ -1,5 +1,8 @@
 """`init`, `schema` and `doctor`: commands to prepare the first run."""
 
+import json
+import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -13,16 +16,51 @@ def init(
     robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
 ) -> None:
     """Copy the recipes and a robot description into a folder of your own."""
-    from iowbc.commands.init import begin
+    from iowbc.commands.printed import shown_path, tell
+    from iowbc.errors import UsageError
+    from iowbc.files import replacing
+    from iowbc.pipeline.writability import require_writable
+    from iowbc.recipe.reading.finding import known_files
+    from iowbc.robot.description import robot_folder
 
-    begin(folder, robot, console())
+    try:
+        source = robot_folder(robot)
+    except FileNotFoundError as error:
+        raise UsageError(str(error)) from None
+    origins = {folder / "robots" / source.name: source}
+    for path in known_files():
+        origins.setdefault(folder / "recipes" / path.name, path)
+    links = [str(path) for path in (folder / "robots", folder / "recipes", *origins) if path.is_symlink()]
+    if links:
+        raise UsageError(f"{', '.join(links)}: a link leads elsewhere; remove it, or name another folder")
+    # what an earlier call that was cut short has copied stays
+    same = [target for target, origin in origins.items() if target.exists() and _content(target) == _content(origin)]
+    there = [str(target) for target in origins if target.exists() and (target not in same or len(same) == len(origins))]
+    if there:
+        raise UsageError(f"{', '.join(there)} {'is' if len(there) == 1 else 'are'} there already; name another folder")
+    require_writable(folder, "DIR")
+    for target, origin in origins.items():
+        if target in same:
+            continue
+        with replacing(target) as fresh:
+            shutil.copytree(origin, fresh) if origin.is_dir() else shutil.copyfile(origin, fresh)
+        tell(console(), shown_path(target))
+    console().print(f"to begin: cd {folder}, then `iowbc run quickstart`", highlight=False, soft_wrap=True)
 
 
 def schema(output: Annotated[Path | None, typer.Option(help="Output file (default: print).")] = None) -> None:
     """Write the JSON Schema of recipes, for editors."""
-    from iowbc.commands.schema import write_schema
+    from iowbc.errors import UsageError
+    from iowbc.recipe.recipe import recipe_schema
 
-    write_schema(output)
+    text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None:
+        sys.stdout.write(text)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"--output {output}: cannot be written: {error.strerror}; name another file") from None
 
 
 def doctor(runs: RunsFolder = None) -> None:
@@ -30,3 +68,9 @@ def doctor(runs: RunsFolder = None) -> None:
     from iowbc.commands.doctor import examine
 
     raise typer.Exit(examine(runs_folder(runs), console()))
+
+
+def _content(path: Path) -> dict[str, bytes]:
+    """The content of a file, or of all files below a folder, by relative path."""
+    files = (file for file in (path, *path.rglob("*")) if file.is_file())
+    return {file.relative_to(path).as_posix(): file.read_bytes() for file in files}

@@ -1,32 +1,54 @@
 """`run`, `sweep`, `plan` and `publish`: make, plan and publish a recipe's artifacts."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from iowbc.cli.options import (
-    Address,
-    AsJson,
-    DryRun,
-    Engine,
-    Force,
-    OnCodeChange,
-    Overrides,
-    Quiet,
-    RecipeFile,
-    RunsFolder,
-    SweepFile,
-    Until,
-    Workers,
-    console,
-    runs_folder,
-)
+from iowbc.cli.options import AsJson, RunsFolder, console, runs_folder
 from iowbc.commands import completion
 from iowbc.commands.process import outlasting_readers
 
 if TYPE_CHECKING:
     from iowbc.commands.request import Request
+
+RecipeFile = Annotated[
+    str,
+    typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Override a recipe value (repeatable).",
+        metavar="A.B.C=VALUE",
+        autocompletion=completion.paths,
+    ),
+]
+SweepFile = Annotated[
+    Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
+]
+Until = Annotated[
+    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
+]
+Force = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=completion.stages
+    ),
+]
+Engine = Annotated[
+    Literal["local", "ray"] | None, typer.Option(help="Execution engine: local processes or a Ray cluster.")
+]
+Address = Annotated[
+    str | None,
+    typer.Option(help="Ray cluster: local, auto, HOST:PORT, ray://HOST:PORT.", metavar="ADDRESS"),
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Show the plan without running it.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+OnCodeChange = Annotated[
+    Literal["report", "rerun"], typer.Option(help="Policy for cached stages whose code has changed.")
+]
 
 
 def run(
@@ -34,7 +56,7 @@ def run(
     overrides: Overrides = None,
     until: Until = None,
     force: Force = None,
-    workers: Workers = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
     engine: Engine = None,
     address: Address = None,
     dry_run: DryRun = False,
@@ -48,8 +70,8 @@ def run(
     from iowbc.commands.run import run as run_recipe
     from iowbc.stages.registry import STAGES
 
-    options: dict[str, Any] = {"until": until, "workers": workers, "engine": engine, "address": address}
-    request = request_of(recipe, overrides, runs, force, on_code_change=on_code_change, **options)
+    options: dict[str, Any] = {"workers": workers, "engine": engine, "address": address}
+    request = request_of(recipe, overrides, runs, force, until=until, on_code_change=on_code_change, **options)
     if dry_run:
         print_plan(request, STAGES, console())
         return
@@ -91,8 +113,8 @@ def sweep(
     from iowbc.commands.sweep import sweep as run_sweep
     from iowbc.stages.registry import STAGES
 
-    options: dict[str, Any] = {"until": until, "workers": workers, "engine": engine, "address": address}
-    request = request_of(recipe, overrides, runs, on_code_change=on_code_change, **options)
+    options: dict[str, Any] = {"workers": workers, "engine": engine, "address": address}
+    request = request_of(recipe, overrides, runs, until=until, on_code_change=on_code_change, **options)
     asked = SweepRequest(request, file, jobs, points)
     if dry_run:
         plan_sweep(asked, STAGES, console(), as_json)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from iowbc.commands.diff import difference_lines
-from iowbc.commands.lookup import FILM, Named, film_of, members_of, named, points_of, record_comparison
+from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
 from iowbc.commands.needs import require_training
 from iowbc.commands.printed import filming, print_json, shown_path, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
@@ -19,6 +19,7 @@ from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
+from iowbc.report.runs import Group, Run, grouped, metrics_table
 from iowbc.results.table import ABSENT, Table, drawn, heads, markdown, read_tables, write_table
 from iowbc.stages.registry import STAGES
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from iowbc.report.curves import CurvePanel
-    from iowbc.report.runs import Group, Run
 
 CURVE_WIDTH = 40
 """Characters of a learning curve."""
@@ -47,8 +47,6 @@ def compare(
     a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
     `UsageError`.
     """
-    from iowbc.report.runs import metrics_table
-
     found = [named(store, word) for word in points_of(store, words)]
     members = [name for word in words for name in members_of(word)]
     if len(found) < 2 and not members:
@@ -57,11 +55,11 @@ def compare(
     require_training("compare")
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
-    record_comparison([run.word for run in found], output)
-    metrics = metrics_table(_groups(found))
+    record_comparison([run.label for run in found], output)
+    metrics = metrics_table(grouped(found))
     (output / "metrics.md").write_text(markdown(metrics), encoding="utf-8")
     tried = _having(found, TRIALS)
-    missing = [name for name in members if name not in {run.word for run in tried}]
+    missing = [name for name in members if name not in {run.label for run in tried}]
     _report_probes(found, output)
     if len(tried) > 1 or (tried and members):
         report_together(tried, output, missing)
@@ -88,7 +86,7 @@ def compare(
 def report(store: Store, console: Console, words: Sequence[str], output: Path) -> None:
     """Write one HTML file about what the words name, which opens anywhere without a network. Raises `UsageError`."""
     found = [named(store, word) for word in points_of(store, words)]
-    single = [run.word for run in found if run.recipe is None]
+    single = [run.label for run in found if not run.recipe]
     if single:
         raise UsageError(
             f"{single[0]} is one artifact; report takes recipes that have run, as `iowbc status` lists them"
@@ -104,15 +102,15 @@ def report(store: Store, console: Console, words: Sequence[str], output: Path) -
     differences = [
         line
         for other in found[1:]
-        for line in (f"{found[0].word} → {other.word}", *(f"  {text}" for text in difference_lines(found[0], other)))
+        for line in (f"{found[0].label} → {other.label}", *(f"  {text}" for text in difference_lines(found[0], other)))
     ]
     tables, media = _joined(store, found)
     main, others = split_tables(tables)
-    write_page(output, _runs(found), _groups(found), main, others, differences, media)
+    write_page(output, found, grouped(found), main, others, differences, media)
     tell(console, f"{shown_path(output)} ({size(output.stat().st_size)}): open it in any browser, no network needed")
 
 
-def _joined(store: Store, found: Sequence[Named]) -> tuple[list[Table], dict[str, bytes]]:
+def _joined(store: Store, found: Sequence[Run]) -> tuple[list[Table], dict[str, bytes]]:
     """The result tables of one run; of several those over all their trials, and by file name their pictures and their
     film side by side, where there is one."""
     evaluated = [run.artifacts["eval"] for run in found if "eval" in run.artifacts]
@@ -123,39 +121,27 @@ def _joined(store: Store, found: Sequence[Named]) -> tuple[list[Table], dict[str
         _report_probes(found, output)
         if len(tried) > 1:
             report_together(tried, output)
-        film = film_of(store.runs, [run.word for run in found])
+        film = film_of(store.runs, [run.label for run in found])
         media = [*sorted((output / "figures").glob("*.png")), *([film] if film else [])]
         return read_tables(output / "tables"), {path.name: path.read_bytes() for path in media}
 
 
-def _data(found: Sequence[Named], output: Path) -> dict[str, Any]:
+def _data(found: Sequence[Run], output: Path) -> dict[str, Any]:
     """The comparison for other programs: every metric of every run, and the files that were written."""
     metrics = [
-        {"stage": stage, "run": run.word, **artifact.metrics}
+        {"stage": stage, "run": run.label, **artifact.metrics}
         for run in found
         for stage, artifact in run.artifacts.items()
     ]
     return {"metrics": metrics, "files": [shown_path(path) for path in sorted(output.rglob("*.*"))]}
 
 
-def _runs(found: Sequence[Named]) -> "list[Run]":
-    from iowbc.report.runs import Run
-
-    return [Run(run.word, run.artifacts, run.recipe or {}) for run in found]
-
-
-def _groups(found: Sequence[Named]) -> "list[Group]":
-    from iowbc.report.runs import grouped
-
-    return grouped(_runs(found))
-
-
-def _learning_curves(found: Sequence[Named], output: Path) -> "dict[str, list[CurvePanel]]":
+def _learning_curves(found: Sequence[Run], output: Path) -> "dict[str, list[CurvePanel]]":
     """The main learning curves of all recipes by stage; also drawn under `output`, a picture a stage."""
     from iowbc.report.curves import PICTURE_POINTS, learning_figure, learning_panels
     from iowbc.results.picture import write_figure
 
-    groups = _groups(found)
+    groups = grouped(found)
     curves = {stage: panels for stage in STAGES if (panels := learning_panels(groups, stage, PICTURE_POINTS)[0])}
     for stage, panels in curves.items():
         write_figure(learning_figure(panels, stage), output / "figures" / f"learning_{stage}.png")
@@ -173,12 +159,12 @@ def _print_curves(curves: "Mapping[str, Sequence[CurvePanel]]", console: Console
                     console.print(text, markup=False, highlight=False, no_wrap=True, overflow="ellipsis")
 
 
-def _having(runs: Sequence[Named], name: str) -> list[Named]:
+def _having(runs: Sequence[Run], name: str) -> list[Run]:
     """The runs whose evaluation left a file of this name."""
     return [run for run in runs if "eval" in run.artifacts and (run.artifacts["eval"].folder / name).is_file()]
 
 
-def _told_apart(runs: Sequence[Named], name: str, together: bool = True) -> "tuple[list[pd.DataFrame], dict[str, str]]":
+def _told_apart(runs: Sequence[Run], name: str, together: bool = True) -> "tuple[list[pd.DataFrame], dict[str, str]]":
     """A table of each run's evaluation, and the labels of variants that go by another name.
 
     Runs that differ in their seed alone are trainings of one variant, unless `together` is false; a variant is called
@@ -188,8 +174,8 @@ def _told_apart(runs: Sequence[Named], name: str, together: bool = True) -> "tup
 
     from iowbc.evaluation.report.aggregate import TRAINING
 
-    tables = {run.word: pd.read_parquet(run.artifacts["eval"].folder / name) for run in runs}
-    groups = _groups(runs) if together else [group for run in runs for group in _groups([run])]
+    tables = {run.label: pd.read_parquet(run.artifacts["eval"].folder / name) for run in runs}
+    groups = grouped(runs) if together else [Group(run.label, (run,)) for run in runs]
     own = [str(tables[group.runs[0].label]["variant"].iloc[0]) for group in groups]
     labels: dict[str, str] = {}
     for group, label in zip(groups, own, strict=True):
@@ -197,10 +183,10 @@ def _told_apart(runs: Sequence[Named], name: str, together: bool = True) -> "tup
         labels |= {} if called == label else {called: label}
         for run, seed in zip(group.runs, group.seeds, strict=True):
             tables[run.label] = tables[run.label].assign(variant=called, **{TRAINING: seed})
-    return [tables[run.word] for run in runs], labels
+    return [tables[run.label] for run in runs], labels
 
 
-def _report_probes(found: Sequence[Named], output: Path) -> None:
+def _report_probes(found: Sequence[Run], output: Path) -> None:
     """Knowledge of the load in the histories of all runs that were probed."""
     import pandas as pd
 
@@ -210,7 +196,7 @@ def _report_probes(found: Sequence[Named], output: Path) -> None:
         write_probe(pd.concat(_told_apart(runs, PROBE, together=False)[0], ignore_index=True), output)
 
 
-def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] = ()) -> None:
+def report_together(runs: Sequence[Run], output: Path, missing: Sequence[str] = ()) -> None:
     """Write tables and figures over all trials of the runs under `output`.
 
     missing: recipes that belong to them and have not run. Raises `UsageError` where the runs count masses differently.
@@ -226,10 +212,10 @@ def report_together(runs: Sequence[Named], output: Path, missing: Sequence[str] 
             f"the recipes count a mass as carried at different rates (eval.success.capacity_rate): {rates}"
         )
     write_report(pd.concat(trials, ignore_index=True), output, float(rates.pop()), labels)
-    write_table(trainings_table(_groups(runs), missing), output / "tables")
+    write_table(trainings_table(grouped(runs), missing), output / "tables")
 
 
-def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> Table:
+def trainings_table(groups: Sequence[Group], missing: Sequence[str] = ()) -> Table:
     """Length and seed of each training behind a comparison, a row for each run; `missing`: recipes that belong to the
     comparison and have not run."""
     import pandas as pd
@@ -253,7 +239,7 @@ def trainings_table(groups: "Sequence[Group]", missing: Sequence[str] = ()) -> T
     return Table("trainings", caption, columns, rows, pd.DataFrame(numbers))
 
 
-def _steps_of(run: "Run", stage: str) -> int | None:
+def _steps_of(run: Run, stage: str) -> int | None:
     """Environment steps of a stage that trains; None where the run has no such stage."""
     if stage not in run.recipe.get("stages", ()):
         return None
@@ -279,16 +265,16 @@ def film_together(store: Store, console: Console, words: Sequence[str], output: 
     return film
 
 
-def _film(store: Store, console: Console, tried: Sequence[Named], path: Path, quiet: bool = False) -> None:
+def _film(store: Store, console: Console, tried: Sequence[Run], path: Path, quiet: bool = False) -> None:
     """Play one trial that all share again, with the policies that were evaluated, and film it side by side: the first
     training of each recipe, or all of them where there is one recipe."""
     from iowbc.evaluation.side_by_side import common_trial, film_side_by_side
 
-    first = [group.runs[0].label for group in _groups(tried)]
+    first = [group.runs[0].label for group in grouped(tried)]
     chosen = [
         (run.artifacts["eval"], table)
         for run, table in zip(tried, _told_apart(tried, TRIALS)[0], strict=True)
-        if len(first) == 1 or run.word in first
+        if len(first) == 1 or run.label in first
     ]
     with filming(console, None if quiet else path) as progress:
         actors = [evaluated_actor(store, artifact, table) for artifact, table in chosen]

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 from rich.console import Console
 
-from iowbc.commands.lookup import Named, named
+from iowbc.commands.lookup import named
 from iowbc.commands.printed import hanging, print_json, tell
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
@@ -20,6 +20,7 @@ from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
+from iowbc.report.runs import Run
 
 ABSENT = "(absent)"
 """In place of a value that one of the two has not."""
@@ -27,7 +28,7 @@ ABSENT = "(absent)"
 
 def diff(store: Store, console: Console, first: str, second: str, as_json: bool = False) -> None:
     """Print the differences. Each of the two is whatever `show` takes, or a recipe file that has not run."""
-    lines = difference_lines(_either(store, first), _either(store, second))
+    lines = list(difference_lines(_either(store, first), _either(store, second)))
     if as_json:
         print_json(console, {"first": first, "second": second, "differences": lines})
         return
@@ -35,23 +36,19 @@ def diff(store: Store, console: Console, first: str, second: str, as_json: bool 
         tell(console, hanging(line, console.width, 0) if console.is_terminal else line)
 
 
-def difference_lines(a: Named, b: Named) -> list[str]:
-    """Differences of two recipes or artifacts, a line each, those of a stage together; empty where there are none."""
-    return list(_differences(a, b))
-
-
-def _differences(a: Named, b: Named) -> Iterator[str]:
+def difference_lines(a: Run, b: Run) -> Iterator[str]:
+    """Differences of two recipes or artifacts, a line each, those of a stage together."""
     yield from _changes("", _today(a.recipe), _today(b.recipe))
     for stage in dict.fromkeys([*a.artifacts, *b.artifacts]):
         old, new = a.artifacts.get(stage), b.artifacts.get(stage)
         if old is None or new is None:
-            yield f"{stage}: only in {b.word if old is None else a.word}"
+            yield f"{stage}: only in {b.label if old is None else a.label}"
         else:
-            for text in _of_artifacts(old, new, with_recipe=a.recipe is None or b.recipe is None):
+            for text in _of_artifacts(old, new, with_recipe=not (a.recipe and b.recipe)):
                 yield f"{stage}: {text}"
 
 
-def _either(store: Store, word: str) -> Named:
+def _either(store: Store, word: str) -> Run:
     """A recipe file counts as it is now, and so does one by its name that has not run; its artifacts are those that it
     used last."""
     file = recipe_file(word)
@@ -61,16 +58,16 @@ def _either(store: Store, word: str) -> Named:
     except UsageError:
         if not there:
             raise
-        found, as_file = Named(word, {}), True
+        found, as_file = Run(word, {}), True
     return replace(found, recipe=load_recipe(file).recipe.model_dump(mode="json")) if as_file else found
 
 
-def _today(recipe: Mapping[str, Any] | None) -> Mapping[str, Any]:
+def _today(recipe: Mapping[str, Any]) -> Mapping[str, Any]:
     """A resolved recipe with the defaults of fields that came after it was written; as it is where that fails."""
     try:
-        return {} if recipe is None else Recipe.model_validate(recipe).model_dump(mode="json")
+        return recipe and Recipe.model_validate(recipe).model_dump(mode="json")
     except ValidationError:
-        return recipe or {}
+        return recipe
 
 
 def _of_artifacts(old: Artifact, new: Artifact, with_recipe: bool) -> Iterator[str]:

@@ -13,7 +13,6 @@ from rich.text import Text
 
 from iowbc.commands.lookup import known_recipes, last_used, named
 from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json, shown_path, tell
-from iowbc.commands.results import metrics_text
 from iowbc.errors import require_known, shown
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
@@ -114,6 +113,8 @@ def list_artifacts(store: Store, console: Console, stage: str | None, as_json: b
     artifacts = store.artifacts(stage)
     for artifact in artifacts:
         manifest = artifact.manifest
+        metrics = [f"{name} {figure(value)}" for name, value in artifact.metrics.items()]
+        text = ", ".join([*metrics[:METRICS_SHOWN], *(["..."] if len(metrics) > METRICS_SHOWN else [])])
         table.add_row(
             manifest.stage,
             manifest.key[:KEY_LENGTH],
@@ -121,7 +122,7 @@ def list_artifacts(store: Store, console: Console, stage: str | None, as_json: b
             ago(manifest.made),
             duration(manifest.seconds),
             size(artifact.size),
-            *([Text(metrics_text(artifact, METRICS_SHOWN))] if wide else []),
+            *([Text(text)] if wide else []),
         )
     if artifacts:
         console.print(table)
@@ -136,9 +137,9 @@ def show(store: Store, console: Console, word: str, as_json: bool = False) -> No
         artifacts = [
             artifact_data(artifact) | {"ingredients": artifact.ingredients} for artifact in found.artifacts.values()
         ]
-        print_json(console, artifacts if found.recipe is None else {"recipe": found.recipe, "stages": artifacts})
+        print_json(console, {"recipe": found.recipe, "stages": artifacts} if found.recipe else artifacts)
         return
-    if found.recipe is not None:
+    if found.recipe:
         for stage, artifact in found.artifacts.items():
             manifest = artifact.manifest
             took = f"made {ago(manifest.made)}, took {duration(manifest.seconds)}"

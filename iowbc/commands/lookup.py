@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import PIPELINE, Recipe
 from iowbc.recipe.sweep import Sweep
+from iowbc.report.runs import Run
 from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
@@ -36,25 +37,7 @@ PLAYED = "teacher"
 CHECKPOINT = Path("scratch", "training.checkpoint")
 
 
-@dataclass(frozen=True)
-class Named:
-    """Meaning of a word of the command line."""
-
-    word: str
-    artifacts: Mapping[str, Artifact]
-    """By stage: all that a recipe used last, or the one artifact that was named."""
-    recipe: Mapping[str, Any] | None = None
-    """The resolved recipe, where the word names a recipe."""
-    shipped: Mapping[str, Artifact] = field(default_factory=dict)
-    """By stage: what came with the repository under the recipe's name, where it has used nothing else yet."""
-
-    @property
-    def usable(self) -> dict[str, Artifact]:
-        """By stage: all that there is to play or to take along."""
-        return {**self.shipped, **self.artifacts}
-
-
-def named(store: Store, word: str) -> Named:
+def named(store: Store, word: str) -> Run:
     """The meaning of a recipe's name or file, `RECIPE/STAGE`, or the first characters of a key. Raises `UsageError`."""
     recipes = finished_recipes(store)
     if word in recipes or Path(word).suffix in SUFFIXES:
@@ -65,15 +48,15 @@ def named(store: Store, word: str) -> Named:
         if stage not in found:
             stages = ", ".join(found) or "none"
             raise UsageError(f"{word}: recipe {name} has no finished stage '{stage}'; finished: {stages}")
-        return Named(word, {stage: found[stage]})
+        return Run(word, {stage: found[stage]})
     artifact = _by_key(store, word)
-    return Named(word, {artifact.manifest.stage: artifact})
+    return Run(word, {artifact.manifest.stage: artifact})
 
 
 def open_artifact(word: str, runs: Path | str = "runs") -> Artifact:
     """From Python: the artifact that `RECIPE/STAGE` or the first characters of a key name. Raises `UsageError`."""
     found = named(Store(Runs(Path(runs))), word)
-    if found.recipe is not None:
+    if found.recipe:
         stages = ", ".join(f"{word}/{stage}" for stage in found.usable)
         raise UsageError(f"'{word}' is a recipe; name one of its artifacts: {stages or 'none is stored'}")
     (artifact,) = found.artifacts.values()
@@ -103,16 +86,16 @@ def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     return {stage: artifact for stage, artifact in found.items() if artifact is not None}
 
 
-def _recipe(store: Store, word: str, name: str, recipes: Sequence[str]) -> Named:
+def _recipe(store: Store, word: str, name: str, recipes: Sequence[str]) -> Run:
     if name not in recipes:
         listing = ", ".join(recipes) or "none"
         raise UsageError(f"recipe {word} has no finished stage in {store.runs.root}; those that have: {listing}")
     shipped = _published(store).get(name, {})
     if name not in known_recipes(store):
-        return Named(word, shipped, list(shipped.values())[-1].recipe)
+        return Run(word, shipped, list(shipped.values())[-1].recipe)
     used = last_used(store, name)
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
-    return Named(word, used, recall(store.runs, name)["recipe"], others)
+    return Run(word, used, recall(store.runs, name)["recipe"], others)
 
 
 def _name_in(word: str) -> str:

@@ -106,20 +106,21 @@ def in_all(found: Planned, what: str = "points") -> str:
     cached = sum(stage.step.cached for stage in stages)
     if not made:
         return f"{len(found)} {what}: all stages are cached"
-    head = f"{len(found)} {what}: {len(made)} stages would run, {shared} are shared, {cached} cached"
-    rest = sum(step.guess is None for step in made)
-    if rest == len(made):
-        return f"{head}; how long that takes is not known"
-    return f"{head}; {time_of(made)} one after another{f', and {rest} of unknown length' if rest else ''}"
+    counts = f"{len(made)} stages would run, {shared} are shared, {cached} cached"
+    return f"{len(found)} {what}: {counts}; {_time_of(made, ' one after another')}"
 
 
-def time_of(steps: Sequence[StagePlan]) -> str:
-    """The time that stages take together, as far as it is known: a range, or a guess where one of them has no more."""
+def _time_of(steps: Sequence[StagePlan], manner: str = "") -> str:
+    """The time that stages take together: a range, a guess where one of them has no more, and how many have neither."""
     known = [step for step in steps if step.guess is not None]
-    if any(step.expected is None for step in known):
-        return f"a guess: {duration(sum(step.guess or 0.0 for step in known))}"
+    if not known:
+        return "how long that takes is not known"
     low, high = (duration(sum((step.expected or 0.0) * step.spread[end] for step in known)) for end in (0, 1))
-    return f"{low} to {high}" if low != high else f"about {low}"
+    text = f"{low} to {high}" if low != high else f"about {low}"
+    if any(step.expected is None for step in known):
+        text = f"a guess: {duration(sum(step.guess or 0.0 for step in known))}"
+    unknown = f", and {len(steps) - len(known)} of unknown length" if len(known) < len(steps) else ""
+    return f"{text}{manner}{unknown}"
 
 
 def plan_table(found: Planned, what: str) -> Table:
@@ -152,22 +153,14 @@ def _print(steps: Sequence[StagePlan], console: Console) -> None:
             console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
-    rest = sum(step.guess is None for step in missing)
-    if not missing:
-        text = "all stages are cached"
-    elif rest == len(missing):
-        text = f"{count}; how long that takes is not known"
-    else:
-        unknown = f", and {rest} stage{'s' if rest != 1 else ''} of unknown length" if rest else ""
-        text = f"{count}: {time_of(missing)}{unknown}"
-    console.print(text, highlight=False)
+    console.print(f"{count}; {_time_of(missing)}" if missing else "all stages are cached", highlight=False)
 
 
 def _described(step: StagePlan) -> Text:
     if step.cached:
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if step.published else "cached", "cyan"), (key, "dim"))
-    takes = "" if step.guess is None else f", {time_of([step])}"
+    takes = "" if step.guess is None else f", {_time_of([step])}"
     if step.expected is None and step.roughly is not None:
         takes += f" at the rate of {step.rate_of}"
     return Text.assemble(("run", "bold yellow"), takes)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
+from iowbc.commands.process import NOT_BEGUN, STAGE_FAILED, RunEnding
 from iowbc.pipeline.console.board import Board, last_line
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.processes import die_with_parent
@@ -27,8 +27,8 @@ PATIENCE = 10.0
 """Seconds that an aborted run has to end by itself."""
 LOG_WIDTH = 160
 """Characters in a line of a table in a log."""
-Endings = dict[str, RunEnding | None]
-"""Ending of each run by name; None for a run that never began."""
+Endings = dict[str, RunEnding]
+"""Ending of each run by name."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def run_points(
     One that fails does not stop the others. Once `stop` is asked for, all that run are asked to stop after a
     checkpoint, and none begins. Raises `KeyboardInterrupt` when asked twice, after all have ended.
     """
-    endings: Endings = {task.name: None for task in tasks}
+    endings: Endings = {task.name: RunEnding(NOT_BEGUN) for task in tasks}
     waiting, running = deque(tasks), dict[PointRun, PointThread | PointProcess]()
     asked = False
     try:
@@ -73,9 +73,8 @@ def run_points(
                 if (ending := one.ending()) is not None:
                     del running[task]
                     endings[task.name] = ending
-                    failed = ending.code not in (DONE, INTERRUPTED)
-                    state = "failed" if failed else "done" if ending.code == DONE else "stopped"
-                    board.ended(task.name, state, f"{ending.failure}; log {task.log}" if failed else "")
+                    note = f"{ending.failure}; log {task.log}" if ending.state == "failed" else ""
+                    board.ended(task.name, ending.state, note)
             board.refresh()
     except KeyboardInterrupt:
         for one in running.values():

@@ -1,15 +1,14 @@
 """Output of commands: plain lines, tables, paths, the progress of a film, and JSON for other programs."""
 
-import json
-import math
 import os
 import textwrap
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import to_json
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -51,7 +50,7 @@ def shown_path(path: Path) -> str:
 
 def print_json(console: Console, data: Any) -> None:
     """Print data as JSON; what is no number is null."""
-    tell(console, json.dumps(_finite(data), indent=2, ensure_ascii=False))
+    tell(console, to_json(data, indent=2, inf_nan_mode="null").decode("utf-8"))
 
 
 @contextmanager
@@ -99,11 +98,3 @@ def artifact_data(artifact: Artifact) -> dict[str, Any]:
         "versions": manifest.versions,
         "metrics": artifact.metrics,
     }
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, Mapping):
-        return {str(name): _finite(value) for name, value in data.items()}
-    if isinstance(data, (list, tuple)):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 DONE, STAGE_FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
+NOT_BEGUN = 256
+"""In place of the exit code, 0 to 255 or a signal below 0, of a run that never began."""
 IMPORTS = "importlib._bootstrap"
 """Module whose code is on the stack while a module is being read."""
 GONE = (errno.EIO, errno.EPIPE, *FULL)
@@ -31,11 +33,16 @@ STANDARD_OUTPUT = 1
 
 @dataclass(frozen=True)
 class RunEnding:
-    """Exit code of one run."""
+    """The end of one run."""
 
     code: int
     failure: str = ""
     """The stage that failed and the reason, in a line; empty where none did."""
+
+    @property
+    def state(self) -> str:
+        """`done`, `stopped`, `waits`, or `failed`."""
+        return {DONE: "done", INTERRUPTED: "stopped", NOT_BEGUN: "waits"}.get(self.code, "failed")
 
 
 def close_on_termination() -> None:

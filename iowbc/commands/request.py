@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,19 +37,14 @@ class Request:
 
     def command(self, forced: Sequence[str]) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
-        asked = self.options
-        options = [
-            *(("--set", override) for override in self.overrides),
-            ("--until", asked.until),
-            *(("--force", stage) for stage in sorted(forced)),
-            ("--workers", asked.workers),
-            ("--engine", asked.engine),
-            ("--address", asked.address),
-            ("--on-code-change", asked.on_code_change if asked.on_code_change != "report" else None),
-            ("--runs", self.runs.root if self.runs.root != Path("runs") else None),
-        ]
         words = ["iowbc", self.verb, self.word, *self.further]
-        return shlex.join([*words, *(str(part) for pair in options if pair[1] for part in pair)])
+        words += [word for override in self.overrides for word in ("--set", override)]
+        for one in fields(Options):
+            value = getattr(replace(self.options, force=frozenset(forced)), one.name)
+            values = sorted(value) if isinstance(value, frozenset) else [] if value == one.default else [value]
+            words += [word for each in values for word in (f"--{one.name.replace('_', '-')}", str(each))]
+        words += [] if self.runs.root == Path("runs") else ["--runs", str(self.runs.root)]
+        return shlex.join(words)
 
 
 def recipes(request: Request) -> tuple[LoadedRecipe, ...]:

@@ -121,13 +121,6 @@ def _rank(path: Path) -> tuple[int, str]:
     return TABLES.index(path.stem) if path.stem in TABLES else len(TABLES), path.name
 
 
-def metrics_text(artifact: Artifact, limit: int | None = None) -> str:
-    """The metrics of an artifact in one line, or the first few."""
-    items = list(artifact.metrics.items())
-    text = ", ".join(f"{name} {figure(value)}" for name, value in items[:limit])
-    return text + (", ..." if limit is not None and len(items) > limit else "")
-
-
 def tables_of(artifact: Artifact) -> list[Table]:
     """The tables that an artifact holds; an evaluation that has them as text alone is read again."""
     found, file = read_tables(artifact.folder / "tables"), artifact.folder / TRIALS

@@ -1,6 +1,7 @@
 """`iowbc report EXPORT --log MCAP`: the log of a robot, replayed and drawn."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -11,6 +12,9 @@ from iowbc.commands.robot import require_bus
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError
+
+if TYPE_CHECKING:
+    from iowbc.onboard.errors_of_run import Run
 
 
 def report_log(console: Console, what: str, log: Path, output: Path) -> None:
@@ -24,7 +28,6 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     from iowbc.onboard.errors_of_run import UNITS, read_run
     from iowbc.onboard.log import read_messages
     from iowbc.onboard.replay import replay
-    from iowbc.report.robot_log import draw
 
     folder = exported_folder(what)
     controller = Controller.load(folder)
@@ -40,5 +43,32 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     for name, values in run.deviations().items():
         table.add_row(name, f"{np.mean(values):.3f}", f"{np.quantile(values, 0.95):.3f}", UNITS[name])
     console.print(table)
-    draw(run, output)
+    _draw(run, output)
     tell(console, f"{shown_path(output)}: command and robot over time")
+
+
+def _draw(run: "Run", path: Path) -> None:
+    """Write the figure as PNG: what was commanded, and what the robot did."""
+    from matplotlib.figure import Figure
+
+    from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+    from iowbc.results.picture import COLOURS, write_figure
+
+    period = np.diff(run.time, prepend=run.time[0])
+    turned = run.heading[0] + np.cumsum(run.command[:, YAW_RATE] * period)
+    rows = (
+        ("forward velocity [m/s]", run.command[:, 0], run.velocity[:, 0]),
+        ("sideways velocity [m/s]", run.command[:, 1], run.velocity[:, 1]),
+        ("heading [rad]", turned, run.heading),
+        ("pelvis height [m]", run.command[:, HEIGHT], run.height),
+        ("torso pitch [rad]", run.command[:, PITCH], run.pitch),
+    )
+    figure = Figure(figsize=(9.0, 10.0), layout="constrained")
+    axes = figure.subplots(len(rows), 1, sharex=True)
+    for ax, (name, wanted, done) in zip(axes, rows, strict=True):
+        ax.plot(run.time, done, color=COLOURS[0], linewidth=1.0, label="robot")
+        ax.plot(run.time, wanted, color=COLOURS[1], linewidth=1.0, linestyle="--", label="command")
+        ax.set_ylabel(name)
+    axes[0].legend(loc="upper right")
+    axes[-1].set_xlabel("time [s]")
+    write_figure(figure, path)

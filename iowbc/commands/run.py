@@ -1,7 +1,7 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -91,16 +91,13 @@ def _report_of(folder: Path) -> str:
     return "\n".join([main_tables([folder]), *(path.read_text(encoding="utf-8") for path in others)])
 
 
-@contextmanager
-def engine(options: Options, execution: Execution) -> "Iterator[Cluster | None]":
-    """The cluster that was asked for, to the end of the block; None where stages run here. Raises `UsageError`."""
+def engine(options: Options, execution: Execution) -> "AbstractContextManager[Cluster | None]":
+    """The cluster that was asked for, to the end of a block; None where stages run here. Raises `UsageError`."""
     if (options.engine or execution.engine) == "local":
-        yield None
-        return
+        return nullcontext()
     from iowbc.pipeline.cluster.cluster import connected
 
-    with connected(options.address or execution.address, copy=execution.copy_files) as cluster:
-        yield cluster
+    return connected(options.address or execution.address, copy=execution.copy_files)
 
 
 def run_recipe(

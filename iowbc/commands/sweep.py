@@ -35,7 +35,6 @@ LOGS = "logs"
 """Folder of a sweep with what each point prints."""
 MANY = 100
 """Number of points from which it is printed before planning, which takes a while."""
-STATES = {DONE: "done", INTERRUPTED: "stopped", None: "waits"}
 
 
 @dataclass(frozen=True)
@@ -195,10 +194,8 @@ def _task(
 
 
 def _code(endings: Endings) -> int:
-    codes = {None if ending is None else ending.code for ending in endings.values()}
-    if codes & {INTERRUPTED, None}:
-        return INTERRUPTED
-    return DONE if codes <= {DONE} else STAGE_FAILED
+    states = {ending.state for ending in endings.values()}
+    return INTERRUPTED if states & {"stopped", "waits"} else STAGE_FAILED if "failed" in states else DONE
 
 
 def _conclude(
@@ -212,11 +209,10 @@ def _conclude(
 ) -> None:
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
 
-    codes = {name: None if ending is None else ending.code for name, ending in endings.items()}
-    finished = {name: named(Store(runs), name) for name, code in codes.items() if code == DONE}
+    states = {name: ending.state for name, ending in endings.items()}
+    finished = {name: named(Store(runs), name) for name, state in states.items() if state == "done"}
     if not finished:
         return
-    states = {name: STATES.get(code, "failed") for name, code in codes.items()}
     made = outcomes(found, finished)
     results = table(found, made)
     paths = write_results(found, made, finished, states, folder)
@@ -235,8 +231,7 @@ def _conclude(
 def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -> None:
     """Say on standard error what failed, and how to go on."""
     said = Console(stderr=True, soft_wrap=True)
-    ended = {name: ending for name, ending in endings.items() if ending is not None}
-    failed = {name: one.failure for name, one in ended.items() if one.code not in (DONE, INTERRUPTED)}
+    failed = {name: ending.failure for name, ending in endings.items() if ending.state == "failed"}
     if failed:
         said.print(f"{len(failed)} of {len(endings)} points failed:", highlight=False)
     for name, failure in failed.items():

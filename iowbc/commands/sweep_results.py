@@ -1,19 +1,19 @@
 """Results of a sweep: a table and a figure over its settings, seeds together, and every point's metrics."""
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from iowbc.commands.lookup import Named
 from iowbc.commands.results import headline
 from iowbc.evaluation.report.statistics import mean_half_width
 from iowbc.recipe.recipe import PIPELINE, SEEDS
 from iowbc.recipe.sweep import Point, Sweep, written
 from iowbc.report.parallel import Line, parallel_coordinates
+from iowbc.report.runs import Run
 from iowbc.results.picture import write_figure
 from iowbc.results.table import Table, heads, markdown, measured
 
@@ -33,7 +33,7 @@ class Outcomes:
     lines: tuple[Line, ...]
 
 
-def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
+def outcomes(sweep: Sweep, found: Mapping[str, Run]) -> Outcomes:
     """The outcomes of the points; `found`: the finished ones by name."""
     settings = tuple(path for path in sweep.axes if path not in SEEDS)
     points = [point for point in sweep.points if point.name in found]
@@ -59,13 +59,13 @@ def outcomes(sweep: Sweep, found: Mapping[str, Named]) -> Outcomes:
     return Outcomes(settings, metrics, tuple(lines))
 
 
-def _metric(run: Named, name: str) -> float:
+def _metric(run: Run, name: str) -> float:
     """The `stage metric` of a run; NaN where it has none."""
     stage, _, metric = name.partition(" ")
     return run.artifacts[stage].metrics.get(metric, math.nan) if stage in run.artifacts else math.nan
 
 
-def _chosen(runs: Sequence[Named]) -> tuple[str, ...]:
+def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
     """The telling metrics in which points differ, of the last stages first; of one that is the same for all, those of
     the last stage."""
     by_stage = {
@@ -85,7 +85,7 @@ def _chosen(runs: Sequence[Named]) -> tuple[str, ...]:
 
 
 def write_results(
-    sweep: Sweep, made: Outcomes, found: Mapping[str, Named], states: Mapping[str, str], folder: Path
+    sweep: Sweep, made: Outcomes, found: Mapping[str, Run], states: Mapping[str, str], folder: Path
 ) -> list[Path]:
     """Write table, figure and points; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -115,14 +115,11 @@ def table(sweep: Sweep, made: Outcomes) -> Table:
     return Table(sweep.name, caption, heads(*settings, "seeds", *made.metrics), rows, grouped=False)
 
 
-def _write_points(sweep: Sweep, found: Mapping[str, Named], states: Mapping[str, str], path: Path) -> None:
+def _write_points(sweep: Sweep, found: Mapping[str, Run], states: Mapping[str, str], path: Path) -> None:
     rows = []
     for point in sweep.points:
         row: dict[str, object] = {"point": point.name, "state": states.get(point.name, "waits"), **point.settings}
         for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
             row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
         rows.append(row)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
-        writer.writeheader()
-        writer.writerows(rows)
+    pd.DataFrame(rows).to_csv(path, index=False)

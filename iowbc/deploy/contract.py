@@ -16,8 +16,7 @@ from iowbc.control.feasible_map import FEASIBLE
 from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
-from iowbc.recipe.section import Section
-from iowbc.recipe.sentences import sentences
+from iowbc.recipe.section import Section, sentences
 from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References

@@ -15,10 +15,10 @@ from iowbc.deploy.session import Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import Measure, trial_metrics
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
-from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.rollout import Acting, play_episodes, play_in
 from iowbc.evaluation.trials.table import carried_along, measure_of, met
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
@@ -102,29 +102,21 @@ def try_out(
 
     Returns the driver, which holds the difference of targets, and how the trials went.
     """
-    with closing(_environment(world)) as environment:
-        policy = ExportedPolicy(Controller.load(exported, robots=environment.num_envs), environment)
-        return policy, _played(world, environment, policy, interrupted)
+    episodes = acceptance_episodes(world.recipe)
+    with closing(VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)) as environment:
+        policy = ExportedPolicy(Controller.load(exported, robots=len(episodes)), environment)
+        return policy, _each_judged(world, episodes, play_in(environment, policy, interrupted))
 
 
 def try_out_network(world: Specification, policy: Acting, interrupted: Callable[[], bool]) -> list[Accepted]:
     """Let the policy that was exported play the same trials, as it was trained. Raises Interrupted when interrupted."""
-    with closing(_environment(world)) as environment:
-        return _played(world, environment, policy, interrupted)
-
-
-def _environment(world: Specification) -> VectorEnv:
-    """An environment in this process that plays the trials."""
     episodes = acceptance_episodes(world.recipe)
-    return VectorEnv(world, num_envs=len(episodes), workers=0, seed=0, episodes=episodes)
+    return _each_judged(world, episodes, play_episodes(world, episodes, policy, workers=0, interrupted=interrupted))
 
 
-def _played(
-    world: Specification, environment: VectorEnv, policy: Acting, interrupted: Callable[[], bool]
-) -> list[Accepted]:
+def _each_judged(world: Specification, episodes: list[Episode], outcomes: list[Outcome]) -> list[Accepted]:
     """The result of each `export.acceptance`."""
-    outcomes = play_in(environment, policy, interrupted)
-    trials = iter(zip(acceptance_episodes(world.recipe), outcomes, strict=True))
+    trials = iter(zip(episodes, outcomes, strict=True))
     measure = measure_of(world.recipe, load_robot(world.robot))
     asked = world.recipe.export.acceptance
     return [judged(world.recipe, measure, one, list(itertools.islice(trials, one.trials))) for one in asked]

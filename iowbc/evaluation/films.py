@@ -12,10 +12,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from iowbc.errors import NoRenderer
 from iowbc.evaluation.trials.batch_policy import in_batch
-from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.table import replayed
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.task.specification import Specification
@@ -29,6 +31,8 @@ LINES_PER_FRAME = 26
 """Height of the text: this many lines would fill the frame."""
 UNSEEN = ("robustness", "pushes", "impedance", "map")
 """Kinds of trials that look like others, and are not filmed."""
+SMALL = Video(width=480, height=368, fps=10)
+"""Of films while training: 10 s take some 15 s to draw without a graphics card, and 0.4 MB."""
 NOT_WORD = str.maketrans({" ": "_", "/": "_"})
 
 
@@ -79,34 +83,39 @@ def command_line(signals: dict[str, Any], seconds: float) -> str:
     return f"{seconds:4.1f} s   {walk}   H {height:.2f} m, pitch {pitch:+.2f} rad"
 
 
-class EpisodeFilm:
-    """Frames of the first environment of an in-process vector environment; give `look` to `play_in`, and `close` it."""
+def film_episode(
+    environment: VectorEnv,
+    policy: Acting,
+    add: Callable[[Frame], None],
+    video: Video,
+    title: str,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> tuple[Outcome, int]:
+    """Play the first episode of an in-process environment and give its frames to `add`; its outcome, and their number.
 
-    def __init__(
-        self, environment: VectorEnv, add: Callable[[Frame], None], video: Video, title: Sequence[str]
-    ) -> None:
-        """`add` receives each frame; `title`: lines of text in every frame, above the line with time and command."""
-        self.environment, self.add, self.video, self.title = environment, add, video, list(title)
-        self._renderer: SceneRenderer | None = None
-        self.frames = 0
+    `title`: text in every frame, above the line with time and command; `progress` receives the time reached [s]. Raises
+    Interrupted when interrupted, NoRenderer where nothing can be drawn.
+    """
+    renderer: SceneRenderer | None = None
+    frames = 0
 
-    def look(self, seconds: float) -> None:
-        """Draw a frame if one is due at this time [s]. Raises NoRenderer where nothing can be drawn."""
-        if seconds > self.video.duration or seconds * self.video.fps < self.frames - 1e-6:
+    def look(seconds: float) -> None:
+        nonlocal renderer, frames
+        if seconds > video.duration or seconds * video.fps < frames - 1e-6:
             return
-        simulation = self.environment.batch.simulation
-        if self._renderer is None:
-            self._renderer = SceneRenderer(simulation, 0, width=self.video.width, height=self.video.height)
-        frame = self._renderer.frame()
-        if self.video.traces:
-            frame = with_text(frame, [*self.title, command_line(self.environment.signals, seconds)])
-        self.add(frame)
-        self.frames += 1
+        if renderer is None:
+            renderer = SceneRenderer(environment.batch.simulation, 0, width=video.width, height=video.height)
+        frame = renderer.frame()
+        add(with_text(frame, [title, command_line(environment.signals, seconds)]) if video.traces else frame)
+        frames += 1
 
-    def close(self) -> None:
-        """Frees the renderer."""
-        if self._renderer is not None:
-            self._renderer.close()
+    try:
+        outcome = play_in(environment, policy, interrupted, progress, look)[0]
+    finally:
+        if renderer is not None:
+            renderer.close()
+    return outcome, frames
 
 
 def film_trial(
@@ -117,15 +126,41 @@ def film_trial(
     video: Video,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
-) -> Outcome:
-    """Play the trial in a row of `trials.parquet` again and give its frames to `add`; `progress` receives the time
-    reached [s].
+) -> None:
+    """Play the trial in a row of `trials.parquet` again and give its frames to `add`; see `film_episode`."""
+    title = f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"
+    with closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment:
+        film_episode(environment, in_batch(policy, row), add, video, title, interrupted, progress)
 
-    Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
-    """
-    title = [f"{row['variant']}: {row['case']}, {row['mass']:g} kg, trial {row['trial']}"]
-    with (
-        closing(VectorEnv(world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))) as environment,
-        closing(EpisodeFilm(environment, add, video, title)) as film,
-    ):
-        return play_in(environment, in_batch(policy, row), interrupted, progress, film.look)[0]
+
+class TrainingFilms:
+    """Films of a policy while it trains: the same trial, each time a further part of the training is done. An existing
+    one is not made again."""
+
+    def __init__(self, world: Specification, trial: Trial, folder: Path, parts: int) -> None:
+        """`parts`: into which a training is divided; a film is due after each."""
+        self.world, self.trial, self.folder, self.parts = world, trial, folder, parts
+
+    def due(self, steps: int, planned: int) -> Path | None:
+        """The newest film that is due after so many of the planned steps, if it is missing."""
+        part = min(steps, planned) * self.parts // planned
+        if not part:
+            return None
+        path = self.folder / f"{part * planned // self.parts:010}_steps.mp4"
+        return None if path.exists() else path
+
+    def make(self, path: Path, policy: Acting, say: Callable[[str], None]) -> bool:
+        """Plays the trial and films it; where nothing can be drawn it says so once, and none is due any more."""
+        title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
+        episodes = (self.trial.episode,)
+        try:
+            with (
+                closing(VectorEnv(self.world, num_envs=1, workers=0, seed=0, episodes=episodes)) as environment,
+                written_film(path, SMALL.fps) as add,
+            ):
+                film_episode(environment, policy, add, SMALL, title)
+        except NoRenderer as reason:
+            say(f"no films: {reason}")
+            self.parts = 0
+            return False
+        return True

@@ -13,12 +13,12 @@ from iowbc.deploy import contract, exported_folder
 from iowbc.deploy.controller import Controller
 from iowbc.errors import Interrupted, NoDisplay, require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
-from iowbc.evaluation.films import EpisodeFilm, written_film
+from iowbc.evaluation.films import film_episode, written_film
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, sequence_for
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import load_policy, unfinished_policy
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
@@ -93,18 +93,18 @@ def play(
         if request.video is None:
             return PlayedEpisode(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
-        title = [f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"]
-        with (
-            written_film(request.video, settings.fps) as add,
-            closing(EpisodeFilm(environment, add, settings, title)) as film,
-        ):
-
-            def look(seconds: float) -> None:
-                film.look(seconds)
-                progress(seconds, episode.duration)
-
-            outcome = play_in(environment, policy, interrupted, look=look)[0]
-        return PlayedEpisode(outcome, episode.duration, film.frames)
+        title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
+        with written_film(request.video, settings.fps) as add:
+            outcome, frames = film_episode(
+                environment,
+                policy,
+                add,
+                settings,
+                title,
+                interrupted,
+                lambda seconds: progress(seconds, episode.duration),
+            )
+        return PlayedEpisode(outcome, episode.duration, frames)
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:

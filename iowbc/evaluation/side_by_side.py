@@ -48,13 +48,12 @@ def film_side_by_side(
     actors: Sequence[Actor],
     rows: Sequence["pd.Series[Any]"],
     path: Path,
-    interrupted: Callable[[], bool] = lambda: False,
-    progress: Callable[[float, float], None] = lambda seconds, duration: None,
+    progress: Callable[[float, float], None],
 ) -> None:
     """Play the trial in each actor's row again, and film them as tiles; who falls stays as he lay.
 
-    progress: receives the time of all trials that was played, and how long they may last together [s].
-    Raises Interrupted when interrupted, NoRenderer where nothing can be drawn.
+    progress: receives the time of all trials that was played, and how long they may last together [s]. Raises
+    NoRenderer where nothing can be drawn.
     """
     video = actors[0].world.recipe.eval.video
     with TemporaryDirectory() as place:
@@ -70,7 +69,7 @@ def film_side_by_side(
             def further(seconds: float, before: float = before) -> None:
                 progress(before + seconds, duration)
 
-            film_trial(actor.world, actor.policy, row, keep, video, interrupted, further)
+            film_trial(actor.world, actor.policy, row, keep, video, progress=further)
             before += float(row["duration"])
             progress(before, duration)
         clips = [sorted(folder.glob("*.png")) for folder in folders]

@@ -12,14 +12,14 @@ OnCodeChange = Literal["report", "rerun"]
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a run."""
+    """Options of a run, each under its name on the command line, where it takes a value."""
 
     until: str | None = None
     force: frozenset[str] = frozenset()
-    on_code_change: OnCodeChange = "report"
     workers: int | None = None
     engine: Literal["local", "ray"] | None = None
     address: str | None = None
+    on_code_change: OnCodeChange = "report"
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """On-policy distillation of the teacher into the student (paper eq. 7)."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Width
 
@@ -61,8 +62,6 @@ class Distillation(Encoder):
     checkpoint_every: int = Field(default=50, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Rounds between two checkpoints."""
 
-    @model_validator(mode="after")
-    def _batch_fits(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.batch > self.buffer:
-            raise ValueError(f"batch ({self.batch}) is larger than buffer ({self.buffer})")
-        return self
+            yield "", f"batch ({self.batch}) is larger than buffer ({self.buffer})"

@@ -1,8 +1,8 @@
 """The ONNX graph, its checks, and the trial that accepts the exported controller."""
 
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.section import COSMETIC, LATER, Section
@@ -34,11 +34,9 @@ class Acceptance(Section):
     minimum: int = Field(default=1, ge=0)
     """Trials that must be survived with the object carried and transported, or the stage fails; 0 only reports."""
 
-    @model_validator(mode="after")
-    def _reachable(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.minimum > self.trials:
-            raise ValueError(f"minimum {self.minimum} exceeds the {self.trials} trials")
-        return self
+            yield "", f"minimum {self.minimum} exceeds the {self.trials} trials"
 
 
 class Export(Section):

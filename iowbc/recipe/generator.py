@@ -1,29 +1,13 @@
 """The reference generator: its dataset and its network."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from iowbc.recipe.section import DEEPEST, LATER, Section, Width
+from iowbc.recipe.section import DEEPEST, LATER, Interval, NonNegative, Positive, Section, Width
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
-
-
-class Interval(Section):
-    """A closed range of values."""
-
-    low: float
-    """Smallest value."""
-    high: float
-    """Largest value."""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.low > self.high:
-            raise ValueError(f"low ({self.low}) is above high ({self.high})")
-        return self
 
 
 class WristRegion(Section):
@@ -65,11 +49,9 @@ class Sampling(Section):
     mirrored_share: Share = 0.05
     """Share of the samples that repeat another one mirrored left to right: they measure the labels' symmetry."""
 
-    @model_validator(mode="after")
-    def _shares(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.heading_share + self.torso_share > 1.0:
-            raise ValueError("heading_share and torso_share together pass 1")
-        return self
+            yield "", "heading_share and torso_share together pass 1"
 
 
 class PostureProblem(Section):

@@ -1,8 +1,9 @@
 """The whole recipe: one experiment, from the reference generator to the exported policy."""
 
-from typing import Literal, Self, get_args
+from collections.abc import Iterator
+from typing import Any, Literal, Self, get_args
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from iowbc.recipe.distillation import Distillation
 from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -10,7 +11,7 @@ from iowbc.recipe.execution import Execution
 from iowbc.recipe.export import Export
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.scene_names import misnamed
-from iowbc.recipe.section import Section, Unfitting
+from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
@@ -67,32 +68,18 @@ class Recipe(Section):
         observation = self.task.observation.model_copy(update={"own": {}})
         return self.model_copy(update={"task": self.task.model_copy(update={"observation": observation})})
 
-    @model_validator(mode="after")
-    def _students_units_in_pairs(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         student = self.distill
         unpaired = [units for units in (student.latent, *student.hidden) if units % 2]
         if self.teacher.symmetry == "construction" and unpaired:
-            raise ValueError(
-                f"distill: with teacher.symmetry 'construction' the mirror swaps units of latent and hidden in pairs; "
-                f"{unpaired[0]} is odd, give an even number"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _whole_physics_steps(self) -> Self:
+            text = "with teacher.symmetry 'construction' the mirror swaps units of latent and hidden in pairs"
+            yield "", f"distill: {text}; {unpaired[0]} is odd, give an even number"
         period, step = 1.0 / self.task.control_frequency, self.simulation.physics.timestep
         steps = round(period / step)
         if steps < 1 or abs(steps * step - period) > 1e-9:
             text = f"{step:g} s does not divide a control period of {period:g} s; take {period / max(1, steps):.6g} s"
-            raise Unfitting([("simulation.physics.timestep", text)])
-        return self
-
-    @model_validator(mode="after")
-    def _scenes_are_known(self) -> Self:
-        problems = list(misnamed(self.simulation, self.task, self.teacher, self.eval, self.export, self.skill))
-        if problems:
-            raise Unfitting(problems)
-        return self
+            yield "simulation.physics.timestep", text
+        yield from misnamed(self)
 
     @field_validator("stages")
     @classmethod
@@ -101,3 +88,17 @@ class Recipe(Section):
         if repeated:
             raise ValueError(f"names {', '.join(repeated)} more than once")
         return tuple(sorted(stages, key=PIPELINE.index))
+
+
+def recipe_schema() -> dict[str, Any]:
+    """JSON Schema of a recipe file: the recipe's fields with their sentences, and `extends`.
+
+    No key is required, for a section may hold any part of its keys; `iowbc plan` names what an entry of a list lacks.
+    """
+    schema = Recipe.model_json_schema()
+    for definition in (schema, *schema["$defs"].values()):
+        definition.pop("required", None)
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    extends = {"type": "string", "description": "Recipe file, relative to this one, that this one changes."}
+    schema["properties"] = {"extends": extends, **schema["properties"]}
+    return schema

@@ -1,23 +1,22 @@
 """Names of scenes in a recipe: each exists, and a recipe's own scenes have all that they need."""
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from iowbc.errors import nearest
-from iowbc.recipe.evaluation.evaluation import Evaluation, TrialScene
-from iowbc.recipe.export import Export
+from iowbc.recipe.evaluation.evaluation import TrialScene
 from iowbc.recipe.section import Section
 from iowbc.recipe.simulation.holding import WITH_OBJECT
 from iowbc.recipe.simulation.scene import Scenes
-from iowbc.recipe.simulation.simulation import SimulationSettings
-from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
-from iowbc.recipe.teacher import Teacher
+
+if TYPE_CHECKING:
+    from iowbc.recipe.recipe import Recipe
 
 
-def misnamed(
-    simulation: SimulationSettings, task: Task, teacher: Teacher, evaluation: Evaluation, export: Export, skill: Skill
-) -> Iterator[tuple[str, str]]:
+def misnamed(recipe: "Recipe") -> Iterator[tuple[str, str]]:
     """Dotted paths, and the problem there."""
+    simulation, task, evaluation = recipe.simulation, recipe.task, recipe.eval
     worlds = {"simulation.scenes": simulation.scenes}
     if evaluation.simulation is not None:
         worlds["eval.simulation.scenes"] = evaluation.simulation.scenes
@@ -29,8 +28,8 @@ def misnamed(
     for path, scenes in worlds.items():
         for name in scenes.own:
             yield from _incomplete(f"{path}.{name}", name, scenes, task)
-    others = ((f"teacher.check.others.{name}", name) for name in teacher.check.others)
-    for place, name in (*others, *_object_scenes(export, "export"), *_object_scenes(skill, "skill")):
+    others = ((f"teacher.check.others.{name}", name) for name in recipe.teacher.check.others)
+    for place, name in (*others, *_object_scenes(recipe.export, "export"), *_object_scenes(recipe.skill, "skill")):
         yield from _without_object(place, name, "simulation.scenes", simulation.scenes)
     path, scenes = list(worlds.items())[-1]
     if evaluation.scenes:

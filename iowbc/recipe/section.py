@@ -1,8 +1,12 @@
 """The base of every recipe section, and which of its values decide results."""
 
+import ast
+import functools
+import inspect
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
@@ -17,8 +21,6 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
-
-from iowbc.recipe.sentences import sentences
 
 COSMETIC: dict[str, Any] = {"cosmetic": True}
 """Extra of a field that changes how a stage is carried out or shown, and none of its results."""
@@ -46,6 +48,8 @@ Ascending = Annotated[tuple[PositiveFloat, ...], AfterValidator(_ascending), Fie
 """Positive values that ascend without repetition."""
 Masses = Annotated[tuple[Annotated[float, Field(ge=0)], ...], AfterValidator(_ascending)]
 """Masses [kg] that ascend without repetition."""
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
 Width = Annotated[int, Field(gt=0, le=16_384)]
 """Units of a hidden layer."""
 ArtifactName = Annotated[str, Field(pattern=r"^([0-9a-f]{8,64}|.+\.ya?ml)$", max_length=300)]
@@ -68,6 +72,16 @@ class Section(BaseModel):
         """True where an entry of a mapping does nothing, so that it might as well not be there."""
         return False
 
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """Values that do not fit each other: dotted path from here, empty for the section itself, and what is wrong."""
+        return iter(())
+
+    @model_validator(mode="after")
+    def _values_fit_each_other(self) -> Self:
+        if found := tuple(self.problems()):
+            raise Unfitting(found)
+        return self
+
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Each field is described by the sentence below it."""
@@ -77,6 +91,19 @@ class Section(BaseModel):
             if name in fields:
                 fields[name]["description"] = sentence
         return schema
+
+
+class Interval(Section):
+    """A closed range of values."""
+
+    low: float
+    """Smallest value."""
+    high: float
+    """Largest value."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        if self.low > self.high:
+            yield "", f"low ({self.low}) is above high ({self.high})"
 
 
 class NamedEntries(Section):
@@ -102,14 +129,12 @@ class NamedEntries(Section):
         """Annotation of the entries that a recipe adds."""
         return get_args(cls.__annotations__["__pydantic_extra__"])[1]
 
-    @model_validator(mode="after")
-    def _names_can_be_used(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         for name in self.own:
             if not re.fullmatch(OWN_NAME, name):
-                raise ValueError(f"{name!r} is no name: one begins with a letter and has up to 32 of a-z, 0-9 and _")
+                yield "", f"{name!r} is no name: one begins with a letter and has up to 32 of a-z, 0-9 and _"
             if hasattr(type(self), name):
-                raise ValueError(f"{name!r} is a word that sections have a use of their own for; take another")
-        return self
+                yield "", f"{name!r} is a word that sections have a use of their own for; take another"
 
 
 class Encoder(Section):
@@ -124,13 +149,33 @@ class Encoder(Section):
     """Size of what the encoder makes of the whole history; even, where the mirror swaps its halves."""
 
 
-class Unfitting(ValueError):
-    """Sections of a recipe that do not fit each other: pairs of the dotted path of a value, from the section that
-    raises it, and what is wrong there."""
+@functools.cache
+def sentences(section: type[BaseModel]) -> dict[str, str]:
+    """The string below each field of a section and its bases, by the field's name.
 
-    def __init__(self, problems: Sequence[tuple[str, str]]) -> None:
-        self.problems = tuple(problems)
-        super().__init__("; ".join(f"{path}: {text}" for path, text in problems))
+    For those who ask: pydantic's `use_attribute_docstrings` reads every section's source whenever a command starts.
+    """
+    bases = [base for base in section.__bases__ if issubclass(base, BaseModel) and base is not BaseModel]
+    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
+    assert isinstance(definition, ast.ClassDef)
+    own = {
+        field.target.id: inspect.cleandoc(text.value.value)
+        for field, text in itertools.pairwise(definition.body)
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }
+    return {name: sentence for base in bases for name, sentence in sentences(base).items()} | own
+
+
+class Unfitting(ValueError):
+    """Values of a section that do not fit each other; see `Section.problems`."""
+
+    def __init__(self, problems: tuple[tuple[str, str], ...]) -> None:
+        self.problems = problems
+        super().__init__("; ".join(f"{path}: {text}" if path else text for path, text in problems))
 
 
 def deciding(section: Section) -> dict[str, Any]:

@@ -6,12 +6,12 @@ import json
 import math
 import random
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import Field, JsonValue, ValidationError, model_validator
+from pydantic import Field, JsonValue, ValidationError
 
 from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document, read_value
@@ -19,7 +19,7 @@ from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.reading.validation import descend
 from iowbc.recipe.recipe import NAME
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import Interval, Section
 
 DIGITS = 4
 """Significant digits of a drawn value: it can be read and typed again, and no result hangs on the fifth."""
@@ -29,27 +29,21 @@ MOST_POINTS = 1_000
 """Points of a sweep at most, unless more are asked for: planning one takes some 10 ms and 200 kB."""
 
 
-class Drawn(Section):
+class Drawn(Interval):
     """A number drawn at random: x ~ U(low, high), or log x ~ U(log low, log high)."""
 
-    low: float
-    """Lower limit."""
-    high: float
-    """Upper limit."""
     scale: Literal["linear", "log"] = "linear"
     """`log` draws each order of magnitude alike often: for rates and weights whose size is not known."""
     whole: bool = False
     """Rounds it to an integer."""
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.high <= self.low:
-            raise ValueError(f"high {self.high} is not greater than low {self.low}")
+            yield "", f"high {self.high} is not greater than low {self.low}"
         if not math.isfinite(self.high - self.low):
-            raise ValueError(f"{self.low} to {self.high} is too wide to draw from")
+            yield "", f"{self.low} to {self.high} is too wide to draw from"
         if self.scale == "log" and self.low <= 0:
-            raise ValueError(f"low {self.low}: a logarithmic scale begins above 0")
-        return self
+            yield "", f"low {self.low}: a logarithmic scale begins above 0"
 
     def value(self, part: float) -> int | float:
         """The number for a part of the way from low to high, 0 to 1."""

@@ -1,8 +1,9 @@
 """PPO with privileged information (paper section III-C, Table I)."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.ppo import PPO
@@ -188,46 +189,28 @@ class Teacher(PPO):
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
-    @model_validator(mode="after")
-    def _deviations_descend(self) -> "Teacher":
+    def problems(self) -> Iterator[tuple[str, str]]:
         if not self.std_floor < self.std_end <= self.initial_std:
             stds = f"{self.std_floor:g}, {self.std_end:g}, {self.initial_std:g}"
-            raise ValueError(f"std_floor, std_end and initial_std must ascend, got {stds}")
+            yield "", f"std_floor, std_end and initial_std must ascend, got {stds}"
         if self.restart is not None and self.restart.std < self.std_end:
-            raise ValueError(f"restart.std {self.restart.std:g} is below std_end {self.std_end:g}: nothing comes back")
-        return self
-
-    @model_validator(mode="after")
-    def _history_without_augmentation(self) -> "Teacher":
+            yield "", f"restart.std {self.restart.std:g} is below std_end {self.std_end:g}: nothing comes back"
         if self.history is not None and self.symmetry == "augment":
-            raise ValueError("symmetry: with `history` it is `construction` or `none`, not `augment`")
-        return self
+            yield "", "symmetry: with `history` it is `construction` or `none`, not `augment`"
+        if self.start is not None and self.history is not None and self.history.student is not None:
+            yield "", "history.student: `start` names a policy to begin from, too; give one of them"
+        latent = () if self.history is None else (self.history.latent,)
+        unpaired = [units for units in (*latent, *self.hidden) if units % 2]
+        if self.symmetry == "construction" and unpaired:
+            yield "", f"the mirror swaps units of a layer in pairs; {unpaired[0]} is odd, give an even number"
+        samples = self.environments * self.rollout
+        if samples > LARGEST_UPDATE:
+            yield "", f"environments x rollout = {samples}: an update takes {LARGEST_UPDATE} samples at most"
+        elif samples % self.minibatches:
+            yield "", f"minibatches: {self.minibatches} does not divide environments x rollout = {samples}"
 
     @property
     def beginning(self) -> tuple[str, str | None]:
         """Dotted path of the value that names the policy to begin from, and that value."""
         student = None if self.history is None else self.history.student
         return ("teacher.start", self.start) if student is None else ("teacher.history.student", student)
-
-    @model_validator(mode="after")
-    def _one_start(self) -> "Teacher":
-        if self.start is not None and self.history is not None and self.history.student is not None:
-            raise ValueError("history.student: `start` names a policy to begin from, too; give one of them")
-        return self
-
-    @model_validator(mode="after")
-    def _units_in_pairs(self) -> "Teacher":
-        latent = () if self.history is None else (self.history.latent,)
-        unpaired = [units for units in (*latent, *self.hidden) if units % 2]
-        if self.symmetry == "construction" and unpaired:
-            raise ValueError(f"the mirror swaps units of a layer in pairs; {unpaired[0]} is odd, give an even number")
-        return self
-
-    @model_validator(mode="after")
-    def _minibatches_divide(self) -> "Teacher":
-        samples = self.environments * self.rollout
-        if samples > LARGEST_UPDATE:
-            raise ValueError(f"environments x rollout = {samples}: an update takes {LARGEST_UPDATE} samples at most")
-        if samples % self.minibatches:
-            raise ValueError(f"minibatches: {self.minibatches} does not divide environments x rollout = {samples}")
-        return self

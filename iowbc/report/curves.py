@@ -1,7 +1,7 @@
 """Learning curves over steps and errors over masses, which a page draws with plotly and a picture with matplotlib."""
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -163,12 +163,12 @@ def _columns(folder: Path) -> dict[str, Values]:
     return {name: np.asarray(table[name], np.float64) for name in table.select_dtypes("number") if "step" in table}
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a table of numbers and names, without cells that have no name; none where it is not there."""
+def _rows(path: Path) -> pd.DataFrame:
+    """The rows of a table as texts, cells beyond the last head under ""; none where it is not there."""
     if not path.is_file():
-        return []
+        return pd.DataFrame()
     with path.open(newline="", encoding="utf-8", errors="replace") as file:
-        return [{name: cell or "" for name, cell in row.items() if name} for row in csv.DictReader(file)]
+        return pd.DataFrame(csv.DictReader(file, restkey=""))
 
 
 def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, Values]]]:
@@ -177,11 +177,11 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
     An error is no less than 0, nor is its interval; a mean over one trial has none, its ends are NaN.
     """
     rows = _rows(folder / "tables" / "summary.csv")
-    masses = _numbers(rows, "mass")
-    rows = [rows[place] for place in np.argsort(masses, kind="stable") if np.isfinite(masses[place])]
+    if not {"suite", "case", "mass"} <= {*rows}:
+        return {}
+    rows = rows.assign(mass=_numbers(rows, "mass")).dropna(subset="mass").sort_values("mass", kind="stable")
     found = {}
-    for suite in dict.fromkeys(row.get("suite", "") for row in rows):
-        own = [row for row in rows if row.get("suite") == row.get("case") == suite]
+    for suite, own in rows[rows["suite"] == rows["case"]].groupby("suite", sort=False):
         mass = _numbers(own, "mass")
         if len(set(mass)) < SWEPT:
             continue
@@ -192,10 +192,9 @@ def _suites(folder: Path) -> dict[str, dict[str, tuple[Values, Values, Values, V
     return found
 
 
-def _numbers(rows: Sequence[Mapping[str, str]], name: str) -> Values:
-    """A column; NaN where a cell holds no number."""
-    numbers = pd.to_numeric(pd.Series([row.get(name) for row in rows]), errors="coerce")
-    return np.asarray(numbers, np.float64)
+def _numbers(rows: pd.DataFrame, name: str) -> Values:
+    """A column; NaN where a cell holds no number, or there is no such column."""
+    return np.asarray(pd.to_numeric(rows.get(name, pd.Series(np.nan, rows.index)), errors="coerce"), np.float64)
 
 
 def _thinned(across: Values, values: Values, most_points: int) -> tuple[Values, Values]:

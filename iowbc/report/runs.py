@@ -1,7 +1,7 @@
 """Runs side by side: those that differ in their seed alone belong together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,20 @@ NAMING = ("name", "description", "execution")
 
 @dataclass(frozen=True)
 class Run:
-    """The artifacts of a recipe, under the name by which the user called it."""
+    """The artifacts of a recipe, or a single one, under the word by which the user called it."""
 
     label: str
     artifacts: Mapping[str, Artifact]
-    """By stage."""
-    recipe: Mapping[str, Any]
-    """Resolved."""
+    """By stage: all that a recipe used last, or the one artifact that was named."""
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+    """Resolved; empty for a single artifact."""
+    shipped: Mapping[str, Artifact] = field(default_factory=dict)
+    """By stage: what came with the repository under the recipe's name, where it has used nothing else yet."""
+
+    @property
+    def usable(self) -> dict[str, Artifact]:
+        """By stage: all that there is to play or to take along."""
+        return {**self.shipped, **self.artifacts}
 
 
 @dataclass(frozen=True)

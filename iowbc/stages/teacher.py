@@ -14,7 +14,7 @@ from iowbc.stages.inputs import generator_stage, not_privileged
 from iowbc.stages.training import STATE, leave_extendable, rolls_elsewhere, train
 
 if TYPE_CHECKING:
-    from iowbc.evaluation.training_films import TrainingFilms
+    from iowbc.evaluation.films import TrainingFilms
     from iowbc.evaluation.trials.quick import QuickEvaluation
     from iowbc.learning.teacher import TeacherTraining
     from iowbc.task.specification import Specification
@@ -153,7 +153,7 @@ def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
     parts = job.recipe.teacher.check.films
     if not parts:
         return None
-    from iowbc.evaluation.training_films import TrainingFilms
+    from iowbc.evaluation.films import TrainingFilms
 
     return TrainingFilms(check.world, check.middle, job.work / VIDEOS, parts)
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 from made_up_trials import trials_of
 
 from iowbc.commands.compare import report_together
-from iowbc.commands.lookup import Named, film_of, points_of, record_comparison
+from iowbc.commands.lookup import film_of, points_of, record_comparison
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.report.runs import Run, grouped
@@ -82,7 +82,7 @@ def test_a_second_training_shares_the_reference_generator(folder: Path, command:
     assert "teacher.seed (again.yaml:2:11): (absent) -> 7" in planned
 
 
-def evaluated(folder: Path, name: str, label: str, error: float, seed: int | None, steps: int) -> Named:
+def evaluated(folder: Path, name: str, label: str, error: float, seed: int | None, steps: int) -> Run:
     """A run whose trials have these errors."""
     artifact = SimpleNamespace(
         folder=folder / name, recipe={"eval": {"success": {"capacity_rate": 0.8}}}, metrics={}, ingredients={}
@@ -91,7 +91,7 @@ def evaluated(folder: Path, name: str, label: str, error: float, seed: int | Non
     trials_of(label, "lifting", {0.0: 5, 4.0: 5}, error=error).to_parquet(artifact.folder / "trials.parquet")
     teacher = {"steps": steps} if seed is None else {"steps": steps, "seed": seed}
     recipe = {"name": name, "seed": 3, "stages": ["teacher", "eval"], "teacher": teacher, "eval": {"label": label}}
-    return Named(name, {"eval": artifact}, recipe)
+    return Run(name, {"eval": artifact}, recipe)
 
 
 def test_trainings_that_differ_in_their_seeds_alone_are_one_variant(tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_trainings_whose_recipes_different_versions_wrote_down_are_told_by_what_
         decided = {"recipe": {"seed": 3, "teacher": {"seed": seed, "gamma": gamma}}}
         cast(SimpleNamespace, run.artifacts["eval"]).ingredients = decided
     cast(dict[str, Any], other.recipe)["teacher"] = {"steps": 4096, "gamma": 0.9}
-    groups = grouped([Run(run.word, run.artifacts, run.recipe or {}) for run in (older, newer, other)])
+    groups = grouped([older, newer, other])
     assert [len(group.runs) for group in groups] == [2, 1]
 
 

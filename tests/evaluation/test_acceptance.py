@@ -7,7 +7,7 @@ import pytest
 from made_up_trials import MEASURE, script, trace
 
 from iowbc.evaluation.acceptance import Accepted, judged
-from iowbc.evaluation.trials.outcome import Outcome
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe

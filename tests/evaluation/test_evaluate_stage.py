@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from made_up_trials import COSTS
 from stage_jobs import Backwards, make_job
 
 from iowbc.errors import Interrupted
 from iowbc.evaluation.paper import LIFTING
-from iowbc.evaluation.report.aggregate import COSTS
 from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.plan import planned_sweeps

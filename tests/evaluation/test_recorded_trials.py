@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, Trial, command_script
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.evaluation.trials.table import measure_of, trial_row
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.partner import BEHAVIOURS

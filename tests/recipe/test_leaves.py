@@ -7,11 +7,10 @@ from typing import Any
 import jsonschema
 import pytest
 
-from iowbc.commands.schema import recipe_schema
 from iowbc.recipe.reading.document import located, plain
 from iowbc.recipe.reading.overrides import overridden
 from iowbc.recipe.reading.validation import validate
-from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.recipe import Recipe, recipe_schema
 
 USUAL = Recipe(name="usual")
 

@@ -10,12 +10,11 @@ import jsonschema
 import pytest
 import yaml
 
-from iowbc.commands.schema import recipe_schema
 from iowbc.errors import RecipeError
 from iowbc.pipeline.nested import nested
 from iowbc.recipe.reading.document import as_yaml
 from iowbc.recipe.reading.loading import load_recipe
-from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.recipe import Recipe, recipe_schema
 from iowbc.recipe.section import deciding
 
 BARREL: dict[str, Any] = {

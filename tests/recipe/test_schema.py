@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from iowbc.commands.schema import recipe_schema
+from iowbc.recipe.recipe import recipe_schema
 
 
 def fields(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

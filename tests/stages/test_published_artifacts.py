@@ -17,7 +17,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.evaluation.report.aggregate import aggregate
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.report.runs import Run, grouped
+from iowbc.report.runs import grouped
 
 ROOT = Path(__file__).parents[2]
 
@@ -65,7 +65,7 @@ def test_a_fresh_clone_makes_the_published_figures_from_the_published_trials(fol
 def test_the_published_trainings_that_differ_in_their_seed_are_one_variant(tmp_path: Path) -> None:
     (tmp_path / "published").symlink_to(ROOT / "runs" / "published")
     found = [named(Store(Runs(tmp_path)), name) for name in ("full", "full_seed_1", "blind")]
-    groups = grouped([Run(one.word, one.artifacts, one.recipe or {}) for one in found])
+    groups = grouped(found)
     assert [group.seeds for group in groups] == [("0", "1"), ("0",)]
 
 

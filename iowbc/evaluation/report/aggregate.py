@@ -14,22 +14,14 @@ PARTS = ("", "_moving", "_clamped")
 ALL_ERRORS = tuple(f"{name}{part}" for part in PARTS for name in ERRORS)
 STILL = tuple(f"still_{name}{part}" for part in ("", "_moving") for name in ERRORS)
 """The errors of a robot that stands still, from the script alone."""
-COSTS = (
-    *("E_v_raw", "E_v_raw_moving", "E_v_partner", "distance", "saturation", "saturation_peak", "slip_share"),
-    *("partner_force_peak", "grip_force_peak", "link_object_force", "energy"),
-    *("foot_slip", "foot_slip_peak", "foot_slip_per_metre", "foot_drift", "foot_drift_per_metre"),
-    *("swing_clearance_left", "swing_clearance_right", "hand_weight_share", "partner_weight_share", "weight_in_hands"),
-    *("torso_jerk", "object_jerk", "touchdown_speed", "touchdown_speed_peak", "foot_force_peak"),
-    *("pressure_margin", "pressure_margin_low", "friction_use", "friction_use_high", "action_second_difference"),
-    *("push_force", "push_force_share", "impedance_real", "impedance_imag"),
-)
-"""Other columns averaged over the surviving trials."""
-WAYS = ("transport_robot", "transport_object")
-FORCES = (
-    *("hand_force_mean", "hand_force_p95", "hand_force_peak"),
+OVER_ALL_TRIALS = (
+    *("transport_robot", "transport_object", "hand_force_mean", "hand_force_p95", "hand_force_peak"),
     *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
 )
-"""Columns averaged over all trials, up to their end: who falls has pulled before."""
+"""Metrics averaged over all trials, up to their end: who falls has pulled before. All others are averaged over the
+surviving trials."""
+RAW = ("E_v_raw", "E_v_raw_moving")
+"""E_v without the mean over a gait period; trials of an early version lack it."""
 SETTINGS = (
     *("commanded_distance", "partner_share", "rolling_resistance", "pull_frequency", "pull_direction"),
     *("height", "gait_period"),
@@ -37,8 +29,6 @@ SETTINGS = (
 """Columns that are the same for all trials of a row."""
 TORQUE = "torque_rms"
 """Root mean square of a joint's torque as a part of its limit: the worst joint's, and of each after a slash."""
-JOINT_COSTS = ("peak_torque/", "saturated/", f"{TORQUE}/")
-"""Beginnings of columns with a value a joint, averaged over the surviving trials."""
 TRAINING = "training_seed"
 """Column that tells the trainings of one variant apart; where it is absent, there is one."""
 WORLD = "trial"
@@ -52,15 +42,18 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
 
     Columns: `trainings`, whose trials count alike; `trials`, `survived`, `succeeded`, `carried` (trials with an object
     in the hands whose weight they carried) of `held`, `kept` (trials that did not lose what they push) of `pushed`;
-    `rate` of success with its Wilson interval `rate_low`, `rate_high`; each error's mean over the surviving trials and
-    `<error>_half`, half its 95 % interval; `norm`, the norm of the four means; `torque_rms` of the worst joint by the
-    means of all, and its name `torque_rms_joint`. Intervals take `WORLD` as clusters. NaN where no trial survived (or
-    one alone, for the half widths): "Fails" in the tables; and in columns that trials of an earlier version lack.
+    `rate` of success with its Wilson interval `rate_low`, `rate_high`; every metric's mean over the surviving trials,
+    or, see `OVER_ALL_TRIALS`, all; of an error `<error>_half`, half its 95 % interval; `norm`, the norm of the four
+    errors; `torque_rms` of the worst joint by the means of all, and its name `torque_rms_joint`. Intervals take `WORLD`
+    as clusters. NaN where no trial survived (or one alone, for the half widths): "Fails" in the tables. Metrics that
+    trials of an earlier version lack are missing here, too.
     """
-    missing = [name for name in (*COSTS, *FORCES, *SETTINGS) if name not in trials]
+    missing = [name for name in (*RAW, *OVER_ALL_TRIALS, *SETTINGS) if name not in trials]
     trials = with_trainings(trials).assign(**dict.fromkeys(missing, np.nan))
-    rows = [_row(dict(zip(GROUP, key, strict=True)), group) for key, group in trials.groupby(GROUP, sort=False)]
-    table = pd.DataFrame(rows)
+    numbers = [name for name in trials.select_dtypes("float") if name not in (*GROUP, *SETTINGS)]
+    metrics = [name for name in numbers if not name.startswith("drawn_")]
+    groups = trials.groupby(GROUP, sort=False)
+    table = pd.DataFrame([_row(dict(zip(GROUP, key, strict=True)), group, metrics) for key, group in groups])
     ranks = {
         "variant": variants_of(trials),
         "suite": list(dict.fromkeys(trials["suite"])),
@@ -72,7 +65,7 @@ def aggregate(trials: pd.DataFrame) -> pd.DataFrame:
     ).reset_index(drop=True)
 
 
-def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
+def _row(key: dict[str, object], group: pd.DataFrame, metrics: list[str]) -> dict[str, Any]:
     survivors = group[group["survived"]]
     succeeded, held = int(group["succeeded"].sum()), group["weight_in_hands"].notna()
     pushed = group["object_beside"].notna() & ~held
@@ -91,19 +84,18 @@ def _row(key: dict[str, object], group: pd.DataFrame) -> dict[str, Any]:
         "rate": succeeded / len(group),
         "rate_low": low,
         "rate_high": high,
+        **survivors[metrics].mean().to_dict(),
+        **group[[*OVER_ALL_TRIALS, *STILL]].mean().to_dict(),
+        **group[[*SETTINGS]].iloc[0].to_dict(),
     }
     for name in ALL_ERRORS:
         known = survivors[[WORLD, name]].dropna()
         row[name] = float(known[name].mean())
         row[f"{name}_half"] = mean_half_width(known[name].to_numpy(np.float64), known[WORLD].to_numpy())
     row["norm"] = float(error_norm(np.array([row[name] for name in ERRORS])))
-    joints = [name for name in group.columns if name.startswith(JOINT_COSTS)]
-    row |= survivors[[*COSTS, *joints]].mean().to_dict()
-    by_joint = {name: row[name] for name in joints if name.startswith(TORQUE)}
+    by_joint = {name: row[name] for name in metrics if name.startswith(f"{TORQUE}/")}
     worst = max(by_joint, key=lambda name: by_joint[name], default="")
-    row |= {TORQUE: by_joint.get(worst, np.nan), f"{TORQUE}_joint": worst.removeprefix(f"{TORQUE}/")}
-    row |= group[[*WAYS, *FORCES, *STILL]].mean().to_dict() | group[[*SETTINGS]].iloc[0].to_dict()
-    return row
+    return row | {TORQUE: by_joint.get(worst, np.nan), f"{TORQUE}_joint": worst.removeprefix(f"{TORQUE}/")}
 
 
 def with_trainings(trials: pd.DataFrame) -> pd.DataFrame:

@@ -34,8 +34,10 @@ Capacities = dict[str, dict[str, Capacity]]
 
 
 def load_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
-    """The largest mass of each sweep [kg] up to which every mass of an object reached the success rate."""
-    return _capacities(summary[summary["kind"].isin(SWEPT) & (summary["case"] == summary["suite"])], "mass", rate)
+    """The largest mass of each sweep [kg] up to which every mass of an object reached the success rate, of all
+    variants."""
+    swept = summary[summary["kind"].isin(SWEPT) & (summary["case"] == summary["suite"])]
+    return {variant: {} for variant in variants_of(summary)} | _capacities(swept, "mass", rate)
 
 
 def push_capacities(summary: pd.DataFrame, rate: float) -> Capacities:
@@ -63,9 +65,8 @@ def capacity_table(summary: pd.DataFrame, rate: float) -> Table:
         "≥ where the heaviest tried did. In simulation."
     )
     still = (STANDS_STILL, *("none" if one else ABSENT for one in asked))
-    nothing: Capacities = {variant: {} for variant in variants_of(summary)}
-    found = nothing | load_capacities(summary, rate)
-    return _table("capacity", caption, found, {suite: suite.capitalize() for suite in suites}, "kg", [still])
+    columns = {suite: suite.capitalize() for suite in suites}
+    return _table("capacity", caption, load_capacities(summary, rate), columns, "kg", [still])
 
 
 def push_table(summary: pd.DataFrame, rate: float) -> Table:

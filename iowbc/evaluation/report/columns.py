@@ -85,6 +85,11 @@ def error_entry(name: str, part: str = "") -> Entry:
     return Entry(ERROR_HEADS[name], cell, lambda rows: still_error(rows, name, part))
 
 
+def mean_entry(head: str, name: str, form: str, scale: float = 1.0) -> Entry:
+    """Mean of a metric, times a factor; absent in trials of an earlier version without it."""
+    return Entry(Column(head), lambda row: measured(scale * row.get(name, np.nan), form=form))
+
+
 def asks_for_transport(rows: pd.DataFrame) -> bool:
     """True where any of these trials commands a way that has to be covered."""
     return bool((rows["commanded_distance"] >= SHORTEST_WAY).any()) and not (rows["kind"] == "stagnation").all()

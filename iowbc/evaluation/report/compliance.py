@@ -7,7 +7,16 @@ from matplotlib.figure import Figure
 
 from iowbc.evaluation.report.aggregate import variants_of
 from iowbc.evaluation.report.captions import partner, trainings
-from iowbc.evaluation.report.columns import SUCCESS, SURVIVED, Entry, by_case, still_error, variant_rows, variant_table
+from iowbc.evaluation.report.columns import (
+    SUCCESS,
+    SURVIVED,
+    Entry,
+    by_case,
+    mean_entry,
+    still_error,
+    variant_rows,
+    variant_table,
+)
 from iowbc.evaluation.report.figures import draw_bars, finish, line_labels, style_of, tidy
 from iowbc.evaluation.trials.impedance import apparent
 from iowbc.results.table import ABSENT, FAILS, Cell, Column, Table, measured
@@ -35,7 +44,7 @@ INTERACTION = (
     Entry(Column("Success"), SUCCESS.cell, lambda rows: "none"),
     _force("Handle force [N]", "handle_force"),
     _force("Hand force [N]", "hand_force"),
-    Entry(Column("Work on partner [J]"), lambda row: measured(row["partner_work"], form="+.1f")),
+    mean_entry("Work on partner [J]", "partner_work", "+.1f"),
     _velocity("E_v [m/s]", "E_v"),
     _velocity("E_v raw [m/s]", "E_v_raw"),
     _velocity("E_v partner [m/s]", "E_v_partner"),

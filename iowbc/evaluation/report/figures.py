@@ -84,9 +84,7 @@ def comparison(summary: pd.DataFrame, capacity_rate: float) -> Figure:
         )
         axes.set(title=f"error norm, {suite}", xlabel="mass [kg]", ylabel="norm of the four errors [SI units]")
     if sweeps:
-        nothing: Capacities = {variant: {} for variant in variants_of(summary)}
-        found = nothing | load_capacities(summary, capacity_rate)
-        _capacity_bars(panels[-2], found, sweeps)
+        _capacity_bars(panels[-2], load_capacities(summary, capacity_rate), sweeps)
         panels[-2].set(title=f"load capacity at {100 * capacity_rate:.0f} % success", ylabel="mass [kg]")
     _success_panel(panels[-1], _heaviest(summary), "success rate")
     walked = any(asks_for_steps(summary[summary["suite"] == suite]) for suite in sweeps)
@@ -161,10 +159,6 @@ def _row(panel: float, widths: Sequence[float], layout: Any) -> tuple[Figure, li
     """A figure of panels side by side, in widths of one panel [inch]."""
     figure = Figure(figsize=(max(panel * sum(widths), SMALLEST_WIDTH), 4.2), layout=layout)
     return figure, list(figure.subplots(1, len(widths), squeeze=False, width_ratios=widths).flat)
-
-
-def _norm(errors: Sequence[float]) -> float:
-    return float(error_norm(np.array(errors)))
 
 
 def _with_paper(rows: pd.DataFrame) -> bool:

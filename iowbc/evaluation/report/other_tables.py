@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.paper import TYRE_SUCCESS
-from iowbc.evaluation.report.aggregate import GROUP, TORQUE
+from iowbc.evaluation.report.aggregate import TORQUE
 from iowbc.evaluation.report.captions import conditions
-from iowbc.evaluation.report.columns import SURVIVED, Entry, by_case, variant_rows, variant_table
+from iowbc.evaluation.report.columns import SURVIVED, Entry, by_case, mean_entry, variant_rows, variant_table
 from iowbc.evaluation.report.error_tables import NO_LABELS
-from iowbc.results.table import ABSENT, Cell, Column, Table, heads, measured
+from iowbc.results.table import ABSENT, Cell, Column, Table, heads
 
 TYRE_MASS = 18.0
 PROBING = ("pushes", "impedance", "map")
@@ -59,32 +59,24 @@ def joint_table(summary: pd.DataFrame) -> Table:
     return Table("joints", caption, columns, rows, pd.DataFrame(numbers))
 
 
-def _mean(head: str, name: str, form: str, scale: float = 1.0) -> Entry:
-    return Entry(Column(head), lambda row: measured(scale * row[name], form=form))
-
-
 CONTACT = (
-    _mean("Touchdown [m/s]", "touchdown_speed", ".2f"),
-    _mean("Peak force [N]", "foot_force_peak", ".0f"),
-    _mean("Pressure margin [mm]", "pressure_margin", ".0f", 1e3),
-    _mean("Friction", "friction_use_high", ".2f"),
-    _mean("Action [mrad]", "action_second_difference", ".0f", 1e3),
+    mean_entry("Touchdown [m/s]", "touchdown_speed", ".2f"),
+    mean_entry("Peak force [N]", "foot_force_peak", ".0f"),
+    mean_entry("Pressure margin [mm]", "pressure_margin", ".0f", 1e3),
+    mean_entry("Friction", "friction_use_high", ".2f"),
+    mean_entry("Action [mrad]", "action_second_difference", ".0f", 1e3),
     Entry(
         Column("Torque, worst joint"),
         lambda row: f"{100 * row[TORQUE]:.0f} % ({row[f'{TORQUE}_joint']})" if np.isfinite(row[TORQUE]) else ABSENT,
     ),
 )
-CONTACT_NUMBERS = (
-    *("touchdown_speed", "touchdown_speed_peak", "foot_force_peak", "pressure_margin", "pressure_margin_low"),
-    *("friction_use", "friction_use_high", "action_second_difference"),
-)
-"""Numbers of the table's CSV, beside the torques."""
 
 
 def contact_table(summary: pd.DataFrame) -> Table:
     """Impacts on the ground, margins to tipping and slipping, smoothness of the action and effort of each variant, at
     the heaviest mass of each suite survived."""
-    rows = variant_rows(CONTACT, [(_load(row), row.to_frame().T) for _, row in heaviest(summary).iterrows()])
+    chosen = heaviest(summary)
+    rows = variant_rows(CONTACT, [(_load(row), row.to_frame().T) for _, row in chosen.iterrows()])
     caption = (
         "Contact with the ground and effort at the heaviest load survived: means over surviving trials. Touchdown: "
         "speed of the lowest corner of a sole before it touches. Peak force: of the ground on a foot, in any physics "
@@ -93,8 +85,7 @@ def contact_table(summary: pd.DataFrame) -> Table:
         "square of its second difference over a control period. Torque: root mean square as a part of the limit, of "
         "the joint with the most. In simulation."
     )
-    efforts = [name for name in summary.columns if name.startswith(TORQUE)]
-    return variant_table("contact", caption, "Load", CONTACT, rows, summary[[*GROUP, *CONTACT_NUMBERS, *efforts]])
+    return variant_table("contact", caption, "Load", CONTACT, rows, chosen)
 
 
 def heaviest(summary: pd.DataFrame) -> pd.DataFrame:

@@ -7,14 +7,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from iowbc.arrays import Array
 from iowbc.errors import Interrupted
-from iowbc.evaluation.trials.outcome import Outcome
-from iowbc.evaluation.trials.trace import Trace
+from iowbc.evaluation.trials.trace import Outcome, Trace
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
-
-Array = NDArray[np.float64]
 
 RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
 """Signals that a trace keeps."""

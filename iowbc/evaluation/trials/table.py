@@ -8,8 +8,8 @@ import pandas as pd
 
 from iowbc.arrays import Array
 from iowbc.evaluation.trials.metrics import Measure, Met, trial_metrics
-from iowbc.evaluation.trials.outcome import Outcome
 from iowbc.evaluation.trials.plan import Trial
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe

@@ -1,5 +1,6 @@
-"""The signals of one trial."""
+"""The outcome of one episode, and the signals of its course."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from iowbc.arrays import Array
@@ -69,3 +70,32 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.heading)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Signals and end of one episode."""
+
+    trace: Trace
+    seconds: float
+    """Time until it ended [s]."""
+    fallen: bool
+    dropped: bool
+    finished: bool
+    """True where it reached its time limit."""
+    drawn: Mapping[str, Array]
+    """Everything that was drawn for it, by name, each of shape (k,)."""
+
+    @property
+    def survived(self) -> bool:
+        """No fall, nothing dropped, for the whole episode."""
+        return self.finished and not (self.fallen or self.dropped)
+
+    @property
+    def ending(self) -> str:
+        """The kind of its end; "diverged" where the simulation broke off without a fall or a drop."""
+        if self.fallen:
+            return "fell"
+        if self.dropped:
+            return "dropped"
+        return "finished" if self.finished else "diverged"

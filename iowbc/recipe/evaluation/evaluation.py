@@ -1,8 +1,9 @@
 """Evaluation: the suites of trials, their world, and the films of them."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.evaluation.model_based import ModelBased
@@ -172,8 +173,7 @@ class Evaluation(Section):
     video: Video = Field(default=Video(), json_schema_extra=COSMETIC)
     """Short films of trials."""
 
-    @model_validator(mode="after")
-    def _cases_told_apart(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         suites = {
             "heavy": self.heavy,
             "stagnation": () if self.stagnation is None else self.stagnation.cases,
@@ -183,17 +183,10 @@ class Evaluation(Section):
             names = [case.name for case in cases]
             repeated = sorted({name for name in names if names.count(name) > 1})
             if repeated:
-                raise ValueError(f"{suite}: {', '.join(repeated)} is the name of more than one case; give each its own")
-        return self
-
-    @model_validator(mode="after")
-    def _something_to_do(self) -> Self:
+                yield "", f"{suite}: {', '.join(repeated)} is the name of more than one case; give each its own"
         if not (self.measured or self.probe):
-            raise ValueError(
-                "nothing to evaluate: give lifting, pushing, squeezing, heavy, stagnation, robustness, compliance, map "
-                "or probe, or leave eval out of the stages"
-            )
-        return self
+            valid = "lifting, pushing, squeezing, heavy, stagnation, robustness, compliance, map or probe"
+            yield "", f"nothing to evaluate: give {valid}, or leave eval out of the stages"
 
     @property
     def sweeps(self) -> dict[str, MassSweep]:

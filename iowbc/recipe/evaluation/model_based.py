@@ -4,10 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from iowbc.recipe.section import Section
+from iowbc.recipe.section import NonNegative, Positive, Section
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(gt=0, le=1)]
 
 

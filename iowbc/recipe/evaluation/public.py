@@ -1,8 +1,9 @@
 """A controller that others trained: its file, and the adapter that describes it."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.beside import ModuleFile
 from iowbc.recipe.section import COSMETIC, Section
@@ -29,8 +30,6 @@ class PublicController(Section):
     """Commanded yaw rate against each radian of heading error [1/s]: such a controller follows rates and drifts, where
     learnt policies of this project observe the error. Velocity tasks of Isaac Lab train with 0.5."""
 
-    @model_validator(mode="after")
-    def _module_where_it_is_read(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if (self.adapter == "own") != (self.module is not None):
-            raise ValueError("module: belongs to the adapter 'own', which needs it")
-        return self
+            yield "", "module: belongs to the adapter 'own', which needs it"

@@ -1,8 +1,9 @@
 """Commands of a trial: a stretch of a scripted sequence, and scripts that are drawn trial by trial."""
 
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import Range, Section
 
@@ -26,11 +27,9 @@ class Segment(Section):
     wrists: tuple[Offset, Offset, Offset, Offset, Offset, Offset] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Wrist offsets Δp, left then right, heading frame [m]."""
 
-    @model_validator(mode="after")
-    def _ramp_fits(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.ramp > self.duration:
-            raise ValueError(f"ramp {self.ramp} s is longer than the segment's duration {self.duration} s")
-        return self
+            yield "", f"ramp {self.ramp} s is longer than the segment's duration {self.duration} s"
 
 
 class DrawnScripts(Section):

@@ -1,9 +1,10 @@
 """Groups of trials: sweeps over mass, single cases, pushes that grow until the robot falls, a map of pushes, a probe of
 the history, and interaction with partners."""
 
-from typing import Annotated, Literal, Self, get_args
+from collections.abc import Iterator
+from typing import Annotated, Literal, get_args
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat
 
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON
@@ -66,14 +67,12 @@ class MassSweep(Section):
         given = {name: value for one in own for name, value in one if value is not None and name != "partner_share"}
         return self.model_copy(update={**given, "partner_shares": (share,), "with_share": ()})
 
-    @model_validator(mode="after")
-    def _shares_differ(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if len(set(self.partner_shares)) != len(self.partner_shares):
-            raise ValueError(f"partner_shares must differ, got {list(self.partner_shares)}")
+            yield "", f"partner_shares must differ, got {list(self.partner_shares)}"
         named = [one.partner_share for one in self.with_share]
         if len(set(named)) != len(named) or not set(named) <= set(self.partner_shares):
-            raise ValueError(f"with_share must name each of partner_shares once at most, got {named}")
-        return self
+            yield "", f"with_share must name each of partner_shares once at most, got {named}"
 
 
 class Case(Section):
@@ -232,11 +231,9 @@ class Probe(Section):
     interval: float = Field(default=0.5, gt=0)
     """Time between two readings [s]; as long as a history of 25 observations, so that no two share one."""
 
-    @model_validator(mode="after")
-    def _masses_ascend(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.masses[0] >= self.masses[1]:
-            raise ValueError(f"masses must be a lightest and a heavier one, got {list(self.masses)}")
-        return self
+            yield "", f"masses must be a lightest and a heavier one, got {list(self.masses)}"
 
 
 class Impedance(Section):
@@ -286,9 +283,7 @@ class Compliance(Section):
     impedance: Impedance | None = Impedance()
     """Sinusoidal pulls; empty leaves them out."""
 
-    @model_validator(mode="after")
-    def _behaviours_are_known(self) -> Self:
-        unknown = [name for name in self.behaviours if name not in BEHAVIOURS]
-        if unknown:
-            raise ValueError(f"no partner behaviour {unknown[0]!r}; valid: {', '.join(BEHAVIOURS)}")
-        return self
+    def problems(self) -> Iterator[tuple[str, str]]:
+        for name in self.behaviours:
+            if name not in BEHAVIOURS:
+                yield "", f"no partner behaviour {name!r}; valid: {', '.join(BEHAVIOURS)}"

@@ -21,29 +21,24 @@ def with_files(tree: Located, folder: Path) -> Located:
     `folder`: from where those are taken that are said on the command line. Raises `RecipeError`.
     """
     problems = []
-    for path, leaf in leaves(tree):
+
+    def taken_in(leaf: Located, path: tuple[str, ...] = ()) -> Located:
+        if isinstance(leaf.value, dict):
+            return Located({name: taken_in(entry, (*path, name)) for name, entry in leaf.value.items()}, leaf.place)
         kinds = [model for model in models_at(path) if issubclass(model, FileBeside)]
         if not kinds or not isinstance(leaf.value, str):
-            continue
+            return leaf
         below = folder if leaf.place.startswith("--set ") else Path(leaf.place.rsplit(":", 2)[0]).parent
-        file = below / leaf.value
         try:
-            taken = kinds[0].taken_in(file, leaf.value)
+            return located(kinds[0].taken_in(below / leaf.value, leaf.value).model_dump(mode="json"), leaf.place)
         except ValueError as error:
             problems.append(Problem(leaf.place, f"key '{'.'.join(path)}' = {shown(leaf.value)}: {error}"))
-            continue
-        tree = _replaced(tree, path, located(taken.model_dump(mode="json"), leaf.place))
+            return leaf
+
+    whole = taken_in(tree)
     if problems:
         raise RecipeError(problems)
-    return tree
-
-
-def _replaced(tree: Located, path: tuple[str, ...], value: Located) -> Located:
-    if not path:
-        return value
-    assert isinstance(tree.value, dict)
-    entries = {**tree.value, path[0]: _replaced(tree.value[path[0]], path[1:], value)}
-    return Located(entries, tree.place)
+    return whole
 
 
 LARGEST_FILE = 1_000_000

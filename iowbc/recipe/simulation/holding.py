@@ -1,10 +1,12 @@
 """Scenes, and quantities of an episode that a trial may hold at a value, by name: checked when a recipe is read."""
 
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from iowbc.recipe.simulation.partner import BEHAVIOURS, Leader, PartnerSettings, Stopping
+from iowbc.recipe.section import Section
+from iowbc.recipe.simulation.partner import BEHAVIOURS, OWN_DRAWS, PartnerSettings
 from iowbc.recipe.simulation.randomization import Distribution, Randomization
 from iowbc.recipe.simulation.scene import Scenes
 
@@ -18,19 +20,17 @@ and on a crate's rolling resistance (fifty times as much blocks it). One unless 
 off."""
 BY_AXIS = tuple(f"object_com_offset_{axis}" for axis in "xyz")
 """The parts of the offset of the object's centre of mass, in its own frame."""
+
+
+def _drawn(section: type[Section]) -> Iterator[str]:
+    """Names of the fields of a section that are drawn."""
+    return (name for name, field in section.model_fields.items() if field.annotation is Distribution)
+
+
 HOLDABLE = (
-    *(name for name, field in Randomization.model_fields.items() if field.annotation is Distribution),
-    *(
-        f"partner_{name}"
-        for name, field in PartnerSettings.model_fields.items()
-        if field.annotation is Distribution and name != "push_share"  # in a push it is drawn as the partner's share
-    ),
-    *(
-        f"{section}_{name}"
-        for section, kind in (("leader", Leader), ("stopping", Stopping))
-        for name, field in kind.model_fields.items()
-        if field.annotation is Distribution
-    ),
+    *_drawn(Randomization),
+    *(f"partner_{name}" for name in _drawn(PartnerSettings) if name != "push_share"),  # in a push it is the share
+    *(f"{section}_{name}" for section, kind in OWN_DRAWS.items() for name in _drawn(kind)),
     *SWITCHES,
     *BY_AXIS,
     "object_mass",

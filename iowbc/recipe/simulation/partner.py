@@ -1,8 +1,8 @@
 """The second carrier, at the object's far handle."""
 
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.randomization import Distribution
@@ -27,11 +27,9 @@ class Behaviours(Section):
     stopping: float = Field(default=0.0, ge=0.0)
     """Follows the commanded motion, stops or reverses suddenly, and resumes."""
 
-    @model_validator(mode="after")
-    def _one_is_possible(self) -> Self:
-        if self.path + self.follower + self.leader + self.stopping <= 0.0:
-            raise ValueError("every behaviour has the share 0: give at least one of them a positive share")
-        return self
+    def problems(self) -> Iterator[tuple[str, str]]:
+        if sum(share for _, share in self) <= 0.0:
+            yield "", "every behaviour has the share 0: give at least one of them a positive share"
 
 
 class Leader(Section):
@@ -60,6 +58,10 @@ class Stopping(Section):
     """Backward speed during the stop as a part of the commanded one; 0 stands still."""
     catching_up: float = Field(default=1.0, gt=0.0)
     """Time in which the partner comes back to the handle after the stop [s]; without, it would hold back for ever."""
+
+
+OWN_DRAWS: dict[str, type[Section]] = {"leader": Leader, "stopping": Stopping}
+"""Sections of `PartnerSettings` with quantities that are drawn for an episode."""
 
 
 class Tugging(Section):

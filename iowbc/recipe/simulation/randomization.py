@@ -1,19 +1,16 @@
 """Quantities that are drawn anew for each episode, and the disturbances within one; ranges of the paper's Table I."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from iowbc.recipe.section import LATER, Section, Unfitting
+from iowbc.recipe.section import LATER, Interval, Section
 
 
-class Distribution(Section):
+class Distribution(Interval):
     """x ~ U(low, high), or its logarithm uniform; or else the nominal value."""
 
-    low: float
-    """Lower end of the range."""
-    high: float
-    """Upper end of the range."""
     nominal: float
     """Value where the entry is disabled or not drawn."""
     shape: Literal["uniform", "log-uniform"] = "uniform"
@@ -23,13 +20,10 @@ class Distribution(Section):
     enabled: bool = True
     """Off always gives the nominal value."""
 
-    @model_validator(mode="after")
-    def _range_is_valid(self) -> Self:
-        if self.low > self.high:
-            raise ValueError(f"low {self.low} is above high {self.high}")
+    def problems(self) -> Iterator[tuple[str, str]]:
+        yield from super().problems()
         if self.shape == "log-uniform" and self.low <= 0.0:
-            raise ValueError(f"a log-uniform range must be positive, got low {self.low}")
-        return self
+            yield "", f"a log-uniform range must be positive, got low {self.low}"
 
 
 LATENCIES = ("action_latency", "sensor_latency", "object_latency")
@@ -102,25 +96,16 @@ class Randomization(Section):
     longest_latency: int = Field(default=4, ge=1, le=100)
     """Length of the delay lines [control periods]; no latency may pass it."""
 
-    @model_validator(mode="after")
-    def _can_be_simulated(self) -> Self:
-        problems = []
+    def problems(self) -> Iterator[tuple[str, str]]:
         for name, values in self:
-            if isinstance(values, Distribution) and name not in SIGNED:
-                most = float(self.longest_latency) if name in LATENCIES else float("inf")
-                text = (
-                    f"should be 0 to longest_latency, {most:g} periods" if name in LATENCIES else "should be 0 or more"
-                )
-                ends = ((end, getattr(values, end)) for end in ("low", "high", "nominal"))
-                problems += [(f"{name}.{end}", text) for end, value in ends if not 0 <= value <= most]
-        for name in POSITIVE:
-            ends = ((end, getattr(getattr(self, name), end)) for end in ("low", "high", "nominal"))
-            problems += [
-                (f"{name}.{end}", "should be positive: no link is without mass") for end, v in ends if v == 0.0
-            ]
-        if problems:
-            raise Unfitting(problems)
-        return self
+            for end in ("low", "high", "nominal") if isinstance(values, Distribution) else ():
+                value = getattr(values, end)
+                if name in LATENCIES and not 0 <= value <= self.longest_latency:
+                    yield f"{name}.{end}", f"should be 0 to longest_latency, {self.longest_latency} periods"
+                elif name not in SIGNED and value < 0:
+                    yield f"{name}.{end}", "should be 0 or more"
+                elif name in POSITIVE and value == 0:
+                    yield f"{name}.{end}", "should be positive: no link is without mass"
 
 
 class Impulses(Section):

@@ -1,8 +1,9 @@
 """The worlds that a robot can be put in: nothing, an object held between the wrists, a crate to push, one's own."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.beside import MeshFile
 from iowbc.recipe.section import LATER, NamedEntries, Section
@@ -69,18 +70,16 @@ class Object(Section):
     scale: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)
     """Metres for a unit of the mesh: 0.001 for a file in millimetres."""
 
-    @model_validator(mode="after")
-    def _has_a_size(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if (self.shape == "mesh") != (self.mesh is not None):
-            raise ValueError(f"shape {self.shape!r}: {'give its file, `mesh`' if self.mesh is None else 'has no mesh'}")
-        if (self.shape == "mesh") != (self.size is None):
+            yield "", f"shape {self.shape!r}: {'give its file, `mesh`' if self.mesh is None else 'has no mesh'}"
+        elif (self.shape == "mesh") != (self.size is None):
             text = "has the size of its file: leave size out, change `scale`" if self.size else "give its size"
-            raise ValueError(f"shape {self.shape!r}: {text}")
+            yield "", f"shape {self.shape!r}: {text}"
         if self.size is not None and min(self.size) <= 0.0:
-            raise ValueError(f"size: {list(self.size)} should be positive")
+            yield "", f"size: {list(self.size)} should be positive"
         if self.shape == "cylinder" and self.size is not None and self.size[0] != self.size[1]:
-            raise ValueError(f"size: a cylinder is as long as it is wide, got {self.size[0]:g} and {self.size[1]:g} m")
-        return self
+            yield "", f"size: a cylinder is as long as it is wide, got {self.size[0]:g} and {self.size[1]:g} m"
 
 
 class Scene(Section):
@@ -103,14 +102,12 @@ class Scene(Section):
     creep: float = Field(default=0.02, gt=0.0)
     """Speed below which a crate counts as at rest [m/s]; stuck, the solver lets it creep at 1 mm/s."""
 
-    @model_validator(mode="after")
-    def _object_fits_kind(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if (self.kind == "free") != (self.object is None):
-            raise ValueError(f"a {self.kind} scene {'has no' if self.kind == 'free' else 'needs an'} object")
+            yield "", f"a {self.kind} scene {'has no' if self.kind == 'free' else 'needs an'} object"
         by_contact = self.kind == "lift" and self.grasp.kind == "contact"
         if by_contact and self.object is not None and self.object.shape != "box":
-            raise ValueError(f"a grasp by contact holds a box, whose width fits the hands, not a {self.object.shape}")
-        return self
+            yield "", f"a grasp by contact holds a box, whose width fits the hands, not a {self.object.shape}"
 
 
 class Scenes(NamedEntries):

@@ -1,8 +1,8 @@
 """The 11-D skill-level command and how it is drawn in training."""
 
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import Range, Section
 
@@ -87,8 +87,6 @@ class Commands(Section):
     rates: CommandRates = CommandRates()
     """Rate limits."""
 
-    @model_validator(mode="after")
-    def _commands_last(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.resampling[0] <= 0.0:
-            raise ValueError(f"resampling: {self.resampling[0]} s is no positive time")
-        return self
+            yield "", f"resampling: {self.resampling[0]} s is no positive time"

@@ -1,8 +1,8 @@
 """The curriculum of training: four axes, each with a level of its own, in the order of the paper's three phases."""
 
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import LATER, Section
 
@@ -106,8 +106,6 @@ class Curriculum(Section):
     limit: float = Field(default=2.0, ge=0.0, le=2.0)
     """Highest level of any axis."""
 
-    @model_validator(mode="after")
-    def _level_within_limit(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.fixed_level > self.limit:
-            raise ValueError(f"fixed_level: {self.fixed_level} is above the limit of {self.limit}")
-        return self
+            yield "", f"fixed_level: {self.fixed_level} is above the limit of {self.limit}"

@@ -1,8 +1,9 @@
 """Joint references that follow from a command."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import LATER, NamedEntries, Section
 
@@ -129,13 +130,9 @@ class GaitPrior(Section):
     placement: Placement | None = Field(default=None, json_schema_extra=LATER)
     """Feedback of the estimated forward speed on footholds; empty leaves them to the policy."""
 
-    @model_validator(mode="after")
-    def _feet_are_moved(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.placement is not None and not self.enabled:
-            raise ValueError(
-                "placement: moves the feet of the gait prior, which `enabled: false` leaves out; empty one"
-            )
-        return self
+            yield "", "placement: moves the feet of the gait prior, which is off (`enabled: false`); empty it"
 
 
 class References(Section):
@@ -161,11 +158,8 @@ class References(Section):
     gait: GaitPrior = GaitPrior()
     """Gait clock and swing."""
 
-    @model_validator(mode="after")
-    def _wrists_apart(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         for name, grasp in self.grasps:
             if grasp[1] <= 0.0:
-                raise ValueError(
-                    f"grasps.{name}: the left wrist's y is {grasp[1]}, it must be positive (left of the body)"
-                )
-        return self
+                text = f"the left wrist's y is {grasp[1]}, it must be positive (left of the body)"
+                yield "", f"grasps.{name}: {text}"

@@ -1,8 +1,9 @@
 """Terms and weights of the reward."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.beside import OwnFunction
 from iowbc.recipe.section import LATER, OWN_NAME, Section
@@ -165,11 +166,9 @@ class Later(Section):
     """Weight by the dotted path of a term in this section, as `sync.progress`: it teaches to walk, and once a robot
     walks makes it hurry."""
 
-    @model_validator(mode="after")
-    def _levels_ascend(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.begin >= self.end:
-            raise ValueError(f"begin {self.begin:g} must be below end {self.end:g}")
-        return self
+            yield "", f"begin {self.begin:g} must be below end {self.end:g}"
 
 
 class Reward(Section):
@@ -198,8 +197,7 @@ class Reward(Section):
     )
     """Terms of one's own, by a name for their curve; training alone executes them."""
 
-    @model_validator(mode="after")
-    def _later_weights_are_of_terms(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         groups = {name: value for name, value in self if isinstance(value, Section) and name != "later"}
         terms = {"alive", "termination"} | {
             f"{group}.{name}"
@@ -207,10 +205,8 @@ class Reward(Section):
             for name, value in section
             if isinstance(value, float | Kernel)
         }
-        unknown = sorted(set(self.later.weights if self.later else ()) - terms)
-        if unknown:
-            raise ValueError(f"later.weights: no term {unknown[0]!r}; valid: {', '.join(sorted(terms))}")
-        return self
+        for unknown in sorted(set(self.later.weights if self.later else ()) - terms):
+            yield "", f"later.weights: no term {unknown!r}; valid: {', '.join(sorted(terms))}"
 
     @property
     def own_terms(self) -> dict[str, OwnTerm]:

@@ -1,8 +1,9 @@
 """The Markov decision process: action, observation, termination, and the sections of the other files."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.beside import OwnFunction
 from iowbc.recipe.section import LATER, OWN_NAME, NamedEntries, Section
@@ -91,11 +92,10 @@ class SceneShares(NamedEntries):
         """One scene alone."""
         return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
 
-    @model_validator(mode="after")
-    def _some_scene(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
+        yield from super().problems()
         if sum(share for _, share in self) <= 0.0:
-            raise ValueError("every share is zero: give at least one scene a positive share")
-        return self
+            yield "", "every share is zero: give at least one scene a positive share"
 
 
 class Task(Section):

@@ -5,7 +5,8 @@ from scipy.stats import qmc
 
 from iowbc.arrays import Array, Indices
 from iowbc.control.arms import ArmKinematics
-from iowbc.recipe.generator import Interval, ReferenceGenerator
+from iowbc.recipe.generator import ReferenceGenerator
+from iowbc.recipe.section import Interval
 from iowbc.recipe.task.joint_references import ArmReference
 from iowbc.reference.labels.sample import Sample
 from iowbc.robot.description import Robot
