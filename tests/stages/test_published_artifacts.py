@@ -31,6 +31,7 @@ PUBLISHED_TO = {
     "wo_distill": "eval",
     "blind": "export",
     "compliant": "export",
+    "experts/quick": "distill",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
     "transport_controllers": "skill-eval",
