@@ -65,6 +65,7 @@ def bench_control(
         ),
     ],
     steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
+    skill: Annotated[Path | None, typer.Option(help="Folder of a skill that commands the controller.")] = None,
 ) -> None:
     """Measure the control step's time of an exported controller on one thread, without torch or a simulator."""
     import numpy as np
@@ -73,7 +74,7 @@ def bench_control(
 
     print(f"{what}: {steps:,} control steps of one robot on one thread")
     print(f"{'':16}{'median':>12}{'99th percentile':>18}{'longest':>12}")
-    for name, taken in zip(("time", "processor time"), 1e3 * step_seconds(what, steps).T, strict=True):
+    for name, taken in zip(("time", "processor time"), 1e3 * step_seconds(what, steps, skill).T, strict=True):
         median, late, longest = (f"{value:.3f} ms" for value in np.quantile(taken, (0.5, 0.99, 1.0)))
         print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
 

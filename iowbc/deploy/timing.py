@@ -1,5 +1,6 @@
 """How long a control step takes: arm kinematics, reference generator, history and policy of one robot on one thread."""
 
+import itertools
 import time
 from dataclasses import fields
 from pathlib import Path
@@ -11,32 +12,39 @@ from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import readable
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import GOLDEN, exported_folder
+from iowbc.deploy.skill import Skill
 
 INPUT = "input/"
 """Prefix of the names of the graph's inputs among the golden vectors."""
 
 
-def step_seconds(folder: Path | str, steps: int) -> Array:
-    """Time of each control step along the golden rollout, which is gone through again and again, and the processor's
-    time in it, which other programs do not lengthen, (steps, 2) [s].
+def step_seconds(folder: Path | str, steps: int, skill: Path | None = None) -> Array:
+    """Time of control steps along the golden rollout, which is repeated, and the processor's time in them, which other
+    programs do not lengthen, (steps, 2) [s]. The first step of each rollout, which also settles the references, is left
+    out.
 
-    folder: as of `Controller.load`. Raises ContractBroken where it is not what its contract says.
+    folder: as of `Controller.load`; `skill`: folder of a skill that commands the controller, in place of the rollout's
+    commands. Raises ContractBroken where one is not what its contract says.
     """
     controller = Controller.load(folder)
+    commanding = None if skill is None else Skill.load(skill, controller)
     path = exported_folder(folder) / GOLDEN
     with readable(path), np.load(path, allow_pickle=False) as file:
         given = {name.removeprefix(INPUT): file[name] for name in file.files if name.startswith(INPUT)}
     names = [field.name for field in fields(Measured) if field.name in given]
-    rows = len(given["command"])
-    taken = np.empty((steps, 2))
-    for step in range(steps):
-        row = slice(step % rows, step % rows + 1)
-        measured = Measured(**{name: given[name][row].astype(np.float64) for name in names})
-        command = given["command"][row].astype(np.float64)
-        if row.start == 0:
+    rows, taken, step = len(given["command"]), np.empty((steps, 2)), 0
+    for row in itertools.cycle(range(rows)):
+        if step == steps:
+            break
+        if row == 0:
             controller.reset()
+            if commanding is not None:
+                commanding.reset()
+        measured = Measured(**{name: given[name][row : row + 1].astype(np.float64) for name in names})
+        command = given["command"][row : row + 1].astype(np.float64)
         used, start = time.thread_time(), time.perf_counter()
-        controller.step(measured, command)
+        controller.step(measured, command if commanding is None else commanding.step(measured))
         end = time.perf_counter()
         taken[step] = end - start, time.thread_time() - used
+        step += row > 0
     return taken

@@ -15,6 +15,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.deploy.skill import Skill
 from iowbc.deploy.skill_contract import CONTRACT, GOLDEN, GRAPH
+from iowbc.deploy.timing import step_seconds
 from iowbc.errors import ContractBroken
 from iowbc.export.skill import write_skill
 from iowbc.learning.networks import TeacherNetwork
@@ -148,3 +149,16 @@ def test_a_skill_of_another_controller_is_refused(
     shutil.copy(tmp_path / GRAPH, tmp_path / CONTRACT)
     with pytest.raises(ContractBroken, match="not a contract"):
         Skill.load(tmp_path, controller)
+
+
+def test_steps_of_both_are_timed_without_those_that_settle(
+    folder: Path, controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("IOWBC_RUNS", str(ROOT / "runs"))
+    decided: list[int] = []
+    step = Skill.step
+    monkeypatch.setattr(Skill, "step", lambda skill, measured: decided.append(1) or step(skill, measured))
+    taken = step_seconds("compliant", 7, folder)
+    assert taken.shape == (7, 2)
+    assert (taken > 0.0).all()
+    assert len(decided) == 8, "the first one settles, and is not among the seven"
