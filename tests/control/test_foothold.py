@@ -101,6 +101,5 @@ def test_a_foot_on_the_ground_comes_back_and_no_step_is_longer_than_allowed(
     np.testing.assert_array_equal(placement(np.full((1, 2), 0.2), fast, command, np.zeros(1), np.zeros(1)), 0.0)
 
 
-def test_without_the_setting_or_the_prior_there_is_none(robot: Robot) -> None:
+def test_without_the_setting_there_is_none(robot: Robot) -> None:
     assert FootPlacement.of(robot, GaitPrior(), PERIOD) is None
-    assert FootPlacement.of(robot, PRIOR.model_copy(update={"enabled": False}), PERIOD) is None
