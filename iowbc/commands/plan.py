@@ -107,10 +107,10 @@ def in_all(found: Planned, what: str = "points") -> str:
     if not made:
         return f"{len(found)} {what}: all stages are cached"
     counts = f"{len(made)} stages would run, {shared} are shared, {cached} cached"
-    return f"{len(found)} {what}: {counts}; {_time_of(made, ' one after another')}"
+    return f"{len(found)} {what}: {counts}; {time_of(made, ' one after another')}"
 
 
-def _time_of(steps: Sequence[StagePlan], manner: str = "") -> str:
+def time_of(steps: Sequence[StagePlan], manner: str = "") -> str:
     """The time that stages take together: a range, a guess where one of them has no more, and how many have neither."""
     known = [step for step in steps if step.guess is not None]
     if not known:
@@ -153,14 +153,14 @@ def _print(steps: Sequence[StagePlan], console: Console) -> None:
             console.print(hanging(line, console.width, REASON_INDENT), markup=False, highlight=False)
     missing = [step for step in steps if not step.cached]
     count = f"{len(missing)} stage{'s' if len(missing) != 1 else ''} would run"
-    console.print(f"{count}; {_time_of(missing)}" if missing else "all stages are cached", highlight=False)
+    console.print(f"{count}; {time_of(missing)}" if missing else "all stages are cached", highlight=False)
 
 
 def _described(step: StagePlan) -> Text:
     if step.cached:
         key = f"  {(step.key or '')[:KEY_LENGTH]}"
         return Text.assemble(("cached (published)" if step.published else "cached", "cyan"), (key, "dim"))
-    takes = "" if step.guess is None else f", {_time_of([step])}"
+    takes = "" if step.guess is None else f", {time_of([step])}"
     if step.expected is None and step.roughly is not None:
         takes += f" at the rate of {step.rate_of}"
     return Text.assemble(("run", "bold yellow"), takes)
