@@ -1,9 +1,10 @@
 """Films of episodes: an mp4 file frame by frame, with lines of text in a corner, and trials played again."""
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import Any
 
 import imageio.v2
@@ -54,12 +55,14 @@ def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
     """A function that appends a frame (H, W, 3) to an mp4 file, which appears when the block ends without an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     settings = {"fps": fps, "codec": "libx264", "quality": QUALITY, "pixelformat": "yuv420p"}
-    # in a folder of its own, which goes with whatever an interrupted encoder still writes
-    with TemporaryDirectory(dir=path.parent, prefix=".film-", ignore_cleanup_errors=True) as folder:
-        unfinished = Path(folder, path.name)
-        with imageio.v2.get_writer(unfinished, format="FFMPEG", **settings) as writer:
+    folder = Path(mkdtemp(dir=path.parent, prefix=".film-"))
+    try:
+        with imageio.v2.get_writer(folder / path.name, format="FFMPEG", **settings) as writer:
             yield writer.append_data
-        unfinished.replace(path)
+        (folder / path.name).replace(path)
+    finally:
+        for _ in range(2):  # an interrupted encoder may create its file while the first removal is under way
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
