@@ -1,4 +1,4 @@
-"""What the mice of the browsers hold: points of bodies, and where the pointers are."""
+"""Mouse drags in the browsers: the dragged body, its point, and the pointer."""
 
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass
@@ -30,10 +30,10 @@ class Drag:
     """The pointer, on a plane through that point parallel to the screen."""
     camera: Array
     shift: bool
-    """Whether the shift key is held."""
+    """True while the shift key is down."""
 
     def on_plane(self, height: float) -> Array | None:
-        """Where the pointer's ray meets the horizontal plane of a height [m], (3,); None where it does not."""
+        """Intersection of the pointer's ray with the horizontal plane at a height [m], (3,); None without one."""
         down = self.end[2] - self.camera[2]
         part = (height - self.camera[2]) / down if down else -1.0
         point: Array = self.camera + part * (self.end - self.camera)

@@ -43,7 +43,7 @@ class ShownParts:
 
 @dataclass(frozen=True)
 class GameMarks:
-    """What is drawn of a game, once for its model."""
+    """Draws path, walls and handle of a game, once per model."""
 
     lines: tuple[tuple[Array, tuple[float, ...]], ...]
     """The path and its walls: points (k, 3) [m], world frame, with a colour."""
@@ -131,7 +131,7 @@ class Drawing:
 
     @property
     def away(self) -> Array:
-        """How far the view has followed the robot, (3,) [m]."""
+        """Displacement of the view, which follows the robot, (3,) [m]."""
         return np.array([*self._at, 0.0])
 
     def show(self, model: Any, moment: Moment, shown: ShownParts, marks: GameMarks | None = None) -> None:

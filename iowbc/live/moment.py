@@ -103,7 +103,7 @@ class Witness(SimulationWitness):
     """Takes down the moments of the first environment of a batch, in its present episode."""
 
     def __init__(self, batch: Batch, signals: Mapping[str, Array]) -> None:
-        """`signals`: by name, (n, k), which are written anew in every step."""
+        """`signals`: by name, (n, k); the simulation overwrites them in every step."""
         super().__init__(batch.simulation)
         self.batch, self._signals = batch, signals
         self._reference = mujoco.MjData(self.model)

@@ -1,4 +1,4 @@
-"""What a page plays: one episode after another, stepped at its pace and steered by its controls."""
+"""Episodes of a page: the interface of the driven policy and of the game."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class Played(ABC):
     period: float
     """Time of a step [s]."""
     marks: GameMarks | None = None
-    """What is drawn of a game."""
+    """Path, walls and handle of a game."""
     view: tuple[tuple[float, ...], tuple[float, ...]] = ((1.7, -1.4, 1.2), (0.1, 0.0, 0.6))
     """First position of a camera, and at what it looks [m]."""
     checkpoint = ""

@@ -315,7 +315,7 @@ class Partner:
 
     @property
     def aim(self) -> Array:
-        """Where the partners' springs pull the handles, (n, 3) [m]."""
+        """Equilibrium points of the partners' springs, (n, 3) [m]."""
         return self._aim.copy()
 
     def arrays(self) -> dict[str, Array]:

@@ -178,7 +178,7 @@ class Simulation:
 
     @property
     def partner_aim(self) -> Array:
-        """Where the partners' springs pull the handles, (n, 3) [m]."""
+        """Equilibrium points of the partners' springs, (n, 3) [m]."""
         return self._partner.aim
 
     @property
