@@ -43,7 +43,7 @@ class ShownParts:
 
 @dataclass(frozen=True)
 class GameMarks:
-    """Draws path, walls and handle of a game, once per model."""
+    """Path, walls and handle of a game, drawn once per model."""
 
     lines: tuple[tuple[Array, tuple[float, ...]], ...]
     """The path and its walls: points (k, 3) [m], world frame, with a colour."""

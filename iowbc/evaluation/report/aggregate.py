@@ -18,7 +18,7 @@ OVER_ALL_TRIALS = (
     *("transport_robot", "transport_object", "hand_force_mean", "hand_force_p95", "hand_force_peak"),
     *("handle_force_mean", "handle_force_p95", "handle_force_peak", "partner_work"),
 )
-"""Metrics averaged over all trials, up to their end: who falls has pulled before. All others are averaged over the
+"""Metrics averaged over all trials, up to their end, since a robot pulls before it falls; the others over the
 surviving trials."""
 RAW = ("E_v_raw", "E_v_raw_moving")
 """E_v without the mean over a gait period; trials of an early version lack it."""
