@@ -57,12 +57,12 @@ def written_film(path: Path, fps: int) -> Iterator[Callable[[Frame], None]]:
     settings = {"fps": fps, "codec": "libx264", "quality": QUALITY, "pixelformat": "yuv420p"}
     folder = Path(mkdtemp(dir=path.parent, prefix=".film-"))
     try:
-        with imageio.v2.get_writer(folder / path.name, format="FFMPEG", **settings) as writer:
+        # `closing`: as a context manager, the writer leaves its encoder running where the block raises
+        with closing(imageio.v2.get_writer(folder / path.name, format="FFMPEG", **settings)) as writer:
             yield writer.append_data
         (folder / path.name).replace(path)
     finally:
-        for _ in range(2):  # an interrupted encoder may create its file while the first removal is under way
-            shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def filmed(trials: pd.DataFrame, count: int) -> list[tuple[str, "pd.Series[Any]"]]:
