@@ -29,6 +29,8 @@ class ModelFields:
         names = FIELDS + WHEELS * (scene.kind == "push")
         self._fields = {name: batch.expand(name) for name in names}
         self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
+        self._fields["object_mass"] = np.zeros(len(self.body_mass))
+        self._least_inertia = scene.object.smallest_inertia if scene.object is not None else 0.0
         self._object_inertia = measured(scene.object).principal if scene.object is not None else np.zeros(3)
         batch.set_const()
         self._batch = batch
@@ -36,9 +38,14 @@ class ModelFields:
 
     @property
     def body_mass(self) -> Array:
-        """(n, bodies) [kg]."""
+        """Inertia in translation, (n, bodies) [kg]."""
         mass: Array = self._fields["body_mass"]
         return mass
+
+    @property
+    def object_mass(self) -> Array:
+        """What the object weighs, (n,) [kg]; less than its inertia where it is light."""
+        return self._fields["object_mass"]
 
     def write(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
         """Sets the models of simulations `ids`, which rise, from rows of drawn values in the same order."""
@@ -68,7 +75,8 @@ class ModelFields:
 
     def _write_object(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
         fields, thing = self._fields, self._layout.object
-        mass = drawn["object_mass"]
+        fields["object_mass"][ids] = drawn["object_mass"]
+        mass = np.maximum(drawn["object_mass"], self._least_inertia)
         inertia = self._object_inertia * (mass * drawn["inertia_scale"])[:, None]
         fields["body_mass"][ids, thing] = mass
         fields["body_inertia"][ids, thing] = inertia

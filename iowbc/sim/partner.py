@@ -50,6 +50,7 @@ class Partner:
         """The handle and the centre of mass on the object, object frame [m]."""
         self._places[:, 0, 0], self._places[:, 0, 2] = ahead, above
         slowest = np.array([measured(thing).about_axes[1:].min() if thing else 1.0 for thing in things])
+        self._least_inertia = np.array([thing.smallest_inertia if thing else 0.0 for thing in things])
         self._felt = 1.0 / (1.0 + (ahead * ahead + above * above) / slowest)
         self._line = DelayLine(n, FEED, max(recipe.delay.high, recipe.lagging.delay) / period)
         self._stiffness, self._damping, self._weight = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -84,7 +85,8 @@ class Partner:
         share, mass = drawn["partner_share"][which], drawn["object_mass"][which]
         resistance, pushing = drawn["rolling_resistance"][which], self._pushing[which]
         present = (share != 0.0) & (mass > 0.0)
-        stable = self._recipe.stability * mass * self._felt[which] / self._period
+        inertia = np.maximum(mass, self._least_inertia[which])
+        stable = self._recipe.stability * inertia * self._felt[which] / self._period
         self._stiffness[which] = present * np.minimum(drawn["partner_stiffness"][which], stable / self._period)
         self._damping[which] = present * np.minimum(drawn["partner_damping"][which], stable)
         self._weight[which] = (present & ~pushing) * mass * GRAVITY
@@ -96,7 +98,7 @@ class Partner:
             strongest,
         )
         self._behave(which, drawn)
-        turning = self._recipe.stability * mass * self._turning_inertia[which] / self._period
+        turning = self._recipe.stability * inertia * self._turning_inertia[which] / self._period
         arm = steered * self._recipe.hand_distance**2
         self._yaw_stiffness[which] = np.minimum(arm * self._stiffness[which], turning / self._period)
         self._yaw_damping[which] = np.minimum(arm * self._damping[which], turning)

@@ -100,9 +100,8 @@ class World:
         return Squeeze(self._robot, self.batch, "site_xpos", self.layout.grips) if pressed else None, grip
 
     def _mass_cache(self) -> None:
-        mass = self.fields.body_mass
-        self.robot_mass = np.ascontiguousarray(mass[:, self.layout.links]).sum(axis=1)
-        thing = mass[:, self.layout.object] if self.layout.object is not None else np.zeros(len(mass))
+        self.robot_mass = np.ascontiguousarray(self.fields.body_mass[:, self.layout.links]).sum(axis=1)
+        thing = self.fields.object_mass
         self._object_part = (thing / (thing + self.robot_mass))[:, None]
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
@@ -210,7 +209,9 @@ class World:
     def _handle(self, given: Period, thing: int) -> None:
         """What acts on the object, and between it and the hands."""
         layout, applied = self.layout, self._applied
+        inertia = self.fields.body_mass[:, thing]
         applied[:, thing] = given.wrench
+        applied[:, thing, 2] += GRAVITY * (inertia - self.fields.object_mass)
         if self._rolling is not None:
             self._rolling.turn(given.resistance, given.wrench)
         if self._squeeze is not None:
@@ -220,7 +221,7 @@ class World:
                 lever = points - self._centres[:, layout.wrists]
                 applied[:, layout.wrists, 3:] = rotations.cross(inward, lever)
         if self._grip is not None:
-            torque = self._grip.twist(self.fields.body_mass[:, thing], given.slip_force, self._connected)
+            torque = self._grip.twist(inertia, given.slip_force, self._connected)
             applied[:, thing, 3:] += torque
             applied[:, layout.hands, 3:] = -0.5 * torque[:, None]
 
@@ -323,7 +324,7 @@ class World:
         state.grip_force[place] = grip
         hands = grip[:, 0] + grip[:, 1]
         if self.scene.kind == "lift":
-            state.hand_weight_share[place] = hands[:, 2] / (-GRAVITY * self.fields.body_mass[:, thing])
+            state.hand_weight_share[place] = hands[:, 2] / (-GRAVITY * self.fields.object_mass)
         hands += self._external[:, THING, 3:]
         hands -= self._applied[:, thing, :3]
         state.link_object_force[place] = np.sqrt(np.vecdot(hands, hands))

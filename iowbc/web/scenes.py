@@ -103,6 +103,7 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
         "mass": scene.object.mass,
         "first": next((mass for place, mass in accepted(recipe) if place == name), scene.object.mass),
         "least": scene.object.smallest_mass,
+        "least_inertia": scene.object.smallest_inertia,
         "most": HEAVIEST * scene.object.mass,
         "inertia_per_mass": shape.principal.tolist(),
     }

@@ -65,6 +65,10 @@ class Object(Section):
     """Nominal mass [kg]."""
     smallest_mass: float = Field(default=0.05, gt=0.0)
     """Lighter masses, zero too, are simulated as this [kg]: a free body needs inertia."""
+    smallest_inertia: float = Field(default=0.5, gt=0.0, json_schema_extra=LATER)
+    """Lighter objects weigh what they weigh and move with the inertia of this mass [kg]. Forces of grip and partner are
+    held over a control period; on a light free body they would have to be so soft (`stability`) that a box of 0.05 kg
+    turned over between its carriers."""
     mesh: MeshFile | None = Field(default=None, json_schema_extra=LATER)
     """An .obj or .stl file beside the recipe, x forward and z up."""
     scale: float = Field(default=1.0, gt=0.0, json_schema_extra=LATER)

@@ -30,14 +30,14 @@ export class Hold {
   /** Forces of the period to come; changes the targets of the arms. */
   act() {
     const { data, scene } = this.world, { settings } = this;
-    const object = scene.object.body, mass = this.world.mass;
+    const object = scene.object.body, mass = this.world.mass, inertia = this.world.model.body_mass[object];
     data.xfrc_applied.fill(0);
     const left = Math.max(settings.handover - this.periods, 0) / Math.max(settings.handover, 1);
-    data.xfrc_applied[6 * object + 2] = GRAVITY * left * mass;
+    data.xfrc_applied[6 * object + 2] = GRAVITY * (left * mass + inertia - mass);
     this.periods += 1;
     const force = settings.squeeze + Math.min((settings.by_friction * this.borne) / settings.friction, settings.strength);
     this.#press(force);
-    if (settings.compliant) this.#twist(mass, object);
+    if (settings.compliant) this.#twist(inertia, object);
     this.strongest = [0, 0];
   }
 

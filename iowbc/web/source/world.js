@@ -47,19 +47,20 @@ export class World {
     return this.data.time;
   }
 
-  /** Mass of the object [kg]. */
+  /** What the object weighs [kg]; a light one has more inertia. */
   set mass(mass) {
     const { object } = this.scene;
     if (!object) return;
-    this.model.body_mass[object.body] = mass;
-    this.model.body_inertia.set(object.inertia_per_mass.map((value) => value * mass), 3 * object.body);
+    this.weighed = mass;
+    const inertia = Math.max(mass, object.least_inertia);
+    this.model.body_mass[object.body] = inertia;
+    this.model.body_inertia.set(object.inertia_per_mass.map((value) => value * inertia), 3 * object.body);
     this.mujoco.mj_setConst(this.model, this.scratch);
     this.mujoco.mj_forward(this.model, this.data);
   }
 
   get mass() {
-    const { object } = this.scene;
-    return object ? this.model.body_mass[object.body] : 0;
+    return this.weighed ?? 0;
   }
 
   /** What the robot's sensors deliver, without noise and delay, by the names of the contract's inputs. */
