@@ -94,6 +94,19 @@ def test_a_light_object_comes_to_rest_between_the_palms(start, by_hands, hold_ba
     assert max(turning[-50:]) < 0.05 * max(turning[:50])
 
 
+def test_palms_are_as_stiff_on_a_light_box_as_the_recipe_says(start, by_hands, hold_base, monkeypatch):
+    hold_base()
+    simulation = start(by_hands, ["lift"], object_mass=0.05)
+
+    def turn(commanded, gust, state, out):
+        out[:] = 0.0
+        out[:, 4] = 0.4
+
+    monkeypatch.setattr(simulation._partner, "wrench", turn)
+    run(simulation, 200)
+    assert simulation.world_of(0)[0]._grip.angle[0] == pytest.approx(0.4 / 4.0, rel=0.1)
+
+
 def test_palms_slip_at_their_torque_and_not_below(start, by_hands, hold_base, monkeypatch):
     hold_base()
     simulation = start(by_hands, ["lift"], object_mass=4.0, surface_friction=1.0)
