@@ -28,7 +28,8 @@ class Grip:
     def twist(self, mass: Array, slip_force: Array, connected: Array) -> Array:
         """Torque of the hands on the object over the period to come, (n, 3) [N·m].
 
-        `mass` (n,) with whose inertia the object moves [kg]; `slip_force` (n,) of each hand [N]; `connected` (n, 2): 1 for hands that hold.
+        `mass` (n,) with whose inertia the object moves [kg]; `slip_force` (n,) of each hand [N]; `connected` (n, 2): 1
+        for hands that hold.
         """
         hands = self._sites[:, self._layout.grips]
         axis = hands[:, 0] - hands[:, 1]

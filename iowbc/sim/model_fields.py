@@ -45,7 +45,8 @@ class ModelFields:
     @property
     def object_mass(self) -> Array:
         """What the object weighs, (n,) [kg]; less than its inertia where it is light."""
-        return self._fields["object_mass"]
+        mass: Array = self._fields["object_mass"]
+        return mass
 
     def write(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
         """Sets the models of simulations `ids`, which rise, from rows of drawn values in the same order."""
