@@ -167,9 +167,12 @@ def _suite_table(mujoco: "pd.DataFrame", drake: "pd.DataFrame | None" = None) ->
                 *(() if drake is None else _in_drake(cells[key], others.get(key))),
             )
         )
-    own = ["suite", "load", "survived", "succeeded", Column("time", "s"), *(head for head, _ in FIGURES.values())]
-    in_drake = [] if drake is None else ["succeeded in Drake", "alike", Column("E_v in Drake", "m/s")]
-    return Table("carry", "", heads(*own, *in_drake), rows, summary)
+    columns = heads(
+        "suite", "load", "survived", "succeeded", Column("time", "s"), *(head for head, _ in FIGURES.values())
+    )
+    if drake is not None:
+        columns += heads("succeeded in Drake", "alike", Column("E_v in Drake", "m/s"))
+    return Table("carry", "", columns, rows, summary)
 
 
 def _in_drake(mujoco: "pd.DataFrame", drake: "pd.DataFrame | None") -> tuple[Cell, ...]:
