@@ -51,7 +51,7 @@ def scaled(name: str, factor: float | Array = 1.0) -> Term:
 
 @dataclass(frozen=True)
 class Adapter:
-    """A controller as its own configuration describes it. The arms hold the grasp by this project's kinematics."""
+    """A controller as its own configuration describes it."""
 
     joints: tuple[str, ...]
     """Joints that it observes, in its order."""
@@ -62,7 +62,8 @@ class Adapter:
     kd: Array
     """Velocity gains, (joints,) [N·m·s/rad]."""
     acted: tuple[str, ...]
-    """Joints of its action, in its order: legs and waist at least. Targets of arm joints are not followed."""
+    """Joints of its action, in its order: legs and waist at least. Arm joints follow theirs where `eval.public.arms` is
+    `own` or `free`, which need all of them; elsewhere they hold the grasp by this project's inverse kinematics."""
     scale: Array
     """Radians of joint target for each unit of action, (acted,)."""
     frequency: float
@@ -94,13 +95,14 @@ class Adapter:
         return np.concatenate(past, axis=2).reshape(rows, -1)
 
 
-def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str) -> None:
+def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str, *, moves_arms: bool = False) -> None:
     """Holds an adapter against a robot and the rate of control [Hz], and its network against its observation.
+    `moves_arms`: the controller acts on all arm joints, too.
 
     Raises StageFailed with the field, what it is and what would be valid.
     """
     problems = [
-        *_naming(adapter, robot),
+        *_naming(adapter, robot, moves_arms),
         *(
             f"{name}: has shape {np.shape(values)}, expected {(len(names),)} finite numbers"
             for name, values, names in (
@@ -125,16 +127,17 @@ def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str
     _require_answer(adapter, where)
 
 
-def _naming(adapter: Adapter, robot: Robot) -> list[str]:
+def _naming(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
     """Problems of the names of joints."""
-    support = [robot.joints[index] for index in robot.support]
     found = []
     for field, names, known in (("joints", adapter.joints, robot.joints), ("acted", adapter.acted, adapter.joints)):
         unknown = [name for name in names if name not in known]
         if unknown or len(set(names)) != len(names):
             found.append(f"{field}: unknown or repeated {unknown or 'names'}; valid: {', '.join(known)}")
-    missing = [name for name in support if name not in adapter.acted]
-    return [*found, f"acted: lacks {', '.join(missing)}"] if missing else found
+    needed = [robot.joints[index] for index in (*robot.support, *(robot.interaction if moves_arms else ()))]
+    missing = ", ".join(name for name in needed if name not in adapter.acted)
+    remedy = "; a controller without arms of its own needs arms: measured or default" if moves_arms else ""
+    return [*found, f"acted: lacks {missing}{remedy}"] if missing else found
 
 
 def _require_answer(adapter: Adapter, where: str) -> None:

@@ -18,7 +18,8 @@ class AdaptedPolicy:
     """Acts in n environments, each on its own: the same action whichever others there are.
 
     The sensors are those of the learnt policies, with their noise and latency. With q_d the adapter's default posture,
-    the target of a joint is q_d + scale · output, so that the action is (target - θ_S_ref) / own scale.
+    the target of a joint is q_d + scale · output, so that the action is (target - θ_S_ref) / own scale. Targets of arms
+    that the controller moves follow it [rad].
     """
 
     def __init__(self, controller: PublicController, adapter: Adapter, robot: Robot, task: Task) -> None:
@@ -26,9 +27,10 @@ class AdaptedPolicy:
         self._places = observation_layout(robot, task.observation.observe_object).slices
         self._joints = [robot.joints.index(name) for name in adapter.joints]
         support = [robot.joints[index] for index in robot.support]
-        self._acted = [adapter.acted.index(name) for name in support]
+        moved = [*support, *(robot.joints[index] for index in robot.interaction if controller.moves_arms)]
+        self._acted = [adapter.acted.index(name) for name in moved]
         self._arms = [place for place, name in enumerate(adapter.joints) if name not in support]
-        self._default = adapter.default[[adapter.joints.index(name) for name in support]]
+        self._default = adapter.default[[adapter.joints.index(name) for name in moved]]
         self._own, self._scale = adapter.scale[self._acted], action_scale(robot, task.action)
         self._arms_hidden = controller.arms == "default"
         self._heading_gain = controller.heading_gain
@@ -48,7 +50,8 @@ class AdaptedPolicy:
         self._starts |= which
 
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Residual action, shape (n, A), from s_t, shape (n, S). Rows of zeros, which no trial fills, stay zero.
+        """Residual action, shape (n, A), from s_t, shape (n, S), and the targets of arms that the controller moves,
+        (n, A + arm joints). Rows of zeros, which no trial fills, stay zero.
 
         Raises StageFailed where the network's output is not finite.
         """
@@ -64,8 +67,9 @@ class AdaptedPolicy:
             raise StageFailed("eval.public: its network's output is not finite; compare its inputs with training's")
         self._starts[filled] = False
         target = self._default + self._own * self._output[:, self._acted]
-        reference = rows[:, self._places["support_reference"]]
-        action: NDArray[np.float32] = ((target - reference) / self._scale * filled[:, None]).astype(np.float32)
+        support = target[:, : len(self._scale)]
+        support[:] = (support - rows[:, self._places["support_reference"]]) / self._scale
+        action: NDArray[np.float32] = (target * filled[:, None]).astype(np.float32)
         return action
 
     def _seen(self, parts: dict[str, Array]) -> Seen:

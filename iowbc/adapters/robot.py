@@ -14,19 +14,21 @@ from iowbc.errors import StageFailed
 from iowbc.robot.description import DESCRIPTION, Robot, kind_of
 
 
-def robot_of(adapter: Adapter, robot: Robot, where: str) -> Path:
+def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = False) -> Path:
     """A folder with the robot's description in which legs and waist have the controller's gains and default posture.
 
-    Arms, which this project moves, keep theirs. The folder lasts as long as the process. Raises StageFailed where left
-    and right differ, for both have one row in a description.
+    Arms keep theirs, or take the controller's gains where it moves them. The folder lasts as long as the process.
+    Raises StageFailed where left and right differ, for both have one row in a description.
     """
     entries = yaml.safe_load((robot.folder / DESCRIPTION).read_text(encoding="utf-8"))
     rows = entries["joints"]
-    for index in robot.support:
+    for index in [*robot.support, *(robot.interaction if moves_arms else ())]:
         name = robot.joints[index]
         place, row = adapter.joints.index(name), rows[kind_of(name)]
         sign = -1.0 if row.get("mirrored", False) and name.startswith("right_") else 1.0
-        own = {"kp": adapter.kp[place], "kd": adapter.kd[place], "default": sign * adapter.default[place]}
+        own = {"kp": adapter.kp[place], "kd": adapter.kd[place]}
+        if index in robot.support:
+            own["default"] = sign * adapter.default[place]
         known = row.setdefault("own", own)
         if any(not np.isclose(known[key], own[key]) for key in own):
             raise StageFailed(f"{where}: {name} differs from the other side in kp, kd or default; both should be alike")

@@ -48,8 +48,8 @@ def adapted_robot(controller: PublicController, robot: Robot, task: Task) -> Pat
     """A folder with the robot that has the controller's gains and default posture. Raises StageFailed where the
     controller cannot be used, or does not fit the robot."""
     adapter = load_adapter(controller)
-    require_fitting(adapter, robot, task.control_frequency, PLACE)
-    return robot_of(adapter, robot, PLACE)
+    require_fitting(adapter, robot, task.control_frequency, PLACE, moves_arms=controller.moves_arms)
+    return robot_of(adapter, robot, PLACE, moves_arms=controller.moves_arms)
 
 
 def policy_path(named: str) -> Path:

@@ -88,16 +88,24 @@ def bench_carry(
         typer.Option(help="Its adapter: a Python file, `holosoma` or `deploy`.", metavar="FILE"),
     ],
     arms: Annotated[
-        Literal["measured", "default"], typer.Option(help="Arm posture that it observes: measured, or its default.")
+        Literal["measured", "default", "free", "own"],
+        typer.Option(
+            help="Arms held by this project and observed as measured or in the controller's default posture; or moved "
+            "by the controller in all trials (own) or in those without an object (free)."
+        ),
     ] = "measured",
     posture: Annotated[bool, typer.Option("--posture", help="Also send it commanded height and torso pitch.")] = False,
+    engine: Annotated[
+        Literal["mujoco", "both"] | None,
+        typer.Option(help="MuJoCo alone, or some cells in Drake, too (default: both where Drake is installed)."),
+    ] = None,
     workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
     out: Annotated[Path, typer.Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
 ) -> None:
     """Evaluate a public controller on a fixed suite of lifts and pushes, and write a page of results."""
     from iowbc.commands.bench_carry import carry
 
-    carry(policy, adapter, arms=arms, posture=posture, workers=workers, out=out)
+    carry(policy, adapter, arms=arms, posture=posture, workers=workers, out=out, engine=engine)
 
 
 def bench_engines(

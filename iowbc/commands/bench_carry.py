@@ -3,7 +3,8 @@
 import json
 import os
 import tempfile
-from importlib.metadata import version
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +15,14 @@ from iowbc.recipe.reading.finding import recipe_file
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
-from iowbc.results.table import Column, Table, heads, markdown, measured
+from iowbc.results.table import ABSENT, Cell, Column, Table, heads, markdown, measured
 
 if TYPE_CHECKING:
     import pandas as pd
 
+SUITES = {"mujoco": "carry.yaml", "drake": "carry_drake.yaml"}
+"""Suite of each engine, in the folder `public` of the recipes."""
+NO_DRAKE = "not installed: pip install 'iowbc[drake]'"
 DECIDING = ("simulation", "task", "eval")
 """Sections of the suite that decide its trials."""
 EARLY = 2.0
@@ -34,31 +38,38 @@ FIGURES = {
 MEANING = (
     "E_v and E_ψ: errors of velocity and heading, means over the trials that were survived. Way: part of the commanded "
     "way covered; hand, handle: 95th percentile of the horizontal force between a hand and the object, and between "
-    "partner and object; time: until the end or the fall; means over all trials."
+    "partner and object; time: until the end or the fall; means over all trials. Alike: trials with the same outcome "
+    "in both engines."
 )
 
 
 def carry(
-    policy: str, adapter: str, *, arms: str, posture: bool, workers: int | None, out: Path, suite: Path | None = None
+    policy: str,
+    adapter: str,
+    *,
+    arms: str,
+    posture: bool,
+    workers: int | None,
+    out: Path,
+    engine: str | None = None,
+    suites: Mapping[str, Path] | None = None,
 ) -> None:
-    """Play the suite and write the page. Raises UsageError, RecipeError, and StageFailed where the controller cannot
+    """Play the suites and write the page. Raises UsageError, RecipeError, and StageFailed where the controller cannot
     be used.
 
-    `adapter`: the name of a shipped one or a Python file; `posture`: whether it gets commanded height and pitch.
+    `adapter`: the name of a shipped one or a Python file; `posture`: whether it gets commanded height and pitch;
+    `engine`: "mujoco", "both", or by default both where Drake is installed; `suites`: other files than `SUITES`.
     """
     require_training("bench carry")
     from iowbc.adapters.source import SHIPPED, policy_digest, policy_path
-    from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
-    from iowbc.robot.description import robot_folder
-    from iowbc.task.specification import Specification
 
-    own = adapter not in SHIPPED
+    own, drake = adapter not in SHIPPED, drake_version()
     if own and not Path(adapter).is_file():
         raise UsageError(f"--adapter {adapter}: no such file; give a Python file, or one of {', '.join(SHIPPED)}")
     if out.suffix != ".md":
         raise UsageError(f"--out {out}: a page is a Markdown file; give a name that ends in .md")
-    file = suite or recipe_file("public").parent / "public" / "carry.yaml"
+    if engine == "both" and drake is None:
+        raise UsageError(f"--engine both: Drake is {NO_DRAKE}, or give --engine mujoco")
     digest = policy_digest(policy_path(policy))
     values: dict[str, object] = {
         "adapter": "own" if own else adapter,
@@ -68,7 +79,46 @@ def carry(
         **({"module": str(Path(adapter).resolve())} if own else {}),
     }
     overrides = [f"eval.public.{name}={json.dumps(value)}" for name, value in values.items()]
-    recipe = load_recipe(file, [*overrides, f"task.references.upright={json.dumps(not posture)}"]).recipe
+    overrides.append(f"task.references.upright={json.dumps(not posture)}")
+    files = suites or {name: recipe_file("public").parent / "public" / file for name, file in SUITES.items()}
+    skipped = "left out by --engine mujoco" if engine == "mujoco" else None if drake else NO_DRAKE
+    recipes = {name: load_recipe(files[name], overrides).recipe for name in SUITES if name == "mujoco" or not skipped}
+    played = {name: _play(recipe, workers or os.cpu_count() or 1) for name, recipe in recipes.items()}
+    controller = recipes["mujoco"].eval.public
+    assert controller is not None, "it is among the overrides"
+    source = Path(adapter) if own else Path(SHIPPED[adapter].__code__.co_filename)
+    given = "height and pitch" if posture else "velocities alone"
+    rows = {
+        "controller": f"{Path(policy.partition(':')[2] or policy).name}, SHA-256 {digest}",
+        "adapter": f"{source.name}, SHA-256 {file_digest(source)}",
+        "settings": f"arms {arms}, {given}, heading gain {controller.heading_gain:g} 1/s",
+        "suite": _suite_row(files["mujoco"], played["mujoco"]),
+        f"in Drake {drake or ''}".strip(): skipped or _suite_row(files["drake"], played["drake"]),
+    }
+    head = "\n".join(f"| {name} | {text} |" for name, text in rows.items())
+    table = _suite_table(**played)
+    page = f"# Carry bench\n\n| | |\n| --- | --- |\n{head}\n\n{markdown(table)}\n{MEANING}\n"
+    out.write_text(page, encoding="utf-8")
+    print(markdown(table), end="")
+    if _falls_early(played["mujoco"]):
+        print("it falls at once without an object: compare joint order, gains and scales with those of its training")
+    print(f"page  {out}")
+
+
+def drake_version() -> str | None:
+    """Version of Drake, where it is installed."""
+    try:
+        return version("drake")
+    except PackageNotFoundError:
+        return None
+
+
+def _play(recipe: Recipe, workers: int) -> "pd.DataFrame":
+    """The trials of a suite with the controller that it names."""
+    from iowbc.evaluation.acting import evaluated_policy
+    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.robot.description import robot_folder
+    from iowbc.task.specification import Specification
 
     reached = 0
 
@@ -76,30 +126,19 @@ def carry(
         nonlocal reached
         if int(10 * done / total) > reached:
             reached = int(10 * done / total)
-            print(f"{done:.0f} of {total:.0f} trials, {note}", flush=True)
+            print(f"{recipe.name}: {done:.0f} of {total:.0f} trials, {note}", flush=True)
 
-    world, cores = evaluated_world(Specification(recipe, robot_folder(recipe.robot))), os.cpu_count() or 1
+    world = evaluated_world(Specification(recipe, robot_folder(recipe.robot)))
     acting = evaluated_policy(world, None)
     with tempfile.TemporaryDirectory(prefix="iowbc-carry-") as work:
-        trials = Protocol(world, acting, work=Path(work), workers=workers or cores, progress=progress).run()
-    source = Path(adapter) if own else Path(SHIPPED[adapter].__code__.co_filename)
-    given, controller = "height and pitch" if posture else "velocities alone", recipe.eval.public
-    assert controller is not None, "it is among the overrides"
-    rows = {
-        "controller": f"{Path(policy.partition(':')[2] or policy).name}, SHA-256 {digest}",
-        "adapter": f"{source.name}, SHA-256 {file_digest(source)}",
-        "suite": f"{file.stem} of iowbc {version('iowbc')}, SHA-256 {suite_digest(load_recipe(file).recipe)}",
-        "settings": f"arms {arms}, {given}, heading gain {controller.heading_gain:g} 1/s",
-        "trials": f"{len(trials)}, {recipe.eval.trials} a cell; {int(trials['succeeded'].sum())} succeeded",
-    }
-    head = "\n".join(f"| {name} | {text} |" for name, text in rows.items())
-    table = _suite_table(trials)
-    page = f"# Carry bench\n\n| | |\n| --- | --- |\n{head}\n\n{markdown(table)}\n{MEANING}\n"
-    out.write_text(page, encoding="utf-8")
-    print(markdown(table), end="")
-    if _falls_early(trials):
-        print("it falls at once without an object: compare joint order, gains and scales with those of its training")
-    print(f"page  {out}")
+        return Protocol(world, acting, work=Path(work), workers=workers, progress=progress).run()
+
+
+def _suite_row(file: Path, trials: "pd.DataFrame") -> str:
+    """Name and digest of a suite, and how many of its trials succeeded."""
+    suite = load_recipe(file).recipe
+    played = f"{len(trials)} trials, {suite.eval.trials} a cell, {int(trials['succeeded'].sum())} succeeded"
+    return f"{file.stem} of iowbc {version('iowbc')}, SHA-256 {suite_digest(suite)}; {played}"
 
 
 def suite_digest(suite: Recipe) -> str:
@@ -108,26 +147,42 @@ def suite_digest(suite: Recipe) -> str:
     return data_digest({name: values[name] for name in DECIDING})
 
 
-def _suite_table(trials: "pd.DataFrame") -> Table:
-    """A row for each suite and mass."""
+def _suite_table(mujoco: "pd.DataFrame", drake: "pd.DataFrame | None" = None) -> Table:
+    """A row for each suite and mass, beside it the same cell in Drake."""
     from iowbc.evaluation.report.aggregate import aggregate
 
-    summary = aggregate(trials)
-    seconds = trials.groupby(["suite", "case", "mass"])["seconds"].mean()
-    rows = [
-        (
-            str(row["suite"]),
-            f"{row['mass']:g} kg" if row["mass"] else "no object",
-            f"{row['survived']}/{row['trials']}",
-            f"{row['succeeded']}/{row['trials']}",
-            f"{seconds[row['suite'], row['case'], row['mass']]:.1f}",
-            *(measured(float(row[name]), form=form) for name, (_, form) in FIGURES.items()),
+    summary, cell = aggregate(mujoco), ["suite", "case", "mass"]
+    cells, others = dict(list(mujoco.groupby(cell))), {} if drake is None else dict(list(drake.groupby(cell)))
+    rows = []
+    for _, row in summary.iterrows():
+        key = tuple(row[cell])
+        rows.append(
+            (
+                str(row["suite"]),
+                f"{row['mass']:g} kg" if row["mass"] else "no object",
+                f"{row['survived']}/{row['trials']}",
+                f"{row['succeeded']}/{row['trials']}",
+                f"{cells[key]['seconds'].mean():.1f}",
+                *(measured(float(row[name]), form=form) for name, (_, form) in FIGURES.items()),
+                *(() if drake is None else _in_drake(cells[key], others.get(key))),
+            )
         )
-        for _, row in summary.iterrows()
-    ]
-    own = ("suite", "load", "survived", "succeeded", Column("time", "s"))
-    columns = heads(*own, *(head for head, _ in FIGURES.values()))
+    columns = heads(
+        "suite", "load", "survived", "succeeded", Column("time", "s"), *(head for head, _ in FIGURES.values())
+    )
+    if drake is not None:
+        columns += heads("succeeded in Drake", "alike", Column("E_v in Drake", "m/s"))
     return Table("carry", "", columns, rows, summary)
+
+
+def _in_drake(mujoco: "pd.DataFrame", drake: "pd.DataFrame | None") -> tuple[Cell, ...]:
+    """Successes, trials with the same outcome, and E_v of a cell in Drake."""
+    if drake is None:
+        return (ABSENT,) * 3
+    pairs = mujoco.merge(drake, on="trial", suffixes=("", "_drake"))
+    alike = int((pairs["succeeded"] == pairs["succeeded_drake"]).sum())
+    error = float(drake.loc[drake["survived"], "E_v"].mean())
+    return f"{int(drake['succeeded'].sum())}/{len(drake)}", f"{alike}/{len(pairs)}", measured(error)
 
 
 def _falls_early(trials: "pd.DataFrame") -> bool:

@@ -11,6 +11,7 @@ from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
 from iowbc.control.sensors import Measured
+from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.rollouts.rollout_policies import RolloutPolicy
 from iowbc.rollouts.trajectories import Trajectories, roll
@@ -94,6 +95,9 @@ class Batch:
         self._pulls = PlannedPulls(schedule.pulls, period)
         self.observer = Observer(self.robot, self.layout, self.simulation, self.memory)
         self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
+        arms = None if recipe.eval.public is None else recipe.eval.public.arms
+        self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])
+        """Environments in which a public controller moves its arms, (k,)."""
         self._divergences = divergences
 
     @property
@@ -128,8 +132,11 @@ class Batch:
     def step(self) -> None:
         """One control step of every environment; those that end begin anew."""
         memory, simulation = self.memory, self.simulation
-        action = self.buffers["action"].astype(np.float64).clip(-self._bound, self._bound)
+        given, support = self.buffers["action"].astype(np.float64), len(self.robot.support)
+        action = given[:, :support].clip(-self._bound, self._bound)
         simulation.target[:] = self.guidance.targets(memory, action)
+        if len(self._own_arms):
+            simulation.target[np.ix_(self._own_arms, self.robot.interaction)] = given[self._own_arms, support:]
         self.feed_partner(simulation.feed)
         if self._pushes.any:
             simulation.planned_push[:] = self._pushes.force(memory.steps, memory.heading_reference)

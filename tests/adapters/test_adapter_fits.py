@@ -52,12 +52,24 @@ def test_what_does_not_fit_is_named(robot: Robot, adapter: Adapter, changes: dic
         require_fitting(replace(adapter, **changes), robot, 50.0, "eval.public")
 
 
-def test_legs_and_waist_take_the_controllers_gains_and_the_arms_keep_theirs(robot: Robot, adapter: Adapter) -> None:
+def test_arms_of_its_own_need_all_arm_joints(robot: Robot, adapter: Adapter) -> None:
+    text = "acted: lacks left_shoulder_pitch_joint, .*; a controller without arms of its own needs arms: measured or"
+    with pytest.raises(StageFailed, match=text):
+        require_fitting(adapter, robot, 50.0, "eval.public", moves_arms=True)
+    whole = replace(adapter, acted=robot.joints, scale=np.full(29, 0.25), network=lambda seen: seen[:, :29])
+    require_fitting(whole, robot, 50.0, "eval.public", moves_arms=True)
+
+
+@pytest.mark.parametrize("moves_arms", [False, True])
+def test_the_joints_that_it_moves_take_its_gains_and_legs_and_waist_its_posture(
+    robot: Robot, adapter: Adapter, moves_arms: bool
+) -> None:
     posture = np.where(["knee" in name for name in robot.joints], 0.5, robot.default_position)
-    made = load_robot(robot_of(replace(adapter, default=posture), robot, "eval.public"))
+    unused = posture + 0.1 * np.isin(np.arange(len(posture)), robot.interaction)
+    made = load_robot(robot_of(replace(adapter, default=unused), robot, "eval.public", moves_arms=moves_arms))
     for index in robot.support:
         assert (made.kp[index], made.kd[index]) == (40.0, 2.5)
-    np.testing.assert_array_equal(made.kp[robot.interaction], robot.kp[robot.interaction])
+    np.testing.assert_array_equal(made.kp[robot.interaction], 40.0 if moves_arms else robot.kp[robot.interaction])
     np.testing.assert_array_equal(made.default_position, posture)
     np.testing.assert_array_equal(made.effort, robot.effort)
 

@@ -99,6 +99,15 @@ def test_arms_can_appear_at_rest_in_the_default_posture(robot: Robot, adapter: A
     assert (seen.joint_velocity[0, legs] == 2.0).all()
 
 
+def test_arms_that_it_moves_get_their_targets_beside_the_action(robot: Robot, adapter: Adapter) -> None:
+    own = Watched(robot, adapter, CONTROLLER.model_copy(update={"arms": "own"})).act()[0]
+    support = len(robot.support)
+    np.testing.assert_array_equal(own[:support], Watched(robot, adapter).act()[0])
+    places = [adapter.joints.index(robot.joints[joint]) for joint in robot.interaction]
+    expected = adapter.default[places] + adapter.scale[places] * np.array(places) / 100
+    np.testing.assert_allclose(own[support:], expected, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("by_term", "first", "second"),
     [

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,14 @@ from stage_jobs import make_job
 from stand_ins import holosoma_file, linear
 from typer.testing import CliRunner
 
+from iowbc.adapters.holosoma import adapter as holosoma_adapter
 from iowbc.adapters.source import load_adapter, policy_digest
 from iowbc.cli import app
-from iowbc.commands.bench_carry import carry, suite_digest
+from iowbc.commands.bench_carry import SUITES, carry, suite_digest
 from iowbc.control.references import ReferenceLayer
 from iowbc.evaluation.acting import evaluated_policy
 from iowbc.evaluation.trials.batch_policy import PolicyInBatch
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
+from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, planned_sweeps
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.recipe.evaluation.sequences import WALKING
@@ -34,6 +36,7 @@ from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import Robot, robot_folder
 from iowbc.stages import eval as evaluate
 from iowbc.task.specification import Specification
+from iowbc.task.vector.vector_env import VectorEnv
 
 pytestmark = pytest.mark.integration
 
@@ -92,6 +95,28 @@ def test_its_robot_has_its_gains_and_starts_in_its_posture(file: Path) -> None:
     assert np.abs(outcome.trace.action).max() < 1e-5, "a network of zeros asks for the posture that it starts in"
 
 
+@pytest.mark.parametrize(
+    ("arms", "moved"), [("measured", [False, False]), ("free", [True, False]), ("own", [True] * 2)]
+)
+def test_arms_of_its_own_go_to_the_posture_that_it_asks_for(file: Path, arms: str, moved: list[bool]) -> None:
+    asked = recipe(file)
+    assert asked.eval.public is not None
+    public = asked.eval.public.model_copy(update={"arms": arms})
+    asked = asked.model_copy(update={"eval": asked.eval.model_copy(update={"public": public})})
+    world = evaluated_world(Specification(asked, robot_folder("g1")))
+    script = command_script(WALKING, world.recipe.task.commands)
+    episodes = tuple(Condition("lift", script).episode(mass, 5) for mass in (0.0, 1.0))
+    environment = VectorEnv(world, num_envs=2, workers=0, seed=0, episodes=episodes)
+    policy, seen = evaluated_policy(world, None), environment.reset()
+    policy.reset(np.ones(2, np.bool_))
+    environment.step(policy.act(seen[:, environment.layout.observation], seen[:, environment.layout.privileged]))
+    robot, batch = environment.batch.robot, environment.batch
+    own = holosoma_adapter(file)
+    posture = [own.default[own.joints.index(robot.joints[joint])] for joint in robot.interaction]
+    away = np.abs(batch.simulation.target[:, robot.interaction] - posture).max(axis=1)
+    assert list(away < 1e-6) == moved
+
+
 def test_a_trial_is_the_same_whichever_it_is_played_with(file: Path) -> None:
     world = evaluated_world(Specification(recipe(file), robot_folder("g1")))
     script = command_script(WALKING, world.recipe.task.commands)
@@ -123,37 +148,54 @@ def test_upright_references_leave_out_height_and_pitch(robot: Robot) -> None:
 
 
 @pytest.fixture
-def suite(tmp_path: Path) -> Path:
-    """The suite of the bench at the smallest size."""
-    lifting = SHORT["lifting"] | {"undisturbed": [], "with_share": []}
-    changes = SHORT | {"lifting": lifting, "scripts": None, "pushing": None}
-    written = tmp_path / "suite.yaml"
-    written.write_text(yaml.safe_dump({"extends": str(RECIPES / "public" / "carry.yaml"), "eval": changes}))
-    return written
+def suites(tmp_path: Path) -> dict[str, Path]:
+    """The suites of the bench at the smallest size; MuJoCo stands in for Drake."""
+    files = {engine: tmp_path / f"suite_{engine}.yaml" for engine in SUITES}
+    for engine, written in files.items():
+        lifting = SHORT["lifting"] | {"undisturbed": [], "with_share": [], "no_object": engine == "mujoco"}
+        changes = SHORT | {"lifting": lifting, "scripts": None, "pushing": None}
+        written.write_text(yaml.safe_dump({"extends": str(RECIPES / "public" / "carry.yaml"), "eval": changes}))
+    return files
 
 
 def test_the_bench_writes_a_page_with_the_digests_of_controller_adapter_and_suite(
-    file: Path, suite: Path, tmp_path: Path
+    file: Path, suites: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: "1.2.3")
     adapter, page = tmp_path / "mine.py", tmp_path / "page.md"
     adapter.write_text("from iowbc.adapters.holosoma import adapter\n")
-    carry(str(file), str(adapter), arms="measured", posture=False, workers=1, out=page, suite=suite)
+    carry(str(file), str(adapter), arms="measured", posture=False, workers=1, out=page, suites=suites)
     text = page.read_text()
     assert f"walker.onnx, SHA-256 {policy_digest(file)}" in text
     assert f"mine.py, SHA-256 {hashlib.sha256(adapter.read_bytes()).hexdigest()}" in text
-    assert f"SHA-256 {suite_digest(load_recipe(suite).recipe)}" in text
-    assert "| lifting | no object | 1/1 |" in text
-    assert "| 2, 1 a cell;" in text
+    for label, engine, played in (("suite", "mujoco", 2), ("in Drake 1.2.3", "drake", 1)):
+        digest = suite_digest(load_recipe(suites[engine]).recipe)
+        assert f"| {label} | suite_{engine} of iowbc {version('iowbc')}, SHA-256 {digest}; {played} trials, 1 a" in text
+    alone, lifted = text.split("| --- |\n")[-1].splitlines()[:2]
+    assert alone.startswith("| lifting | no object | 1/1 |")
+    assert alone.endswith("| – | – | – |"), "its suite in Drake has no such cell"
+    assert "| 1/1 | 1/1 |" in lifted[-24:], "one engine stands in for the other, so that the outcomes are alike"
+
+
+def test_every_trial_in_drake_is_one_of_the_bench() -> None:
+    whole, cells = (load_recipe(RECIPES / "public" / file).recipe for file in SUITES.values())
+    assert cells.eval.engine == "drake"
+    planned, part = ([trial for sweep in planned_sweeps(one) for trial in sweep.named()] for one in (whole, cells))
+    assert len(part) == 40
+    assert all(trial in planned for trial in part)
 
 
 def test_the_tutorial_plays_a_controller_of_ones_own(
-    suite: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    suites: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: None)
     monkeypatch.chdir(tmp_path)
     write("tutorials/controller.md", tmp_path)
     policy = linear(tmp_path / "walker.onnx", np.zeros((15, 55), np.float32), np.zeros(15, np.float32))
-    carry("walker.onnx", "my_adapter.py", arms="measured", posture=True, workers=1, out=Path("page.md"), suite=suite)
-    assert "height and pitch" in Path("page.md").read_text()
+    carry("walker.onnx", "my_adapter.py", arms="measured", posture=True, workers=1, out=Path("page.md"), suites=suites)
+    page = Path("page.md").read_text()
+    assert "height and pitch" in page
+    assert "| in Drake | not installed: pip install 'iowbc[drake]' |" in page
     (tmp_path / "recipes" / "public").symlink_to(RECIPES / "public")
     (tmp_path / "recipes" / "full.yaml").symlink_to(RECIPES / "full.yaml")
     digest = hashlib.sha256(policy.read_bytes()).hexdigest()
@@ -176,11 +218,13 @@ def test_the_digest_of_a_suite_changes_with_its_trials_alone() -> None:
         (["walker.onnx", "--adapter", "holosom"], "--adapter holosom: no such file; give a Python file, or one of"),
         (["walker.onnx", "--adapter", "holosoma"], "walker.onnx: is not there"),
         (["walker.onnx", "--adapter", "holosoma", "--out", "page.txt"], "a page is a Markdown file"),
+        (["walker.onnx", "--adapter", "holosoma", "--engine", "both"], "--engine both: Drake is not installed: pip"),
     ],
 )
 def test_the_bench_says_what_is_wrong_before_it_plays(
     words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: None)
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["bench", "carry", *words])
     assert message in str(done.exception)

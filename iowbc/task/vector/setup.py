@@ -50,8 +50,9 @@ class Setup:
         robot = load_robot(self.specification.robot)
         extra = {} if self.episodes is None else trial_signals(len(robot.joints), len(robot.support))
         recipe = self.specification.recipe
-        terms = len(term_names(recipe.task.reward))
-        return buffer_fields(full_layout(recipe, robot).size, len(robot.support), terms, extra)
+        terms, public = len(term_names(recipe.task.reward)), recipe.eval.public
+        actions = len(robot.support) + (len(robot.interaction) if public is not None and public.moves_arms else 0)
+        return buffer_fields(full_layout(recipe, robot).size, actions, terms, extra)
 
     def batch(self, first: int, last: int, buffers: Buffers) -> Batch:
         """The environments from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
