@@ -127,6 +127,9 @@ def robot_sim(
         typer.Option(help="Initial support of the robot (default: band; with an object: fixture)."),
     ] = None,
     release: Annotated[float, typer.Option(help="Time at full gains before the support releases [s].", min=0.0)] = 3.0,
+    object_pose: Annotated[
+        str | None, typer.Option(help="Send the object's pose to udp:PORT of this machine, as motion capture would.")
+    ] = None,
     lockstep: InStep = False,
     seconds: Seconds = float("inf"),
     web: Web = False,
@@ -145,6 +148,7 @@ def robot_sim(
         seed=seed,
         support=support,
         release=release,
+        object_pose=object_pose,
         lockstep=lockstep,
         seconds=seconds,
         port=page_port(web, port),

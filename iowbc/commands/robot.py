@@ -135,11 +135,15 @@ def simulated_robot(
     seed: int,
     support: Literal["band", "fixture", "none"] | None,
     release: float,
+    object_pose: str | None,
     lockstep: bool,
     seconds: float,
     port: int | None,
 ) -> None:
-    """Simulate a robot on the bus until it is stopped; `port` of a page that shows it, None for no page."""
+    """Simulate a robot on the bus until it is stopped; `port` of a page that shows it, None for no page.
+
+    `object_pose`: `udp:PORT` to which the object's pose is sent, None to send none.
+    """
     require_bus("robot-sim")
     require_training("robot-sim")
     if port is not None:
@@ -147,11 +151,13 @@ def simulated_robot(
         require_free(port)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
-    from iowbc.onboard.operators import Ranges
+    from iowbc.onboard.operators import Ranges, pose_port
     from iowbc.twin.process import serve
     from iowbc.twin.robot import Twin
     from iowbc.twin.support import Support
+    from iowbc.twin.tracking import ObjectTracking
 
+    tracking = None if object_pose is None else ObjectTracking(pose_port(object_pose))
     folder = exported_folder(what)
     world, controller = exported_world(folder), Controller.load(folder)
     simulation = world.recipe.simulation
@@ -177,6 +183,8 @@ def simulated_robot(
 
     def watch(robot: Twin) -> None:
         nonlocal told, view
+        if tracking is not None:
+            tracking.send(robot)
         if view is not None and robot.periods % POLLING == 0:
             try:
                 _show(robot, view)
@@ -193,6 +201,8 @@ def simulated_robot(
     serve(bus, twin, going, lockstep=lockstep, each=watch, answer=bus.answer_mode_requests)
     tell(console, twin.verdict)
     bus.close()
+    if tracking is not None:
+        tracking.close()
     if view is not None:
         view.close()
 

@@ -221,16 +221,21 @@ def operator(kind: str, contract: Contract) -> Remote | Keyboard | Udp:
         return Remote(ranges)
     if kind == "keyboard":
         return Keyboard(ranges)
-    return _udp(kind, ranges, f"--commands {kind}: valid: remote, keyboard, udp:PORT")
+    return Udp(ranges, _port(kind, f"--commands {kind}: valid: remote, keyboard, udp:PORT"))
 
 
 def object_poses(kind: str, contract: Contract) -> Udp:
     """The source of the object's pose that `--object-pose` names. Raises UsageError."""
-    return _udp(kind, Ranges(contract), f"--object-pose {kind}: valid: udp:PORT")
+    return Udp(Ranges(contract), pose_port(kind))
 
 
-def _udp(kind: str, ranges: Ranges, refusal: str) -> Udp:
+def pose_port(kind: str) -> int:
+    """The port that `--object-pose` names. Raises UsageError."""
+    return _port(kind, f"--object-pose {kind}: valid: udp:PORT")
+
+
+def _port(kind: str, refusal: str) -> int:
     name, _, port = kind.partition(":")
-    if name == "udp" and port.isdecimal() and 0 <= int(port) < 65536:
-        return Udp(ranges, int(port))
+    if name == "udp" and port.isdecimal() and int(port) < 65536:
+        return int(port)
     raise UsageError(refusal)

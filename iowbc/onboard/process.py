@@ -28,7 +28,7 @@ FAREWELL = 0.5
 REALTIME_PRIORITY = 60
 """Above ordinary threads of the kernel's real-time class, below its own."""
 KEPT_TIMES = 1 << 20
-"""Turns of which times are kept for the statistics: 35 minutes."""
+"""Latest turns of which times are kept for the statistics: 35 minutes."""
 
 
 class Clock(Protocol):
@@ -136,7 +136,8 @@ def drive(
     stopped: Callable[[], bool] = lambda: False,
 ) -> Times:
     """Drives the robot until `stopped` or for some time [s], and damps it at the end."""
-    kept: tuple[list[float], list[float]] = ([], [])
+    kept = np.full((2, KEPT_TIMES), np.nan, np.float32)  # in memory from the beginning
+    turns = 0
     begin: float | None = None
     leaving: float | None = None
     while True:
@@ -160,11 +161,10 @@ def drive(
                 log.add("event", now, text=event, state=machine.state)
         if log is not None:
             log.turn(given, command)
-        if len(kept[0]) < KEPT_TIMES:
-            kept[0].append(clock.late)
-            kept[1].append(time.perf_counter() - started)
+        kept[:, turns % KEPT_TIMES] = clock.late, time.perf_counter() - started
+        turns += 1
         if leaving is not None and now - leaving >= FAREWELL:
-            times = Times(np.array(kept[0]), np.array(kept[1]))
+            times = Times(*kept[:, :turns])
             if log is not None:
                 log.add("timing", now, text=str(times))
             return times

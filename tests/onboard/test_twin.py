@@ -9,14 +9,19 @@ import pytest
 
 from iowbc.commands.robot import _show
 from iowbc.deploy.controller import Controller
+from iowbc.errors import UsageError
 from iowbc.evaluation.exported import exported_world
 from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
+from iowbc.onboard.limits import Limits
+from iowbc.onboard.machine import Inputs, Machine, State, Wanted
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import Ranges
+from iowbc.onboard.operators import Ranges, object_poses
+from iowbc.onboard.process import PERIOD
 from iowbc.sim.rendering.forces import Force
 from iowbc.twin.robot import SILENCE, Twin
 from iowbc.twin.support import Support
+from iowbc.twin.tracking import ObjectTracking
 
 pytestmark = pytest.mark.integration
 
@@ -93,6 +98,38 @@ def test_a_fixture_is_released_when_asked_and_a_band_lowers_the_robot_and_slacke
             assert band.waits == fixture.rigid == (turn == 5)
     assert np.flatnonzero(released).tolist() == [10]
     assert not band.force(np.zeros(3), np.zeros(3)).any()
+
+
+def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot_sends(sighted: Path) -> None:
+    controller = Controller.load(sighted)
+    machine, standing = Machine(controller, "lift", Limits(ramp=0.1)), Ranges(controller.contract).standing
+    fixed = {"impulse_scale": 0.0, "push_scale": 0.0, "partner_share": 0.0, "object_mass": 4.0}
+    posture = controller.settled_posture(standing)[0]
+    simulation = exported_world(sighted).recipe.simulation
+    twin = Twin(controller.robot, simulation, 50.0, "lift", 0, posture, Support("fixture", 0.2), fixed)
+    poses = object_poses("udp:0", controller.contract)
+    tracking = ObjectTracking(poses.port)
+    requests = {10: State.DAMPING, 20: State.STAND, 100: State.RUN}
+    for turn in range(1500):
+        now = turn * PERIOD
+        pose = poses.wanted(now, None)
+        wanted = Wanted(standing, now, requests.get(turn), pose.seen, pose.seen_at)
+        twin.command(machine.turn(Inputs(now, (twin.state,), wanted)))
+        twin.step()
+        tracking.send(twin)
+    tracking.close()
+    poses.close()
+    assert machine.state is State.RUN
+    assert not twin.fallen
+    assert twin.simulation.state.grasped.all()
+    truth = twin.simulation.state
+    position = truth.base_rotation[0].T @ (truth.object_position[0] - truth.base_position[0])
+    np.testing.assert_allclose(pose.seen["object_position"][0], position, atol=0.05)
+
+
+def test_a_pose_cannot_be_sent_to_port_0() -> None:
+    with pytest.raises(UsageError, match="udp:0"):
+        ObjectTracking(0)
 
 
 class View:
