@@ -22,7 +22,7 @@ from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import Machine, State, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator, Ranges, Seeing, Udp
-from iowbc.onboard.process import Clock, LockStep, MonotonicClock, drive, listen
+from iowbc.onboard.process import Clock, LockStep, MonotonicClock, drive, listen, prefer_this_process
 
 TASKS = {
     "stand": ("free", (), (0.0, 0.0, 0.0)),
@@ -159,6 +159,8 @@ def main() -> None:
     if given.memory:
         measure_memory(folder, given.seconds, given.domain)
         return
+    if given.realtime:
+        print(prefer_this_process())  # as `iowbc robot`; the simulated robot inherits the priority
     passed = dict.fromkeys(given.task or TASKS, 0)
     for seed in range(given.trials):
         for task in passed:
