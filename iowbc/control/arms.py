@@ -23,14 +23,12 @@ def arm_chains(robot: Robot) -> tuple[list[tuple[Body, ...]], tuple[Body, ...]]:
 def by_arm(values: Array) -> Array:
     """Rows of both arms' joints, (n, arm joints), as (joints of one, 2, n); `by_row` is the inverse."""
     xp = namespace(values)
-    sides: Array = xp.swapaxes(values.reshape(-1, 2, values.shape[-1] // 2), 0, 2)
-    return sides
+    return xp.swapaxes(values.reshape(-1, 2, values.shape[-1] // 2), 0, 2)
 
 
 def by_row(values: Array) -> Array:
     """Values (joints of one, 2, n) as rows (n, arm joints)."""
-    rows: Array = namespace(values).swapaxes(values, 0, 2).reshape(-1, 2 * values.shape[0])
-    return rows
+    return namespace(values).swapaxes(values, 0, 2).reshape(-1, 2 * values.shape[0])
 
 
 class ArmKinematics(Constants):
@@ -100,8 +98,7 @@ class ArmKinematics(Constants):
         xp, cosine, sine = namespace(points), namespace(points).cos(pelvis_pitch), namespace(points).sin(pelvis_pitch)
         x, y, z = xp.swapaxes(points, 0, 2)
         at_pelvis = stacked([cosine * x - sine * z, y, sine * x + cosine * z])
-        seen: Array = xp.swapaxes(self._waist.inward(waist.T[:, None], at_pelvis), 0, 2)
-        return seen
+        return xp.swapaxes(self._waist.inward(waist.T[:, None], at_pelvis), 0, 2)
 
     def torso_in_heading(
         self, waist: Array, pelvis_pitch: Array, pelvis_roll: Array | None = None
@@ -121,5 +118,4 @@ def _solved(columns: Array, damping: Array, wanted: Array) -> Array:
     """(JJᵀ + damping)⁻¹ wanted by Cramer's rule, (3, 2, n), of a Jacobian (3, joints, 2, n), damping (3, 3, 2, n)."""
     matrix = (columns[:, None] * columns[None]).sum(2) + damping
     cofactors = crossed(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
-    solved: Array = (cofactors * wanted[None]).sum(1) / (matrix[:, 0] * cofactors[:, 0]).sum(0)
-    return solved
+    return (cofactors * wanted[None]).sum(1) / (matrix[:, 0] * cofactors[:, 0]).sum(0)

@@ -29,26 +29,22 @@ PLANES = ((1, 2), (2, 0), (0, 1))
 
 def rotated(rotation: Array, vector: Array) -> Array:
     """R v of matrices (..., 3, 3, chains, n) and vectors (..., 3, chains, n)."""
-    turned: Array = (rotation * vector[..., None, :, :, :]).sum(-3)
-    return turned
+    return (rotation * vector[..., None, :, :, :]).sum(-3)
 
 
 def rotated_back(rotation: Array, vector: Array) -> Array:
     """Rᵀ v, shapes as in `rotated`."""
-    turned: Array = (rotation * vector[..., :, None, :, :]).sum(-4)
-    return turned
+    return (rotation * vector[..., :, None, :, :]).sum(-4)
 
 
 def crossed(a: Array, b: Array) -> Array:
     """a × b of vectors (3, ...)."""
-    product: Array = stacked([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-    return product
+    return stacked([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def product(first: Array, second: Array) -> Array:
     """Products of matrices (3, 3, chains, n)."""
-    product: Array = (first[:, :, None] * second).sum(1)
-    return product
+    return (first[:, :, None] * second).sum(1)
 
 
 def turn(axis: int, angle: Array) -> Array:
@@ -60,8 +56,7 @@ def turn(axis: int, angle: Array) -> Array:
     rows[first][first] = rows[second][second] = xp.cos(angle)
     rows[second][first] = xp.sin(angle)
     rows[first][second] = -rows[second][first]
-    matrices: Array = stacked([stacked(row) for row in rows])
-    return matrices
+    return stacked([stacked(row) for row in rows])
 
 
 @dataclass(frozen=True)
@@ -77,8 +72,7 @@ class Frames:
 
     def end(self, point: Array) -> Array:
         """Points (3, chains, n) [m] of the last bodies, in the frame that the chains hang on."""
-        place: Array = self.origin[-1] + rotated(self.rotation[-1], point)
-        return place
+        return self.origin[-1] + rotated(self.rotation[-1], point)
 
     def jacobian(self, point: Array) -> Array:
         """Motion of points (3, chains, n) [m] with each hinge, a_j × (p - o_j), (3, hinges, chains, n)."""
@@ -126,14 +120,12 @@ class Chain(Constants):
     def _local(self, angle: Array) -> Array:
         """Rotation of each body in the frame of the one before, (hinges, 3, 3, chains, n)."""
         xp, by = namespace(angle), angle[:, None, None]
-        turned: Array = self._turn[:, 0] + self._turn[:, 1] * xp.cos(by) + self._turn[:, 2] * xp.sin(by)
-        return turned
+        return self._turn[:, 0] + self._turn[:, 1] * xp.cos(by) + self._turn[:, 2] * xp.sin(by)
 
 
 def _by_hinge(values: Sequence[Sequence[Array]]) -> Array:
     """Constants of each chain's hinges, (hinges, ..., chains, 1)."""
-    constants: Array = np.moveaxis(np.array(values), 0, -1)[..., None].copy()
-    return constants
+    return np.moveaxis(np.array(values), 0, -1)[..., None].copy()
 
 
 @dataclass(frozen=True)
@@ -148,8 +140,7 @@ class _Link:
         """Matrices A, B, C, (3, 3, 3): after the hinge the body is turned by A + B cos θ + C sin θ (Rodrigues)."""
         along = np.outer(self.axis, self.axis)
         quarter = rotations.axis_matrix(self.axis, np.asarray(0.5 * np.pi))
-        parts: Array = self.rotation @ np.stack([along, np.eye(3) - along, quarter - along])
-        return parts
+        return self.rotation @ np.stack([along, np.eye(3) - along, quarter - along])
 
 
 def _links(chain: Sequence[Body]) -> list[_Link]:

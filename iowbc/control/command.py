@@ -43,5 +43,4 @@ def rate_limits(rates: CommandRates) -> Array:
 
 def approach(command: Array, goal: Array, largest_step: Array) -> Array:
     """The command moved towards its goal by at most `largest_step` (11,); commands (n, 11)."""
-    moved: Array = command + (goal - command).clip(-largest_step, largest_step)
-    return moved
+    return command + (goal - command).clip(-largest_step, largest_step)

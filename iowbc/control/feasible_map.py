@@ -52,8 +52,7 @@ class FeasibleMap(Constants):
     def contains(self, height: Array, pitch: Array) -> NDArray[np.bool_]:
         """Whether commands are inside, shape (n,)."""
         clamped_height, clamped_pitch = self.clamp(height, pitch)
-        inside: NDArray[np.bool_] = (clamped_height == height) & (clamped_pitch == pitch)
-        return inside
+        return (clamped_height == height) & (clamped_pitch == pitch)
 
     def save(self, path: Path) -> None:
         """Writes plain arrays."""

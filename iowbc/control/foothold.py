@@ -57,8 +57,7 @@ class FootPlacement(Constants):
         left = (1.0 - swing_progress(foot, gait.stance)) * ((1.0 - gait.stance) / gait.frequency)
         landing = foothold + (wanted - foothold) * (period / (left + feedback.filter_time))
         kept = foothold * float(np.exp(-period / feedback.return_time))
-        placed: Array = (standing * kept + (1.0 - standing) * landing) * running
-        return placed
+        return (standing * kept + (1.0 - standing) * landing) * running
 
     def speed(self, measured: Measured) -> Array:
         """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""

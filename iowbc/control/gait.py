@@ -17,8 +17,7 @@ def wants_to_move(command: Array, gait: GaitPrior) -> Mask:
     """Whether the commanded velocity asks for steps; command (n, 11), result (n,)."""
     xp = namespace(command)
     speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
-    moving: Mask = (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
-    return moving
+    return (speed > gait.moving_speed) | (xp.abs(command[:, 2]) > gait.moving_yaw_rate)
 
 
 def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> Mask:
@@ -29,15 +28,13 @@ def is_falling(measured: Measured, pelvis_pitch: Array, recovery: Recovery) -> M
     xp, gravity, rate = namespace(pelvis_pitch), measured.projected_gravity, measured.base_angular_velocity
     pitch = gravity[:, 0] - xp.sin(pelvis_pitch) + recovery.horizon * rate[:, 1]
     roll = -gravity[:, 1] + recovery.horizon * rate[:, 0]
-    falling: Mask = pitch * pitch + roll * roll > recovery.tilt**2
-    return falling
+    return pitch * pitch + roll * roll > recovery.tilt**2
 
 
 def foot_phase(phase: Array) -> Array:
     """Phase of the left and the right foot, half a stride apart; (n,) to (n, 2), each in [0, 1)."""
     xp, other = namespace(phase), phase + 0.5
-    both: Array = xp.concatenate([phase[:, None], (other - xp.floor(other))[:, None]], -1)
-    return both
+    return xp.concatenate([phase[:, None], (other - xp.floor(other))[:, None]], -1)
 
 
 def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: float) -> tuple[Array, Mask]:
@@ -57,25 +54,21 @@ def advance(phase: Array, stepping: Mask, moving: Mask, gait: GaitPrior, dt: flo
 
 def swing_progress(foot_phase: Array, stance: float) -> Array:
     """How far each foot is through its swing, 0 on the ground and 1 at touch-down; (n, 2) to (n, 2)."""
-    progress: Array = ((foot_phase - stance) / (1.0 - stance)).clip(0.0, 1.0)
-    return progress
+    return ((foot_phase - stance) / (1.0 - stance)).clip(0.0, 1.0)
 
 
 def swing_height(progress: Array, gait: GaitPrior) -> Array:
     """Height of the soles above the ground by the recipe's profile, of their progress in swing, (n, 2) [m]."""
     sine = namespace(progress).sin(np.pi * progress)
-    height: Array = gait.swing_clearance * (sine if gait.profile == "sine" else sine * sine)
-    return height
+    return gait.swing_clearance * (sine if gait.profile == "sine" else sine * sine)
 
 
 def expected_stance(foot_phase: Array, stepping: Mask, stance: float) -> Mask:
     """Which feet should be on the ground, (n, 2); both while the clock rests."""
-    down: Mask = (foot_phase < stance) | ~stepping[:, None]
-    return down
+    return (foot_phase < stance) | ~stepping[:, None]
 
 
 def phase_signal(phase: Array, stepping: Mask) -> Array:
     """(sin 2πφ, cos 2πφ), shape (n, 2); zero while the clock rests, so that standing is its own value."""
     xp, angle = namespace(phase), 2.0 * np.pi * phase
-    signal: Array = xp.stack([xp.sin(angle), xp.cos(angle)], 1) * stepping[:, None]
-    return signal
+    return xp.stack([xp.sin(angle), xp.cos(angle)], 1) * stepping[:, None]

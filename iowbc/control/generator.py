@@ -103,5 +103,4 @@ def input_names(robot: Robot, height: str) -> tuple[str, ...]:
 def _rowwise(x: Array, weight: Array) -> Array:
     """x Wᵀ, (n, in) to (n, out), a product a row: products of whole matrices round otherwise for other numbers of rows,
     and a robot's reference would depend on how many are computed beside it."""
-    product: Array = (x[:, None] @ weight.T)[:, 0]
-    return product
+    return (x[:, None] @ weight.T)[:, 0]

@@ -50,16 +50,14 @@ def joint_deviation(sensed: Sensed) -> Array:
 
 def heading_error(sensed: Sensed) -> Array:
     """How far the base has turned beyond its command, in [-π, π), (n, 1) [rad]; the yaw among the paper's Φ_b."""
-    error: Array = (sensed.measured.heading - sensed.heading_reference + math.pi) % (2.0 * math.pi) - math.pi
-    return error
+    return (sensed.measured.heading - sensed.heading_reference + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def object_orientation(sensed: Sensed) -> Array:
     """Vector part of the object's quaternion with a positive scalar part: axis · sin(angle/2), (n, 3)."""
     quaternion = sensed.measured.object_quaternion
     assert quaternion is not None, "a layout with the object is filled with the object's pose"
-    vector: Array = quaternion[:, 1:] * (1.0 - 2.0 * (quaternion[:, :1] < 0.0))
-    return vector
+    return quaternion[:, 1:] * (1.0 - 2.0 * (quaternion[:, :1] < 0.0))
 
 
 PROPRIOCEPTION: tuple[Part[Sensed], ...] = (

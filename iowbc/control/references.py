@@ -59,8 +59,7 @@ class ReferenceLayer(Constants):
             return command
         height, pitch = self.feasible.clamp(command[:, HEIGHT], command[:, PITCH])
         parts = [command[:, :HEIGHT], height[:, None], pitch[:, None], command[:, OFFSET]]
-        clamped: Array = namespace(command).concatenate(parts, 1)
-        return clamped
+        return namespace(command).concatenate(parts, 1)
 
     def startable(self, command: Array) -> Array:
         """The command with the posture in which an episode can start, (n, 11): without a generator the default one."""
@@ -117,13 +116,11 @@ class ReferenceLayer(Constants):
         moving, recovery = wants_to_move(command, self._settings), self._settings.recovery
         if recovery is None:
             return moving
-        caught: Mask = moving | is_falling(measured, self.start_pitch(support, command), recovery)
-        return caught
+        return moving | is_falling(measured, self.start_pitch(support, command), recovery)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""
-        pitch: Array = command[:, PITCH] - support[:, self._waist_pitch].sum(1)
-        return pitch
+        return command[:, PITCH] - support[:, self._waist_pitch].sum(1)
 
     def start_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch at which the feet of a posture are flat, (n,) [rad]: zero for the default posture."""
@@ -140,8 +137,7 @@ class ReferenceLayer(Constants):
     def wrists(self, command: Array, grasp: Array) -> Array:
         """x_wrist in the heading frame, ahead of the base grasp where the torso leans forward, (n, 2, 3) [m]."""
         lean = namespace(command).sin(command[:, PITCH]).clip(0.0, None)
-        wrists: Array = grasp + command[:, OFFSET].reshape(-1, 2, 3) + lean[:, None, None] * self._ahead
-        return wrists
+        return grasp + command[:, OFFSET].reshape(-1, 2, 3) + lean[:, None, None] * self._ahead
 
     def arm_target(
         self, arms: Array, support: Array, command: Array, load: Array, frames: Frames | None = None
@@ -154,5 +150,4 @@ class ReferenceLayer(Constants):
         xp, pitch = namespace(command), self.pelvis_pitch(support, command)
         down = xp.stack([xp.sin(pitch), 0.0 * pitch, -xp.cos(pitch)], 1)
         torque = self._gravity.torque(arms, support[:, self.waist], down, 0.5 * load[:, None], frames)
-        target: Array = arms + torque * self._compliance
-        return target
+        return arms + torque * self._compliance

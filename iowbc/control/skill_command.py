@@ -52,8 +52,7 @@ class SkillCommand:
 
     def action_of(self, command: Array, nominal: Array) -> Array:
         """The action that departs from a nominal command towards another, (n, 11) in [-1, 1]."""
-        action: Array = ((command - nominal) / self._scale).clip(-1.0, 1.0)
-        return action
+        return ((command - nominal) / self._scale).clip(-1.0, 1.0)
 
 
 def _ranges(ranges: object) -> Array:

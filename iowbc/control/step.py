@@ -165,14 +165,12 @@ class ControlStep(Constants):
 
     def _joints(self, support: Array, arms: Array) -> Array:
         """Values of both branches in MJCF order, (n, joints)."""
-        joints: Array = namespace(support).concatenate([support, arms], 1)[:, self._order]
-        return joints
+        return namespace(support).concatenate([support, arms], 1)[:, self._order]
 
     def packed(self, state: State) -> Array:
         """The state as rows, (n, size)."""
         parts = [getattr(state, name).reshape(-1, size) for name, size in self.sizes.items()]
-        rows: Array = namespace(parts[0]).concatenate(parts, 1)
-        return rows
+        return namespace(parts[0]).concatenate(parts, 1)
 
     def unpacked(self, rows: Array) -> State:
         """The state of rows (n, size)."""

@@ -82,8 +82,7 @@ class Stride(Constants):
         moved = [change, hip_roll, hip_yaw, bend, -change - bend, ankle_roll]
         others = 0.0 * posture[:, : len(self.order) - 2 * len(moved)]
         changes = xp.concatenate([*moved, others], -1)[:, list(self.order)]
-        walked: Array = (posture + changes).clip(self.lower, self.upper)
-        return walked
+        return (posture + changes).clip(self.lower, self.upper)
 
     def _soles(
         self, pitch: Array, ankle_x: Array, command: Array, phase: Array, stepping: Array
@@ -122,8 +121,7 @@ def travel(foot: Array, swing: Array, stance: float) -> Array:
     """
     slope = (1.0 - stance) / stance
     forth = swing * swing * (3.0 - 2.0 * swing) - slope * swing * (1.0 - swing) * (1.0 - 2.0 * swing)
-    place: Array = namespace(foot).where(foot < stance, 0.5 - foot / stance, forth - 0.5)
-    return place
+    return namespace(foot).where(foot < stance, 0.5 - foot / stance, forth - 0.5)
 
 
 def _ankle(legs: Legs, knee: Array) -> tuple[Array, Array]:
@@ -155,5 +153,4 @@ def _sideways(legs: Legs, thigh: Array, knee: Array, left: Array, turn: Array) -
 
 def _forward(x: Array, z: Array) -> Array:
     """Pitch that turns straight down into a vector of the sagittal plane, [rad]."""
-    pitch: Array = namespace(x).arctan2(-x, -z)
-    return pitch
+    return namespace(x).arctan2(-x, -z)

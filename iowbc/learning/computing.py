@@ -55,5 +55,4 @@ def reduced(precision: Precision) -> AbstractContextManager[None]:
     used twice would sometimes sum its gradients in bfloat16.
     """
     wanted = precision == "bfloat16" or (precision == "auto" and has_bfloat16())
-    context: AbstractContextManager[None] = torch.autocast("cpu", torch.bfloat16, enabled=wanted, cache_enabled=False)
-    return context
+    return torch.autocast("cpu", torch.bfloat16, enabled=wanted, cache_enabled=False)

@@ -23,8 +23,7 @@ class MlpEncoder(nn.Module):
         self.whole = nn.Sequential(nn.Linear(history * features, latent), activate())
 
     def forward(self, history: Tensor) -> Tensor:
-        latent: Tensor = self.whole(self.frame(history).flatten(1))
-        return latent
+        return self.whole(self.frame(history).flatten(1))
 
 
 class MirroredEncoder(nn.Module):

@@ -65,8 +65,7 @@ class HistoryEnvironments(VecEnvWrapper):  # type: ignore[misc]
 
     def statistics(self) -> dict[str, float]:
         """Figures since the last call."""
-        figures: dict[str, float] = self.venv.statistics()
-        return figures
+        return self.venv.statistics()
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Everything that the future depends on."""

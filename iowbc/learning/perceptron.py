@@ -92,8 +92,7 @@ class DenseMlp(VectorPerceptron):
         return seen, [(weight, seen)]
 
     def head(self, hidden: Hidden) -> Tensor:
-        output: Tensor = self.last(hidden[0].float())
-        return output
+        return self.last(hidden[0].float())
 
     def initialize(self, gain: float, last: float) -> None:
         for layer in (*self.layers, self.last):

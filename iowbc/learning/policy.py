@@ -115,9 +115,7 @@ class ActorCritic(ActorCriticPolicy):  # type: ignore[misc]
         return self.action_dist.proba_distribution(self._mean(obs), self.log_std)
 
     def predict_values(self, obs: Tensor) -> Tensor:
-        values: Tensor = self.critic(self.normalizer(obs))
-        return values
+        return self.critic(self.normalizer(obs))
 
     def _mean(self, obs: Tensor) -> Tensor:
-        mean: Tensor = self.actor(self.normalizer(obs))
-        return mean
+        return self.actor(self.normalizer(obs))

@@ -125,12 +125,10 @@ class SymmetricMlp(VectorPerceptron):
         self.last = SymmetricHead(hidden[-1], outputs)
 
     def prepare(self, x: Tensor) -> Tensor:
-        prepared: Tensor = self.basis(x)
-        return prepared
+        return self.basis(x)
 
     def hidden(self, prepared: Tensor) -> Hidden:
-        parts: Hidden = self.layers(*self.basis.split(self.looked_at(prepared)))
-        return parts
+        return self.layers(*self.basis.split(self.looked_at(prepared)))
 
     def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
         hidden = torch.zeros(len(self.basis.matrix))
@@ -147,8 +145,7 @@ class SymmetricMlp(VectorPerceptron):
 
     def head(self, hidden: Hidden) -> Tensor:
         sums, differences = hidden
-        output: Tensor = self.last(sums.float(), differences.float())
-        return output
+        return self.last(sums.float(), differences.float())
 
     def initialize(self, gain: float, last: float) -> None:
         self.layers.initialize(gain)

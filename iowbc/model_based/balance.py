@@ -163,8 +163,7 @@ class Balance:
         forward = sum(self.data.oMf[sole].rotation[:, 0] for sole in self.support.soles)
         yaw = np.arctan2(forward[1], forward[0])
         wanted_rotation = pinocchio.utils.rotate("z", yaw) @ sample.torso_rotation()
-        error: Array = pinocchio.log3(wanted_rotation @ self.data.oMf[self.support.torso].rotation.T)
-        return error
+        return pinocchio.log3(wanted_rotation @ self.data.oMf[self.support.torso].rotation.T)
 
     def _jacobian(self, frame: int) -> Any:
         return pinocchio.getFrameJacobian(self.model, self.data, frame, WORLD)

@@ -23,8 +23,7 @@ def filter_gains(period: float, settings: Estimation, angle: float, rate: float)
     process = np.outer(push, push) + np.diag([0.0, 0.0, period * settings.load_drift**2])
     noise = np.diag(np.maximum([angle, rate], SMALLEST_NOISE) ** 2)
     covariance = solve_discrete_are(step.T, seen.T, process, noise)
-    gains: Array = np.linalg.solve(seen @ covariance @ seen.T + noise, seen @ covariance).T
-    return gains
+    return np.linalg.solve(seen @ covariance @ seen.T + noise, seen @ covariance).T
 
 
 class MotionFilter:

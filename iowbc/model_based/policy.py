@@ -69,8 +69,7 @@ class ModelPolicy:
         motion.advance(index, solution.acceleration[3:])
         planned = v[6:] + self._period * solution.acceleration[6:]
         target = ahead[7:] + (solution.torque + self._kd * planned) / self._kp
-        action: Array = (target - reference) / self._scale
-        return action
+        return (target - reference) / self._scale
 
     def _filter(self, n: int) -> MotionFilter:
         return MotionFilter(n, len(self._scale), self._period, self._settings.estimation)

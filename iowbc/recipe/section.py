@@ -181,8 +181,7 @@ class Unfitting(ValueError):
 def deciding(section: Section) -> dict[str, Any]:
     """The values of a section that decide results, as JSON data, however deep, without its cosmetic fields and without
     later ones at their default."""
-    kept: dict[str, Any] = _deciding(section, section.model_dump(mode="json"))
-    return kept
+    return _deciding(section, section.model_dump(mode="json"))
 
 
 def _deciding(value: Any, plain: Any) -> Any:

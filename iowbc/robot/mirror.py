@@ -25,8 +25,7 @@ class MirrorMap:
 
     def __call__(self, values: Array) -> Array:
         """The mirror image of values, shape (..., size)."""
-        mirrored: Array = self.sign * values[..., self.permutation]
-        return mirrored
+        return self.sign * values[..., self.permutation]
 
     def __len__(self) -> int:
         return len(self.permutation)

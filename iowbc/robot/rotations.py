@@ -12,30 +12,26 @@ def cross(a: Array, b: Array) -> Array:
     """a × b, shapes (..., 3): z, x and y of it from the components of a and b in order and those that follow."""
     before = a * b.take(NEXT, axis=-1)
     before -= a.take(NEXT, axis=-1) * b
-    out: Array = before.take(NEXT, axis=-1)
-    return out
+    return before.take(NEXT, axis=-1)
 
 
 def rotate(quaternion: Array, vector: Array) -> Array:
     """R(q) v: from the rotated frame into the outer one; shapes (..., 4) and (..., 3)."""
     axis = quaternion[..., 1:]
     t = 2.0 * cross(axis, vector)
-    rotated: Array = vector + quaternion[..., :1] * t + cross(axis, t)
-    return rotated
+    return vector + quaternion[..., :1] * t + cross(axis, t)
 
 
 def rotate_inverse(quaternion: Array, vector: Array) -> Array:
     """R(q)ᵀ v: from the outer frame into the rotated one; shapes (..., 4) and (..., 3)."""
     axis = quaternion[..., 1:]
     t = 2.0 * cross(axis, vector)
-    rotated: Array = vector - quaternion[..., :1] * t + cross(axis, t)
-    return rotated
+    return vector - quaternion[..., :1] * t + cross(axis, t)
 
 
 def normalized(quaternion: Array) -> Array:
     """The quaternion scaled to unit length; shape (..., 4)."""
-    unit: Array = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
-    return unit
+    return quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
 
 
 def from_euler(roll: Array, pitch: Array, yaw: Array) -> Array:
@@ -56,14 +52,12 @@ def from_euler(roll: Array, pitch: Array, yaw: Array) -> Array:
 
 def lean_of(rotation: Array) -> Array:
     """Lean against gravity, positive forward: atan2(-R₂₀, R₂₂) of matrices (..., 3, 3), shape (...) [rad]."""
-    lean: Array = np.arctan2(-rotation[..., 2, 0], rotation[..., 2, 2])
-    return lean
+    return np.arctan2(-rotation[..., 2, 0], rotation[..., 2, 2])
 
 
 def roll_of(rotation: Array) -> Array:
     """Roll of Rz Ry Rx, positive to the right: atan2(R₂₁, R₂₂) of matrices (..., 3, 3), shape (...) [rad]."""
-    roll: Array = np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2])
-    return roll
+    return np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2])
 
 
 def matrix(quaternion: Array) -> Array:
@@ -87,5 +81,4 @@ def axis_matrix(axis: Array, angle: Array) -> Array:
     x, y, z = axis
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, versine = np.sin(angle)[..., None, None], (1.0 - np.cos(angle))[..., None, None]
-    rotation: Array = np.eye(3) + sine * skew + versine * (skew @ skew)
-    return rotation
+    return np.eye(3) + sine * skew + versine * (skew @ skew)

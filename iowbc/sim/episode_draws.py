@@ -59,8 +59,7 @@ class DrawTable:
         logarithmic = self._logarithmic
         row[:, logarithmic] = self._low[logarithmic] * self._ratio ** chances[:, logarithmic]
         undrawn = chances[:, self.width :] >= self._probability
-        drawn: Array = np.where(undrawn[:, self._owner], self.nominal, row)
-        return drawn
+        return np.where(undrawn[:, self._owner], self.nominal, row)
 
 
 class Draws:

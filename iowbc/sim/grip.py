@@ -49,8 +49,7 @@ class Grip:
         lag = 0.5 * self._period * stiffness  # a held torque lags half a period and would drive what it should damp
         damping = np.minimum(self._grasp.swing_damping * inertia + lag, stable)
         size = (stiffness * self.angle + damping * rate).clip(-most, most)
-        torque: Array = axis * -size[:, None]
-        return torque
+        return axis * -size[:, None]
 
     def arrays(self) -> dict[str, Array]:
         """The grip's memory, by name."""

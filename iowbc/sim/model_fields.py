@@ -39,8 +39,7 @@ class ModelFields:
     @property
     def body_mass(self) -> Array:
         """Inertia in translation, (n, bodies) [kg]."""
-        mass: Array = self._fields["body_mass"]
-        return mass
+        return self._fields["body_mass"]
 
     @property
     def object_mass(self) -> Array:
@@ -95,14 +94,12 @@ class ModelFields:
     @property
     def rolling_directions(self) -> Array:
         """Those directions, x, y and yaw of each, (n, 9); to be written."""
-        directions: Array = self._fields["wrap_prm"]
-        return directions
+        return self._fields["wrap_prm"]
 
     @property
     def torque_range(self) -> Array:
         """Least and greatest torque of each motor, (n, joints, 2) [N·m]; to be written."""
-        ranges: Array = self._fields["actuator_forcerange"]
-        return ranges
+        return self._fields["actuator_forcerange"]
 
     def place_grips(self, ids: Indices, places: Array) -> None:
         """Where on the object the grips are connected, (k, 2, 3), object frame [m]."""
@@ -119,8 +116,7 @@ class ModelFields:
 
     def half_size(self, ids: Indices) -> Array:
         """Half extents of the object, (k, 3) [m]."""
-        half: Array = self._fields["geom_size"][ids, self._layout.object_geom]
-        return half
+        return self._fields["geom_size"][ids, self._layout.object_geom]
 
     def snapshot(self) -> dict[str, Array]:
         """Copies of all fields that may differ."""

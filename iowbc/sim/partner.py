@@ -333,5 +333,4 @@ class Partner:
 
 def _length(vectors: Array) -> Array:
     """Lengths of the planar parts of vectors, (n, k) to (n,)."""
-    length: Array = np.sqrt(vectors[:, 0] * vectors[:, 0] + vectors[:, 1] * vectors[:, 1])
-    return length
+    return np.sqrt(vectors[:, 0] * vectors[:, 0] + vectors[:, 1] * vectors[:, 1])

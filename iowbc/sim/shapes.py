@@ -44,8 +44,7 @@ class Shape:
     @property
     def size(self) -> Array:
         """Extent along the axes, (3,) [m]."""
-        extent: Array = self.high - self.low
-        return extent
+        return self.high - self.low
 
 
 @functools.cache

@@ -157,14 +157,12 @@ class Simulation:
     def infeasible(self) -> NDArray[np.bool_]:
         """Where a crate resists more than the friction between feet and ground can push against, (n,)."""
         hold = self.drawn["ground_friction"] * self._robot_mass * GRAVITY
-        beyond: NDArray[np.bool_] = self.drawn["rolling_resistance"] > hold
-        return beyond
+        return self.drawn["rolling_resistance"] > hold
 
     @property
     def disturbed(self) -> NDArray[np.bool_]:
         """Where an impulse or a push acts in this control period, (n,)."""
-        acting: NDArray[np.bool_] = np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
-        return acting
+        return np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
 
     @property
     def steered(self) -> NDArray[np.bool_]:
@@ -330,8 +328,7 @@ class Simulation:
         """Force with which the arms press each hand against a held object, (n,) [N]: always the same where friction
         alone holds it, else what friction needs for the palms' part of the load they bore last."""
         needed = self._by_friction * self._borne / np.maximum(self.drawn["surface_friction"], TINY)
-        pressed: Array = self._pressed + np.minimum(needed, self._strength)
-        return pressed
+        return self._pressed + np.minimum(needed, self._strength)
 
     def _keep_divergences(self, world: World, ids: Indices, given: Period) -> None:
         self.divergence_count += len(ids)
@@ -403,13 +400,11 @@ class Simulation:
 
     def partner_handle(self, env: int) -> Array:
         """Where the partner takes hold, (3,) [m]."""
-        place: Array = self._partner.at[env]
-        return place
+        return self._partner.at[env]
 
     def impulse_force(self, env: int) -> Array:
         """The impulse that acts on the object in this control period, world frame, (3,) [N]."""
-        force: Array = self._impulses.force[env] + self.planned_impulse[env]
-        return force
+        return self._impulses.force[env] + self.planned_impulse[env]
 
     def hand_position(self, env: int) -> Array:
         """Positions of the grips, (2, 3) [m]."""

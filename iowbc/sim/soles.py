@@ -54,8 +54,7 @@ class Soles:
     @property
     def _com(self) -> Array:
         """The robot's centre of mass, (n, 1, 3) [m]."""
-        com: Array = self._subtree_com[:, self._layout.base][:, None]
-        return com
+        return self._subtree_com[:, self._layout.base][:, None]
 
     def _slide(self, loaded: Array, pressure: Array) -> Array:
         """Horizontal speed at the centres of pressure [m/s]; zero in the air.
@@ -68,8 +67,7 @@ class Soles:
     def _velocity(self, place: Array) -> Array:
         """Velocity of points of the feet, given from the robot's centre of mass, (n, 2, 3) [m/s]."""
         spatial = self._spatial[:, self._layout.feet]
-        velocity: Array = spatial[..., 3:] + rotations.cross(spatial[..., :3], place)
-        return velocity
+        return spatial[..., 3:] + rotations.cross(spatial[..., :3], place)
 
     def _margin(self, loaded: Array, pressure: Array) -> Array:
         """Distance of the centres of pressure from the edge of the sole [m]; zero in the air.

@@ -35,8 +35,7 @@ class Timing:
                 f"see randomization.longest_latency"
             )
         steps = np.round(latency * self.substeps)
-        delay: Array = np.where(steps > 0.0, (steps - 0.5) * self.timestep, 0.0)
-        return delay
+        return np.where(steps > 0.0, (steps - 0.5) * self.timestep, 0.0)
 
     def longest_stable_step(self, rate: float) -> float:
         """Longest physics step that divides the control period and is below 1 / `rate` [s]."""

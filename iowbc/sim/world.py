@@ -135,8 +135,7 @@ class World:
         feet = self.model.geom_bodyid[points]
         offset = np.broadcast_to(self.model.geom_pos[points], (len(ids), len(points), 3))
         centre = self._body_position[ids][:, feet] + rotations.rotate(self._body_quaternion[ids][:, feet], offset)
-        lowest: Array = np.min(centre[..., 2] - self.model.geom_size[points, 0], axis=1)
-        return lowest
+        return np.min(centre[..., 2] - self.model.geom_size[points, 0], axis=1)
 
     def _place_object(self, ids: Indices, drop: Array, yaw: Array, shift: Array, start: int) -> None:
         turn = rotations.from_euler(np.zeros_like(yaw), np.zeros_like(yaw), yaw)
@@ -166,10 +165,9 @@ class World:
     def _palm_offset(self, ids: Indices) -> Array:
         """From the grips to the centres of the palms, world frame, (k, 2, 3) [m]."""
         local = self.model.geom_pos[self.layout.palms]
-        turned: Array = rotations.rotate(
+        return rotations.rotate(
             self._body_quaternion[ids][:, self.layout.hands], np.broadcast_to(local, (len(ids), 2, 3))
         )
-        return turned
 
     def step(self, given: Period, diverged: Mask) -> None:
         """One control period. Marks in `diverged` the simulations that left the numbers and puts them back."""
@@ -300,8 +298,7 @@ class World:
         velocity = momentum.sum(axis=2)
         velocity /= self.robot_mass[:, None]
         velocity += self.qvel[:, BASE_LINEAR]
-        moved: Array = velocity
-        return moved
+        return velocity
 
     def _gather_object(self, state: SimulationState, thing: int, robot_velocity: Array) -> None:
         place, spatial, position = self.place, self._spatial_velocity[:, thing], self._body_position[:, thing]
@@ -340,8 +337,7 @@ class World:
 
     def hand_position(self, index: int) -> Array:
         """Positions of the grips of one simulation, (2, 3) [m]."""
-        hands: Array = self._sites[index, self.layout.grips].copy()
-        return hands
+        return self._sites[index, self.layout.grips].copy()
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""

@@ -40,7 +40,7 @@ class Trained:
     def prepared(self, inputs: NDArray[np.float32]) -> Tensor:
         """Inputs (..., k), normalised."""
         with torch.inference_mode():
-            return self.network.normalizer(torch.from_numpy(inputs))  # type: ignore[no-any-return]
+            return self.network.normalizer(torch.from_numpy(inputs))
 
     def descend(self, loss: Tensor) -> None:
         """One step of the optimiser."""

@@ -82,8 +82,7 @@ def difficulty(curriculum: Curriculum, played: Array) -> Difficulty:
 
 
 def _scaled(scale: Scale, level: Array) -> Array:
-    factor: Array = np.interp(level, (0.0, 1.0, 2.0), (scale.start, scale.full, scale.extreme))
-    return factor
+    return np.interp(level, (0.0, 1.0, 2.0), (scale.start, scale.full, scale.extreme))
 
 
 def phase(curriculum: Curriculum, levels: Array) -> Array:
@@ -102,8 +101,7 @@ def next_levels(curriculum: Curriculum, levels: Array, played: Array, course: Co
     moved -= curriculum.fall * (_failure(curriculum, played, course) & own)
     ceilings = np.stack([_row(each) for each in (curriculum.balance, curriculum.locomotion, curriculum.extreme)])
     ceiling = np.minimum(ceilings[phase(curriculum, levels) - 1], curriculum.limit)
-    bounded: Array = np.clip(moved, 0.0, np.maximum(ceiling, levels))
-    return bounded
+    return np.clip(moved, 0.0, np.maximum(ceiling, levels))
 
 
 def _success(curriculum: Curriculum, played: Array, course: Course) -> Mask:
@@ -136,5 +134,4 @@ def _row(ceilings: Ceilings) -> Array:
 
 
 def _reached(ceilings: Ceilings, levels: Array, limit: float) -> Mask:
-    reached: Mask = np.all(levels >= np.minimum(_row(ceilings), limit) - ROUNDING, axis=1)
-    return reached
+    return np.all(levels >= np.minimum(_row(ceilings), limit) - ROUNDING, axis=1)

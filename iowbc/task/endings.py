@@ -53,13 +53,12 @@ class Ending:
 
 def fallen(motion: Motion, pitch_command: Array, termination: Termination) -> Mask:
     """Base or torso beyond the limits, (n,); pitch_command (n,) [rad]."""
-    fell: Mask = (
+    return (
         (motion.pelvis_height < termination.pelvis_height)
         | (motion.pelvis_tilt > termination.pelvis_tilt)
         | (np.abs(motion.torso_roll) > termination.torso_roll)
         | (np.abs(motion.torso_pitch - pitch_command) > termination.torso_pitch_error)
     )
-    return fell
 
 
 def lagging(lag: Array, heading_error: Array, followable: Mask, termination: Termination) -> Mask:
@@ -69,8 +68,7 @@ def lagging(lag: Array, heading_error: Array, followable: Mask, termination: Ter
         late |= lag > termination.lag
     if termination.heading_error is not None:
         late |= np.abs(heading_error) > termination.heading_error
-    too_late: Mask = late & followable
-    return too_late
+    return late & followable
 
 
 def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination: Termination) -> Mask:
@@ -79,8 +77,7 @@ def dropped(motion: Motion, place: Array, held: Mask, grasped: Mask, termination
     place: the object's place from the base, heading frame, (n, 3) [m]; grasped: hands that hold, (n, 2).
     """
     distance = np.sqrt(np.square(motion.object_offset - place).sum(axis=1))
-    away: Mask = held & (~grasped.any(axis=1) | (distance > termination.object_distance))
-    return away
+    return held & (~grasped.any(axis=1) | (distance > termination.object_distance))
 
 
 def lost(motion: Motion, place: Array, pushed: Mask, termination: Termination) -> Mask:
@@ -90,5 +87,4 @@ def lost(motion: Motion, place: Array, pushed: Mask, termination: Termination) -
     """
     if termination.object_beside is None:
         return np.zeros(len(pushed), np.bool_)
-    aside: Mask = pushed & (np.abs(motion.object_offset - place)[:, 1] > termination.object_beside)
-    return aside
+    return pushed & (np.abs(motion.object_offset - place)[:, 1] > termination.object_beside)

@@ -105,5 +105,4 @@ class Guidance:
     def object_place(self, memory: Memory) -> Array:
         """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
         wrists = self.references.wrists(memory.command, self.grasp)
-        place: Array = 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place
-        return place
+        return 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place

@@ -99,5 +99,4 @@ def to_heading(rotation: Array, vectors: Array) -> None:
 
 def low_pass(filtered: Array, value: Array, time_constant: float, dt: float) -> Array:
     """One step of y' = (x − y)/T, any shape; exact for a value that is held over the step."""
-    smoothed: Array = filtered + (1.0 - np.exp(-dt / time_constant)) * (value - filtered)
-    return smoothed
+    return filtered + (1.0 - np.exp(-dt / time_constant)) * (value - filtered)

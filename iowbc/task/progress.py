@@ -17,8 +17,7 @@ LEAST = 1e-9
 
 def heading_error(moved: Motion, memory: Memory) -> Array:
     """Heading less its reference, in [-π, π), (n,) [rad]."""
-    error: Array = np.mod(moved.heading - memory.heading_reference + np.pi, 2.0 * np.pi) - np.pi
-    return error
+    return np.mod(moved.heading - memory.heading_reference + np.pi, 2.0 * np.pi) - np.pi
 
 
 def follow(

@@ -16,8 +16,7 @@ def excess_force(hand_force: Array, command: Array, needed: Array) -> Array:
     the hands overcome along the command, (n,) [N].
     """
     speed = np.sqrt(np.vecdot(command, command))
-    force: Array = hand_force[:, :2] + command * (needed / np.maximum(speed, SLOW))[:, None]
-    return force
+    return hand_force[:, :2] + command * (needed / np.maximum(speed, SLOW))[:, None]
 
 
 class Admittance:
@@ -46,8 +45,7 @@ class Admittance:
         change = self._beyond(force)[1] / self._damping[:, None]
         speed = np.sqrt(np.vecdot(change, change))
         change *= np.minimum(1.0, self._recipe.largest_speed / np.maximum(speed, SLOW))[:, None]
-        target: Array = command + change
-        return target
+        return command + change
 
     def unyielded(self, command: Array, force: Array) -> Array:
         """Size of the excess force beyond the margin and b·|v_coll|, or beyond the margin where b is infinite, no more
@@ -57,5 +55,4 @@ class Admittance:
         speed = np.sqrt(np.vecdot(command, command))
         yielding = np.where(np.isinf(self._damping), 0.0, self._damping) * speed
         most = self._recipe.largest_force
-        beyond: Array = (self._beyond(force)[0] - yielding).clip(0.0, most)
-        return beyond
+        return (self._beyond(force)[0] - yielding).clip(0.0, most)

@@ -86,8 +86,7 @@ def fit(
     def loss(x: torch.Tensor, y: torch.Tensor, jacobian: torch.Tensor) -> torch.Tensor:
         error = (network(x) - y) * spread
         task = torch.bmm(jacobian, error.unsqueeze(-1))
-        mean: torch.Tensor = (error.square().sum() + task.square().sum()) / len(x)
-        return mean
+        return (error.square().sum() + task.square().sum()) / len(x)
 
     network = _network([train.inputs.shape[1], *recipe.hidden, train.outputs.shape[1]], generator)
     x, y, jacobian = prepared(train)

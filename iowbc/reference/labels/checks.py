@@ -66,5 +66,4 @@ def mirror_error(robot: Robot, plan: SamplePlan, dataset: Dataset) -> Array | No
         return None
     own = dataset.support[[row[index] for index in images]]
     source = dataset.support[[row[plan.group(index)] for index in images]]
-    error: Array = np.abs(support_mirror(robot)(source) - own).max(axis=1)
-    return error
+    return np.abs(support_mirror(robot)(source) - own).max(axis=1)

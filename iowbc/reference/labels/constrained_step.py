@@ -34,5 +34,4 @@ def constrained_step(
     solution, _, flag, _ = daqp.solve(hessian, linear, rows @ free, upper - shift, lower - shift, sense)
     if flag != SOLVED or not np.isfinite(solution).all():
         raise Rejected("infeasible")
-    step: Array = particular + free @ solution
-    return step
+    return particular + free @ solution

@@ -73,8 +73,7 @@ class SamplePlan:
         place = np.einsum("nij,nsj->nsi", upright, wrist) + origin[:, None]
         everywhere = np.repeat(place, len(self.pitches), axis=0)
         target = self.kinematics.into_torso(np.zeros((len(self.pitches), 3)), self.pitches, everywhere)
-        arms: Array = self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
-        return arms
+        return self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
 
     def _originals(self, unit: Array) -> list[Sample]:
         command = self._commands(unit)
@@ -129,5 +128,4 @@ def _arm_ranges(robot: Robot, recipe: ReferenceGenerator) -> tuple[Array, Array]
 
 def _scale(unit: Array, interval: Interval) -> Array:
     """Numbers in [0, 1) spread over an interval."""
-    spread: Array = interval.low + unit * (interval.high - interval.low)
-    return spread
+    return interval.low + unit * (interval.high - interval.low)

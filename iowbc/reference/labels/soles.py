@@ -64,8 +64,7 @@ def support_edges(robot: Robot, problem: PostureProblem) -> tuple[Array, Array]:
 def support_margin(edges: tuple[Array, Array], point: Array) -> Array:
     """Distance of points (..., 2) to the nearest edge, positive inside [m]."""
     normals, offsets = edges
-    margin: Array = (point @ normals.T + offsets).min(axis=-1)
-    return margin
+    return (point @ normals.T + offsets).min(axis=-1)
 
 
 def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:

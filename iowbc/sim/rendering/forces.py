@@ -39,8 +39,7 @@ class Force:
     @property
     def end(self) -> Array:
         """Where the arrow points, (3,) [m]."""
-        end: Array = self.start + METRES_PER_NEWTON * self.force
-        return end
+        return self.start + METRES_PER_NEWTON * self.force
 
 
 def forces(simulation: Simulation, env: int) -> Iterator[Force]:

@@ -25,8 +25,7 @@ def draw_goals(commands: Commands, key: Keys, difficulty: Difficulty, *, pushing
 def draw_holding_time(commands: Commands, key: Keys) -> Array:
     """Time until the next goal, t ~ U(resampling), (n,) [s]."""
     low, high = commands.resampling
-    held: Array = low + (high - low) * random.uniform(key, "command/time", 1)[:, 0]
-    return held
+    return low + (high - low) * random.uniform(key, "command/time", 1)[:, 0]
 
 
 def _velocities(commands: Commands, key: Keys, difficulty: Difficulty, pushing: Mask) -> Array:
@@ -46,16 +45,14 @@ def _velocities(commands: Commands, key: Keys, difficulty: Difficulty, pushing: 
     velocity[:, :2] *= np.where(short, commands.smallest_speed / np.where(short, speed, 1.0), 1.0)[:, None]
     slow = on_the_spot & (np.abs(velocity[:, 2]) < commands.smallest_yaw_rate)
     velocity[slow, 2] = np.copysign(commands.smallest_yaw_rate, velocity[slow, 2])
-    moving: Array = velocity * (u[:, 5] >= commands.standing_share)[:, None]
-    return moving
+    return velocity * (u[:, 5] >= commands.standing_share)[:, None]
 
 
 def _deep_pitch(commands: Commands, key: Keys, scale: Array) -> Array:
     """α ~ U(deep_pitch)·scale in a share of the commands, zero in the others, (n,) [rad]."""
     u = random.uniform(key, "command/deep", 2)
     low, high = commands.deep_pitch
-    deep: Array = (low + (high - low) * u[:, 0]) * scale * (u[:, 1] < commands.deep_share)
-    return deep
+    return (low + (high - low) * u[:, 0]) * scale * (u[:, 1] < commands.deep_share)
 
 
 def _posture(commands: Commands, key: Keys, scale: Array) -> Array:
@@ -80,5 +77,4 @@ def interpolate(times: Array, values: Array, now: Array) -> Array:
     start, end = times[rows, after - 1], times[rows, after]
     span = np.where(end > start, end - start, 1.0)
     part = np.clip((now - start) / span, 0.0, 1.0)[:, None]
-    between: Array = values[rows, after - 1] * (1.0 - part) + values[rows, after] * part
-    return between
+    return values[rows, after - 1] * (1.0 - part) + values[rows, after] * part

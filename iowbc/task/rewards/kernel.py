@@ -7,12 +7,10 @@ from iowbc.arrays import Array
 
 def kernel(squared_error: Array, width: float | Array) -> Array:
     """exp(−e²/width²), (n,) or (n, k): 1 without error, 0.37 at an error of `width`, one or (k,)."""
-    score: Array = np.exp(squared_error / -(width * width))
-    return score
+    return np.exp(squared_error / -(width * width))
 
 
 def squared_norm(values: Array) -> Array:
     """Sum of squares over all axes but the first, (n, ...) to (n,)."""
     flat = values.reshape(len(values), -1)
-    total: Array = np.vecdot(flat, flat)
-    return total
+    return np.vecdot(flat, flat)

@@ -15,23 +15,19 @@ def orientation(object_quaternion: Array, held: Mask) -> Array:
     """sin² of the angle between the object's vertical axis and gravity, (n,); world orientation (n, 4)."""
     x, y = object_quaternion[:, 1], object_quaternion[:, 2]
     up = 1.0 - 2.0 * (x * x + y * y)
-    tilt: Array = (1.0 - np.square(up)) * held
-    return tilt
+    return (1.0 - np.square(up)) * held
 
 
 def link_contact(force: Array, most: float) -> Array:
     """Force of links other than the hands on the object, no more than `most`, (n,) [N]."""
-    bounded: Array = np.minimum(force, most)
-    return bounded
+    return np.minimum(force, most)
 
 
 def beside(object_offset: Array, place: Array, most: float, pushed: Mask) -> Array:
     """(y_obj − y_hands)², of no more than `most` [m], (n,) [m²]; from the base, heading frame, (n, 3) [m]."""
-    aside: Array = np.square((object_offset[:, 1] - place[:, 1]).clip(-most, most)) * pushed
-    return aside
+    return np.square((object_offset[:, 1] - place[:, 1]).clip(-most, most)) * pushed
 
 
 def vertical_velocity(object_velocity: Array, commanded: Array, held: Mask) -> Array:
     """(ż_obj − ż_command)², (n,) [m²/s²]; world velocity (n, 3), rate of the commanded height (n,) [m/s]."""
-    fluctuation: Array = np.square(object_velocity[:, 2] - commanded) * held
-    return fluctuation
+    return np.square(object_velocity[:, 2] - commanded) * held

@@ -99,8 +99,7 @@ class RewardFunction:
     def _taken_over(self, later: Later, level: Array) -> Array:
         """Change of the weights at levels (n,), (n, terms)."""
         part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
-        change: Array = part[:, None] * self._change
-        return change
+        return part[:, None] * self._change
 
 
 def _weighted(column: int, function: Term, setting: float | Kernel, seconds: float) -> WeightedTerm:

@@ -31,8 +31,7 @@ def effort(torque: Array, limit: Array, comfortable: float) -> Array:
 
 def power(torque: Array, velocity: Array) -> Array:
     """Σ |τ·q̇|, (n,) [W]; joints (n, 29). Braking costs as much as driving: the motors do not recover it."""
-    total: Array = np.vecdot(np.abs(torque), np.abs(velocity))
-    return total
+    return np.vecdot(np.abs(torque), np.abs(velocity))
 
 
 def base_rates(angular_velocity: Array) -> Array:
@@ -42,11 +41,9 @@ def base_rates(angular_velocity: Array) -> Array:
 
 def vertical_velocity(base_velocity: Array, commanded: Array) -> Array:
     """(ż − ż_command)² of the base, (n,) [m²/s²]; velocity (n, 3), rate of the commanded height (n,) [m/s]."""
-    fluctuation: Array = np.square(base_velocity[:, 2] - commanded)
-    return fluctuation
+    return np.square(base_velocity[:, 2] - commanded)
 
 
 def saturation(saturated: Mask) -> Array:
     """Fraction of joints at their torque limit, (n,); joints (n, k)."""
-    fraction: Array = saturated.sum(axis=1) / saturated.shape[1]
-    return fraction
+    return saturated.sum(axis=1) / saturated.shape[1]

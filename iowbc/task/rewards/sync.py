@@ -24,8 +24,7 @@ def system_velocity(velocity: Array, command: Array) -> Array:
 
 def yaw_rate(rate: Array, command: Array) -> Array:
     """(ω − ω_yaw)², (n,) [rad²/s²]; filtered rate (n,)."""
-    squared: Array = np.square(rate - command)
-    return squared
+    return np.square(rate - command)
 
 
 def progress(velocity: Array, command: Array) -> Array:
@@ -35,36 +34,30 @@ def progress(velocity: Array, command: Array) -> Array:
     """
     speed = np.hypot(command[:, 0], command[:, 1])
     along = np.vecdot(velocity, command) / np.maximum(speed, SLOW)
-    clipped: Array = along.clip(-speed, speed)
-    return clipped
+    return along.clip(-speed, speed)
 
 
 def turning(rate: Array, command: Array) -> Array:
     """Yaw rate towards the commanded one, no more than commanded, (n,) [rad/s]."""
     limit = np.abs(command)
-    clipped: Array = (rate * np.sign(command)).clip(-limit, limit)
-    return clipped
+    return (rate * np.sign(command)).clip(-limit, limit)
 
 
 def heading(error: Array) -> Array:
     """(ψ − ψ_ref)², (n,) [rad²]; the reference integrates the commanded yaw rate."""
-    squared: Array = np.square(error)
-    return squared
+    return np.square(error)
 
 
 def height(pelvis_height: Array, command: Array) -> Array:
     """(h − H)², (n,) [m²]."""
-    squared: Array = np.square(pelvis_height - command)
-    return squared
+    return np.square(pelvis_height - command)
 
 
 def torso_pitch(pitch: Array, command: Array) -> Array:
     """(α − α_pitch)², (n,) [rad²]."""
-    squared: Array = np.square(pitch - command)
-    return squared
+    return np.square(pitch - command)
 
 
 def torso_roll(roll: Array) -> Array:
     """roll², (n,) [rad²]. The command asks for none."""
-    squared: Array = np.square(roll)
-    return squared
+    return np.square(roll)

@@ -101,8 +101,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             raise AttributeError(
                 "the environments live in worker processes; make the vector environment with workers=0"
             )
-        batch: Batch = self.workers.batch
-        return batch
+        return self.workers.batch
 
     def reset(self) -> NDArray[np.float32]:
         """Begins an episode everywhere; after `seed` with those seeds."""
