@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from iowbc.benchmarks.bare_loop import wander
-from iowbc.task.vector.messages import GetLevels
 from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, Workers
 
 PARTS = ("physics", "simulation", "references", "reward", "observation", "rest")
@@ -62,7 +62,7 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
     watch.watch(batch.simulation, "step", "simulation")
     watch.watch(batch.guidance, "advance", "references")
     watch.watch(batch.judge, "judge", "reward")
-    watch.watch(batch.observer, "write", "observation")
+    watch.watch(batch, "_observe", "observation")
     rows: list[dict[str, float]] = []
     for _ in range(rounds):
         batch.reset()
@@ -90,7 +90,7 @@ def transfer_time(workers: Workers, rounds: int) -> float:
     for _ in range(rounds):
         begin = time.perf_counter()
         workers.buffers["action"][:] = 0.0
-        workers.ask([GetLevels() for _ in workers.groups])
+        workers.ask([Message("levels", changes=False) for _ in workers.groups])
         workers.answers()
         for name in ("observation", "reward", "done"):
             workers.buffers[name].copy()

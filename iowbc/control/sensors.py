@@ -2,7 +2,7 @@
 
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from typing import Annotated, Self, get_type_hints
+from typing import Annotated, get_type_hints
 
 from iowbc.arrays import Array
 from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, rotation, turn
@@ -50,11 +50,6 @@ class Measured:
         Array | None, Quantity(axial_vector, "rad/s", "base", "object's angular velocity relative to the base")
     ] = None
     """Object's angular velocity relative to the base, base frame, (n, 3) [rad/s]."""
-
-    @classmethod
-    def of(cls, source: object) -> Self:
-        """The same arrays, taken from the attributes of something that has them all."""
-        return cls(**{field.name: getattr(source, field.name) for field in fields(cls)})
 
 
 @cache

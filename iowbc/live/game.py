@@ -72,7 +72,7 @@ class GameSession(Played):
         self._seen = self._game.reset().observations["robot"]
         batch, state = self._game.batch, self._lower.simulation.state
         self._steps, self._grip, batch.hand[:] = 0, None, np.nan
-        away = self._lower.simulation.handle_position - state.object_position
+        away = self._lower.simulation.partner.at - state.object_position
         handle = rotations.rotate_inverse(state.object_quaternion, away)[0]
         self.marks = GameMarks(tuple(path_lines(batch, 0)), handle)
         self._witness = self._witness or Witness(self._lower, self._signals)
@@ -112,8 +112,8 @@ class GameSession(Played):
             self._grip, hand[:] = None, np.nan
             return
         if self._grip is None or self._grip[1] != drag.shift:
-            self._grip = drag.start - simulation.handle_position[0], drag.shift
-            hand[:] = *simulation.handle_position[0, :2], simulation.partner_aim[0, 2]
+            self._grip = drag.start - simulation.partner.at[0], drag.shift
+            hand[:] = *simulation.partner.at[0, :2], simulation.partner.aim[0, 2]
         beside = self._grip[0]
         if drag.shift:
             hand[2] = drag.end[2] - beside[2]
@@ -132,6 +132,6 @@ class GameSession(Played):
         signals["lateral"][:], signals["share"][:] = now.lateral, force[2]
         assert self._witness is not None
         moment = self._witness.look(self._steps * self.period)
-        pull = Force("partner", simulation.partner_handle(0), force * [1.0, 1.0, 0.0])
+        pull = Force("partner", simulation.partner.at[0], force * [1.0, 1.0, 0.0])
         others = tuple(force for force in moment.forces if force.kind != "partner")
         return replace(moment, forces=(pull, *others))

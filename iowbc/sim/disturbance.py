@@ -4,7 +4,7 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.simulation.randomization import Distribution
+from iowbc.recipe.simulation.randomization import Distribution, Impulses, Pushes
 
 
 class Disturbance:
@@ -12,20 +12,19 @@ class Disturbance:
 
     def __init__(
         self,
-        n: int,
-        *,
         name: str,
-        enabled: bool,
-        interval: Distribution,
+        settings: Impulses | Pushes,
         size: Distribution,
-        duration: float,
+        n: int,
         period: float,
+        *,
         level: bool,
     ) -> None:
-        """`size` of the impulse [N·s], or its part per unit of `scale`; `level`: horizontal directions only."""
-        self._name, self._interval, self._size, self._level = name, interval, size, level
-        self._enabled, self._period = enabled, period
-        self._length = max(1, round(duration / period))
+        """`name`: of the random numbers; `size` of the impulse [N·s], or its part per unit of `scale`; `level`:
+        horizontal directions only."""
+        self._name, self._interval, self._size, self._level = name, settings.interval, size, level
+        self._enabled, self._period = settings.enabled, period
+        self._length = max(1, round(settings.duration / period))
         self._next, self._until = np.zeros(n, np.int64), np.zeros(n, np.int64)
         self._count = np.zeros(n, np.int64)
         self.force = np.zeros((n, 3))

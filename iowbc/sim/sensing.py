@@ -3,10 +3,11 @@
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Mask
+from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.simulation import SensorNoise as Recipe
 from iowbc.robot import rotations
 from iowbc.sim.delay import DelayLine
-from iowbc.sim.state import MeasuredState, SimulationState
+from iowbc.sim.state import SimulationState
 
 PLACE, ORIENTATION = slice(0, 3), slice(3, 7)
 SPEED, TURNING = slice(7, 10), slice(10, 13)
@@ -50,7 +51,7 @@ class Sensing:
         self._nominal = _deviations(recipe, columns)
         self.rows = np.zeros((n, columns.width))
         seen = self.rows[:, width:]
-        self.measured = MeasuredState(
+        self.measured = Measured(
             joint_position=self.rows[:, columns.position],
             joint_velocity=self.rows[:, columns.velocity],
             base_angular_velocity=self.rows[:, columns.angular],
@@ -99,11 +100,11 @@ class Sensing:
         inertial[:, 0] += self._gyro_bias
         rows[:, columns.robot] += seen
         rows[:, columns.position] += self._bias
+        quaternion = rows[:, columns.robot.stop :][:, ORIENTATION]
         if not self._see_object:
-            self.measured.object_quaternion[:, 0] = 1.0
+            quaternion[:, 0] = 1.0
             return
         rows[:, columns.robot.stop :] += self._object_line.read()
-        quaternion = self.measured.object_quaternion
         quaternion /= np.sqrt(np.vecdot(quaternion, quaternion))[:, None]
 
     def _sense(self, state: SimulationState) -> None:

@@ -1,8 +1,7 @@
 """n environments stepped in one process: worlds, partner, disturbances, randomisation and sensors."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.errors import UsageError
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
@@ -24,9 +22,9 @@ from iowbc.sim.episode_draws import Draws
 from iowbc.sim.period import Period
 from iowbc.sim.sensing import Sensing
 from iowbc.sim.snapshots import by_environment, by_world
-from iowbc.sim.state import MeasuredState, SimulationState
+from iowbc.sim.state import SimulationState
 from iowbc.sim.timing import Timing
-from iowbc.sim.world import EVERY, World
+from iowbc.sim.world import EVERY, World, make_world
 
 TINY = 1e-9
 """Keeps a division by the friction of an absent object from dividing by zero."""
@@ -75,17 +73,19 @@ class Simulation:
         if len(models) != n:
             raise ValueError(f"{n} environments but {len(models)} scenes")
         timing = Timing(self.period, recipe.physics.timestep, recipe.randomization.longest_latency)
-        make = World if drake is None else _stepped_by(drake)
         self._scenes = tuple(dict.fromkeys(self.scene_names))
+        rows = [np.flatnonzero(np.array(self.scene_names) == name) for name in self._scenes]
         self.worlds = tuple(
-            make(robot, recipe.physics, getattr(recipe.scenes, name), _rows(self.scene_names, name), timing)
-            for name in self._scenes
+            make_world(robot, recipe.physics, _scene(recipe, name), own, timing, drake)
+            for name, own in zip(self._scenes, rows, strict=True)
         )
         self._owner, self._index = np.empty(n, np.int64), np.empty(n, np.int64)
         """World of each environment, and its place there, (n,)."""
         for number, world in enumerate(self.worlds):
             self._owner[world.rows], self._index[world.rows] = number, np.arange(len(world.rows))
         self._draws = Draws(recipe, models, robot)
+        self.drawn = self._draws.values
+        """Everything that is random in the current episodes, by name, (n,) or (n, k)."""
         self.hold(fixed or {})
         self._key = random.environment_key(seed, self.envs)
         self._episode_key = self._key.copy()
@@ -99,31 +99,18 @@ class Simulation:
         """Force on the base in the period to come beside the drawn pushes, world frame, (n, 3) [N]."""
         self.planned_impulse = np.zeros((n, 3))
         """The same on the object's centre of mass, beside the drawn impulses, (n, 3) [N]."""
-        self._partner = partner.Partner(recipe.partner, models, self.period)
+        self.partner = partner.Partner(recipe.partner, models, self.period)
         self._sensing = Sensing(
             recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency, self.period
         )
+        self.measured = self._sensing.measured
+        """What the sensors deliver, refreshed by `reset` and `step`."""
         self._drives = Drives(robot, recipe.physics, n)
-        self._impulses = Disturbance(
-            n,
-            name="impulse",
-            enabled=recipe.impulses.enabled,
-            interval=recipe.impulses.interval,
-            size=recipe.impulses.magnitude,
-            duration=recipe.impulses.duration,
-            period=self.period,
-            level=False,
-        )
-        self._pushes = Disturbance(
-            n,
-            name="push",
-            enabled=recipe.pushes.enabled,
-            interval=recipe.pushes.interval,
-            size=recipe.pushes.speed,
-            duration=recipe.pushes.duration,
-            period=self.period,
-            level=True,
-        )
+        self.motor_effort = self._drives.effort
+        """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
+        impulses, pushes = recipe.impulses, recipe.pushes
+        self._impulses = Disturbance("impulse", impulses, impulses.magnitude, n, self.period, level=False)
+        self._pushes = Disturbance("push", pushes, pushes.speed, n, self.period, level=True)
         self._robot_mass = np.zeros(n)
         held = [model.kind == "lift" for model in models]
         by_contact = np.array([model.grasp.kind == "contact" for model in models]) & held
@@ -139,21 +126,6 @@ class Simulation:
         self.divergence_count = 0
 
     @property
-    def measured(self) -> MeasuredState:
-        """What the sensors deliver, refreshed by `reset` and `step`."""
-        return self._sensing.measured
-
-    @property
-    def drawn(self) -> dict[str, Array]:
-        """Everything that is random in the current episodes, by name, (n,) or (n, k)."""
-        return self._draws.values
-
-    @property
-    def motor_effort(self) -> Array:
-        """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
-        return self._drives.effort
-
-    @property
     def infeasible(self) -> NDArray[np.bool_]:
         """Where a crate resists more than the friction between feet and ground can push against, (n,)."""
         hold = self.drawn["ground_friction"] * self._robot_mass * GRAVITY
@@ -163,26 +135,6 @@ class Simulation:
     def disturbed(self) -> NDArray[np.bool_]:
         """Where an impulse or a push acts in this control period, (n,)."""
         return np.logical_or(self._impulses.force.any(axis=1), self._pushes.force.any(axis=1))
-
-    @property
-    def steered(self) -> NDArray[np.bool_]:
-        """Partners that take `feed` as their own motion, to be written before a reset, (n,); see `Partner.steered`."""
-        return self._partner.steered
-
-    @property
-    def loose(self) -> NDArray[np.bool_]:
-        """Steered partners that exert no horizontal force, to be written, (n,); see `Partner.loose`."""
-        return self._partner.loose
-
-    @property
-    def partner_aim(self) -> Array:
-        """Equilibrium points of the partners' springs, (n, 3) [m]."""
-        return self._partner.aim
-
-    @property
-    def handle_position(self) -> Array:
-        """The objects' far handles, (n, 3) [m]."""
-        return self._partner.at
 
     @property
     def soles(self) -> dict[str, Array]:
@@ -250,7 +202,7 @@ class Simulation:
         self._drives.reset(which, self.drawn)
         self._impulses.reset(which, key)
         self._pushes.reset(which, key)
-        self._partner.reset(which, self.drawn, state)
+        self.partner.reset(which, self.drawn, state)
         self._sensing.reset(which, self.drawn, state)
         self._deliver()
 
@@ -258,7 +210,7 @@ class Simulation:
         """One control period."""
         state, drawn = self.state, self.drawn
         wrench, diverged = state.external_force, state.diverged
-        self._partner.wrench(self.feed, self._noise[:, self._sensing.noise_width :], state, wrench)
+        self.partner.wrench(self.feed, self._noise[:, self._sensing.noise_width :], state, wrench)
         wrench[:, :3] += self._impulses.advance(self.clock, self._episode_key, drawn["impulse_scale"])
         if self.planned_impulse.any():
             wrench[:, :3] += self.planned_impulse
@@ -290,7 +242,7 @@ class Simulation:
             world.release(state, drawn["slip_force"])
         state.joint_acceleration[:] = (state.joint_velocity - speed) / self.period
         self._borne[:] = 0.5 * np.sqrt(np.vecdot(state.grip_force, state.grip_force)).sum(axis=1)
-        self._partner.observe(state)
+        self.partner.observe(state)
         self._sensing.advance(state)
         self._deliver()
 
@@ -350,9 +302,9 @@ class Simulation:
         own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
         own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass, "borne": self._borne}
         parts: dict[str, dict[str, Array]] = {
-            "state": self.state.arrays(),
+            "state": vars(self.state),
             "drawn": self.drawn,
-            "partner": self._partner.arrays(),
+            "partner": self.partner.arrays(),
             "sensing": self._sensing.arrays(),
             "drives": self._drives.arrays(),
             "impulses": self._impulses.arrays(),
@@ -382,7 +334,7 @@ class Simulation:
         for index, world in enumerate(self.worlds):
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
-        for part in (self._partner, self._sensing):
+        for part in (self.partner, self._sensing):
             part.restored()
 
     def world_of(self, env: int) -> tuple[World, int]:
@@ -398,10 +350,6 @@ class Simulation:
         mujoco.mj_forward(model, data)
         return model, data
 
-    def partner_handle(self, env: int) -> Array:
-        """Where the partner takes hold, (3,) [m]."""
-        return self._partner.at[env]
-
     def impulse_force(self, env: int) -> Array:
         """The impulse that acts on the object in this control period, world frame, (3,) [N]."""
         return self._impulses.force[env] + self.planned_impulse[env]
@@ -416,23 +364,8 @@ def _ignore(message: str) -> None:
     """MuJoCo's warnings are read from its counters; without this it prints them and writes a log file."""
 
 
-def _stepped_by(drake: Drake) -> Callable[..., World]:
-    """Makes worlds that Drake steps; imported here alone, for it is an extra."""
-    try:
-        from iowbc.sim.drake.world import DrakeWorld
-    except ModuleNotFoundError as missing:
-        if (missing.name or "").partition(".")[0] != "pydrake":
-            raise
-        raise UsageError("eval.engine: drake is not installed: pip install 'iowbc[drake]'") from None
-    return partial(DrakeWorld, settings=drake)
-
-
 def _scene(recipe: Recipe, name: str) -> Any:
     known = recipe.scenes.names
     if name not in known:
         raise KeyError(f"no scene {name!r}; there are: {', '.join(known)}")
     return getattr(recipe.scenes, name)
-
-
-def _rows(names: Sequence[str], name: str) -> Indices:
-    return np.array([index for index, given in enumerate(names) if given == name])

@@ -1,25 +1,17 @@
-"""What a simulation tells of its environments: the truth, and what the sensors deliver."""
+"""What a simulation tells of its environments: the truth."""
 
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Mask
 
 
-class _Arrays:
-    """Preallocated arrays with a row an environment."""
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays by name; the same objects, not copies."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-
-
 @dataclass(frozen=True)
-class SimulationState(_Arrays):
-    """The truth after a control period. World frame unless said otherwise; quaternions wxyz.
+class SimulationState:
+    """The truth after a control period, in arrays that are overwritten. World frame unless said otherwise; quaternions
+    wxyz.
 
     Forces, torques, accelerations are those of the last physics step; all else is of the state that it led to.
     """
@@ -137,27 +129,3 @@ class SimulationState(_Arrays):
             if field.name.endswith("quaternion"):
                 arrays[field.name][:, 0] = 1.0
         return cls(**arrays)
-
-
-@dataclass(frozen=True)
-class MeasuredState(_Arrays):
-    """What the sensors deliver, with bias, noise and latency. The arrays are views of one row an environment."""
-
-    joint_position: Array
-    """(n, joints) [rad]."""
-    joint_velocity: Array
-    """(n, joints) [rad/s]."""
-    base_angular_velocity: Array
-    """Base frame, (n, 3) [rad/s]."""
-    heading: Array
-    """Yaw of the base as integrated by the inertial unit, (n, 1) [rad]; it drifts."""
-    projected_gravity: Array
-    """Direction of gravity in the base frame, (n, 3); (0, 0, -1) when upright."""
-    object_position: Array
-    """Object's centre from the base, base frame, (n, 3) [m]; zero without an object."""
-    object_quaternion: Array
-    """Object's orientation in the base frame, (n, 4)."""
-    object_linear_velocity: Array
-    """Rate of `object_position`, (n, 3) [m/s]."""
-    object_angular_velocity: Array
-    """Angular velocity of the object relative to the base, base frame, (n, 3) [rad/s]."""

@@ -7,6 +7,8 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from iowbc.arrays import Array, Indices, Mask, as_slice
+from iowbc.errors import UsageError
+from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
@@ -354,6 +356,22 @@ class World:
         self._warnings[...] = values["warnings"]
         self.batch.forward(stage=VELOCITY)
         self._mass_cache()
+
+
+def make_world(
+    robot: Robot, physics: Physics, scene: Scene, rows: Indices, timing: Timing, drake: Drake | None
+) -> World:
+    """The environments of a scene, stepped by MuJoCo, or with settings by Drake. Raises UsageError where that is not
+    installed: it is an extra."""
+    if drake is None:
+        return World(robot, physics, scene, rows, timing)
+    try:
+        from iowbc.sim.drake.world import DrakeWorld
+    except ModuleNotFoundError as missing:
+        if (missing.name or "").partition(".")[0] != "pydrake":
+            raise
+        raise UsageError("eval.engine: drake is not installed: pip install 'iowbc[drake]'") from None
+    return DrakeWorld(robot, physics, scene, rows, timing, drake)
 
 
 def _past(history: Array, place: slice, substeps: int) -> Array:

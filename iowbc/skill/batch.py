@@ -93,6 +93,10 @@ class GameBatch:
         """The student that controls from now on."""
         self.lower.take(student)
 
+    def meet_agent(self, share: float) -> None:
+        """Part of the episodes drawn from now on whose human is that of the actions."""
+        self.drawn.agent_share = share
+
     def reset(self, seeds: Keys | None = None) -> None:
         """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
         from them."""
@@ -127,8 +131,8 @@ class GameBatch:
         person = self.drawn.kind == KINDS.index(PERSON)
         if person.any():
             holding = np.isfinite(self.hand).all(axis=1)
-            simulation.loose[:] = person & ~holding
-            away = np.nan_to_num(self.hand - simulation.partner_aim)
+            simulation.partner.loose[:] = person & ~holding
+            away = np.nan_to_num(self.hand - simulation.partner.aim)
             self._human.reach(person, self.origin.turned(away), self.now)
         lower.human[:] = self._human.advance()
         lower.control()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.setup import GameSetup
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
-from iowbc.task.vector.messages import MakeStep, Message, Reset
+from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 
 PATIENCE = 60.0
@@ -51,30 +51,6 @@ class Outcome:
     and partner are names."""
 
 
-@dataclass(frozen=True)
-class TakeStudent:
-    """Message: the student that controls from now on."""
-
-    student: Student
-    changes: ClassVar[bool] = True
-
-    def carry_out(self, batch: Any) -> None:
-        """See `Message`."""
-        batch.take(self.student)
-
-
-@dataclass(frozen=True)
-class MeetAgent:
-    """Message: part of the drawn episodes whose human is that of the actions."""
-
-    share: float
-    changes: ClassVar[bool] = True
-
-    def carry_out(self, batch: Any) -> None:
-        """See `Message`."""
-        batch.drawn.agent_share = self.share
-
-
 class TransportGame:
     """n games. What comes of them follows from seed and game, however many workers there are."""
 
@@ -104,7 +80,7 @@ class TransportGame:
         self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
         self._buffers = self._workers.buffers
         self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
-        self._call(TakeStudent(student))
+        self._call(Message("take", (student,)))
 
     @property
     def batch(self) -> GameBatch:
@@ -128,9 +104,10 @@ class TransportGame:
         """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
 
         `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
-        self._call(MeetAgent(agent_share))
+        self._call(Message("meet_agent", (agent_share,)))
         groups = self._workers.groups
-        self._workers.ask([Reset(None if seeds is None else seeds[first:last]) for first, last in groups])
+        own = [None if seeds is None else seeds[first:last] for first, last in groups]
+        self._workers.ask([Message("reset", (part,)) for part in own])
         self._workers.answers()
         return self._observed("now")
 
@@ -138,7 +115,7 @@ class TransportGame:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
         finite."""
         self.act(actions)
-        self._call(MakeStep())
+        self._call(Message("step"))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:

@@ -39,7 +39,7 @@ class LowerLayer(Batch):
         self.wanted = np.tile(nominal_command(specification.recipe.task.commands), (self.n, 1))
         """The commands that robots approach, (n, 11)."""
         self.guidance.commander.steer(self.wanted)
-        self.simulation.steered[:] = True
+        self.simulation.partner.steered[:] = True
         self.moved: Motion
         """The motion after the last control step."""
         self.fallen, self.dropped, self.diverged = np.zeros((3, self.n), np.bool_)

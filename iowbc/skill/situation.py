@@ -88,7 +88,7 @@ def situation(
         yaw=yaw,
         yaw_rate=state.object_angular_velocity[:, 2].copy(),
         tilt=np.arccos(up[:, 2].clip(-1.0, 1.0)),
-        handle=origin.turned(simulation.handle_position - origin.position),
+        handle=origin.turned(simulation.partner.at - origin.position),
         handle_velocity=origin.turned(state.handle_velocity),
         heading=wrapped(moved.heading - origin.heading),
         base=origin.turned(state.base_position - origin.position),

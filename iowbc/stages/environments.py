@@ -13,10 +13,10 @@ from iowbc.arrays import Array
 from iowbc.pipeline.stage import Job
 from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.specification import Specification
-from iowbc.task.vector.messages import Message
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
 from iowbc.task.vector.vector_env import VectorEnv
+from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import Workers
 
 if TYPE_CHECKING:

@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Indices, as_slice
+from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
+from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
@@ -23,8 +25,8 @@ from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
-from iowbc.task.observer import Observer
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
+from iowbc.task.privileged import Truth
 from iowbc.task.record.divergences import keep_divergences
 from iowbc.task.record.recorder import count_endings, count_pushes, count_step, write_signals, write_trial_signals
 from iowbc.task.schedule import Schedule
@@ -56,6 +58,8 @@ class Batch:
         self.layout = full_layout(recipe, self.robot)
         self.n = n = len(environments)
         self.period = period = 1.0 / task.control_frequency
+        self._support, self._arms = as_slice(self.robot.support), as_slice(self.robot.interaction)
+        self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
         self.memory = Memory.blank(n, len(self.robot.interaction), len(self.robot.support))
@@ -85,7 +89,7 @@ class Batch:
         )
         self.judge = Judge(
             recipe,
-            as_slice(self.robot.support),
+            self._support,
             lateral=self.robot.lateral,
             holding=self._holding,
             training=episodes is None,
@@ -93,7 +97,6 @@ class Batch:
         )
         self._pushes = PlannedPushes(schedule.pushes, period)
         self._pulls = PlannedPulls(schedule.pulls, period)
-        self.observer = Observer(self.robot, self.layout, self.simulation, self.memory)
         self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
         arms = None if recipe.eval.public is None else recipe.eval.public.arms
         self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])
@@ -108,7 +111,7 @@ class Batch:
     @property
     def measured(self) -> Measured:
         """The measurements delivered last."""
-        return self.observer.measured
+        return self.simulation.measured
 
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]."""
@@ -217,7 +220,25 @@ class Batch:
         return moved
 
     def _observe(self, moved: Motion, which: Indices | slice = EVERY) -> None:
-        self.observer.write(self.buffers["observation"], moved, which)
+        """Writes s_t and s_priv of some environments among all."""
+        memory, simulation, layout = self.memory, self.simulation, self.layout
+        self._joint_reference[:, self._support] = memory.support
+        self._joint_reference[:, self._arms] = memory.arms
+        sensed = Sensed(
+            measured=simulation.measured,
+            command=memory.command,
+            heading_reference=(memory.heading_reference + memory.heading_offset)[:, None],
+            joint_reference=self._joint_reference,
+            phase=gait.phase_signal(memory.phase, memory.stepping),
+            last_action=memory.action,
+            support_reference=memory.support,
+            arm_reference=memory.arms,
+        )
+        truth = Truth(moved, simulation.state, simulation.drawn, simulation.motor_effort)
+        seen = np.empty((len(moved.heading[which]), layout.size), np.float32)
+        layout.state.gather(sensed, seen[:, layout.observation], which)
+        layout.extra.gather(truth, seen[:, layout.privileged], which)
+        self.buffers["observation"][which] = seen
 
     def __len__(self) -> int:
         return self.n

@@ -9,7 +9,7 @@ from iowbc.task.curriculum import Course
 from iowbc.task.endings import Ending
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
-from iowbc.task.rewards.sync import progress
+from iowbc.task.rewards.terms import progress
 
 LEAST = 1e-9
 """Keeps an episode that commanded nothing from dividing by zero [m]."""

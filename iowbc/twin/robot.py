@@ -137,9 +137,7 @@ class Twin:
     @property
     def state(self) -> Record:
         """The state that the robot sends."""
-        return low_state(
-            round(1e3 * self.time), Measured.of(self.simulation.measured), self.simulation.state.joint_torque[0]
-        )
+        return low_state(round(1e3 * self.time), self.simulation.measured, self.simulation.state.joint_torque[0])
 
     @property
     def battery(self) -> Record:

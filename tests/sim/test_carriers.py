@@ -34,7 +34,7 @@ def test_grips_and_handle_carry_what_the_lever_arms_say(carried, scene, mass, sh
     assert up + handle == pytest.approx(mass * GRAVITY, rel=0.01)
     hands = simulation.hand_position(0).mean(axis=0)
     ahead = rotations.rotate_inverse(
-        state.object_quaternion[:1], np.stack([simulation.partner_handle(0) - hands, state.object_position[0] - hands])
+        state.object_quaternion[:1], np.stack([simulation.partner.at[0] - hands, state.object_position[0] - hands])
     )
     about_hands = handle * ahead[0, 0] - mass * GRAVITY * ahead[1, 0]
     limit = 2.0 * 0.02 * simulation.drawn["slip_force"][0]
@@ -117,7 +117,7 @@ def test_palms_slip_at_their_torque_and_not_below(start, by_hands, hold_base, mo
         out[:] = 0.0
         out[:, 4] = turning[0]
 
-    monkeypatch.setattr(simulation._partner, "wrench", turn)
+    monkeypatch.setattr(simulation.partner, "wrench", turn)
     run(simulation, 60)
     turning[0] = -1.6 * limit
     run(simulation, 14)
@@ -142,7 +142,7 @@ def test_partner_resists_a_robot_that_drifts_and_turns_without_a_command(carried
     run(simulation, 60)
     rest = simulation.state.partner_force[0].copy()
     simulation.state.base_rotation[0] = rotations.matrix(rotations.from_euler(np.zeros(1), np.zeros(1), np.ones(1)))[0]
-    simulation._partner._aim[0, 1] -= 0.05  # as after a drift of the object by 5 cm to the left
+    simulation.partner._aim[0, 1] -= 0.05  # as after a drift of the object by 5 cm to the left
     run(simulation, 1)
     pulled = simulation.state.partner_force[0] - rest
     assert pulled[1] < -0.6 * 0.05 * simulation.drawn["partner_stiffness"][0]
@@ -153,7 +153,7 @@ def test_partner_turns_about_the_commanded_path(carried):
     simulation = carried(["lift"] * 2, object_mass=7.0, partner_share=0.4, start_yaw=[0.0, 2.0])
     simulation.feed[:, 2] = 0.5
     run(simulation, 100)
-    heading = simulation._partner._heading
+    heading = simulation.partner._heading
     turned = 0.5 * (2.0 - 0.1)
     assert heading == pytest.approx(np.array([[np.cos(a), np.sin(a)] for a in (turned, 2.0 + turned)]), abs=0.01)
 
@@ -182,13 +182,13 @@ def test_partner_in_a_push_yields_around_its_share_and_its_noise_follows_the_res
     along = np.vecdot(simulation.state.partner_force[:, :2], heading)
     assert along == pytest.approx(0.4 * resistance * 1.5, rel=0.02)
     noisy = start(recipe, ["push"] * 2, **(held | {"partner_noise": 8.0}))
-    assert noisy._partner._gust[1] == pytest.approx(2.0 * noisy._partner._gust[0])
+    assert noisy.partner._gust[1] == pytest.approx(2.0 * noisy.partner._gust[0])
 
 
 def test_torque_of_the_partner_is_about_the_centre_of_mass(carried):
     simulation = carried(["lift"] * 2, object_mass=7.0, partner_share=0.4, object_com_offset=[0.0, 0.03])
     run(simulation, 50)
-    arm = np.array([simulation.partner_handle(env) for env in range(2)]) - simulation.state.object_position
+    arm = simulation.partner.at - simulation.state.object_position
     arm -= rotations.rotate(simulation.state.object_quaternion, simulation.drawn["object_com_offset"])
     force = simulation.state.external_force
     run(simulation, 1)

@@ -77,11 +77,11 @@ def test_a_snapshot_continues_bit_for_bit(drake):
     run(simulation, 5)
     saved = simulation.snapshot()
     run(simulation, 5)
-    expected = {name: values.copy() for name, values in simulation.state.arrays().items()}
+    expected = {name: values.copy() for name, values in vars(simulation.state).items()}
     other = drake(Recipe(), ["lift", "push"])
     other.restore(saved)
     run(other, 5)
-    assert all(np.array_equal(expected[name], values) for name, values in other.state.arrays().items())
+    assert all(np.array_equal(expected[name], values) for name, values in vars(other.state).items())
 
 
 def test_motors_follow_their_targets_as_late_as_drawn(drake, calm):

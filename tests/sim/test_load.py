@@ -25,7 +25,7 @@ def test_a_box_pressed_against_the_torso_counts_as_force_of_links_and_not_of_han
         out[:] = 0.0
         out[:, 0] = -80.0
 
-    monkeypatch.setattr(simulation._partner, "wrench", push_back)
+    monkeypatch.setattr(simulation.partner, "wrench", push_back)
     run(simulation, 150)
     hands = -simulation.state.grip_force[0].sum(axis=0)
     links = np.array([80.0, 0.0, 4.0 * GRAVITY]) - hands

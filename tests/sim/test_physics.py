@@ -105,7 +105,7 @@ def test_hands_slip_at_the_slip_force_and_not_below(start, calm, hold_base, monk
         out[:] = 0.0
         out[:, 2] = -pull[0]
 
-    monkeypatch.setattr(simulation._partner, "wrench", pull_down)
+    monkeypatch.setattr(simulation.partner, "wrench", pull_down)
     while not simulation.state.slipped.any():
         carried = np.linalg.norm(simulation.state.grip_force[0], axis=1).max()
         simulation.step()
@@ -140,7 +140,7 @@ def test_body_contact_keeps_a_box_out_of_the_torso(start, calm, hold_base, monke
             out[:] = 0.0
             out[:, 0] = -80.0
 
-        monkeypatch.setattr(simulation._partner, "wrench", push_back)
+        monkeypatch.setattr(simulation.partner, "wrench", push_back)
         run(simulation, 100)
         nearest.append(simulation.state.object_position[0, 0] - simulation.state.base_position[0, 0] - 0.15)
     assert nearest[0] < 0.05

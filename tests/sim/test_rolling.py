@@ -25,7 +25,7 @@ def crates(start, calm, monkeypatch):
         def push(commanded, gust, state, out):
             out[:] = wrench
 
-        monkeypatch.setattr(simulation._partner, "wrench", push)
+        monkeypatch.setattr(simulation.partner, "wrench", push)
         return simulation
 
     return make

@@ -23,7 +23,7 @@ def wander(simulation, steps):
         simulation.target[:] = posture
         simulation.target[:, :15] += 0.1 * np.sin(phase + np.arange(15))
         simulation.step()
-        arrays = {**simulation.state.arrays(), **simulation.measured.arrays()}
+        arrays = {**vars(simulation.state), **vars(simulation.measured)}
         seen.append({name: values.copy() for name, values in arrays.items()})
     return seen
 
@@ -111,11 +111,11 @@ def test_planted_nan_marks_that_environment_alone_and_is_counted(start):
     assert np.array_equal(simulation.state.diverged, [False, False, True, False])
     assert simulation.divergence_count == 1
     assert np.array_equal(simulation.state.joint_position[2], before)
-    for arrays in (simulation.state.arrays(), simulation.measured.arrays()):
+    for arrays in (vars(simulation.state), vars(simulation.measured)):
         assert all(np.isfinite(values).all() for values in arrays.values())
     rows = np.array([0, 1, 3])
-    expected = healthy.state.arrays()
-    assert all(np.array_equal(values[rows], expected[name][rows]) for name, values in simulation.state.arrays().items())
+    expected = vars(healthy.state)
+    assert all(np.array_equal(values[rows], expected[name][rows]) for name, values in vars(simulation.state).items())
 
 
 def test_diverged_environment_lives_on_after_a_reset(start, carrying):

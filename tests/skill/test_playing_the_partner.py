@@ -42,7 +42,7 @@ def start(
 
 
 def handle(session: GameSession) -> Array:
-    position: Array = session._lower.simulation.handle_position[0]
+    position: Array = session._lower.simulation.partner.at[0]
     return position
 
 
@@ -70,7 +70,7 @@ def test_a_drag_moves_the_spring_to_the_pointer_and_pulls_there(
         session = start()
         before = handle(session)
         forces.append(dragged(session, 0.1 * sign * np.array([*direction, 0.0]), 15))
-        ends.append(session._lower.simulation.partner_aim[0] - before)
+        ends.append(session._lower.simulation.partner.aim[0] - before)
     np.testing.assert_allclose(ends[0][:2], 0.09 * np.array(direction), atol=0.015)
     along, aside = direction, (-direction[1], direction[0])
     apart = (forces[0] - forces[1])[:2]
@@ -107,9 +107,9 @@ def test_a_released_handle_is_pulled_nowhere_and_its_share_of_the_weight_still_b
 def test_with_the_shift_key_the_handle_is_raised_and_not_pulled_along(start: Callable[..., GameSession]) -> None:
     session = start()
     dragged(session, np.zeros(3), 1)
-    height = session._lower.simulation.partner_aim[0].copy()
+    height = session._lower.simulation.partner.aim[0].copy()
     dragged(session, [0.3, 0.0, 0.1], 25, shift=True)
-    raised = session._lower.simulation.partner_aim[0] - height
+    raised = session._lower.simulation.partner.aim[0] - height
     assert raised[2] == pytest.approx(session.world.recipe.skill.human.vertical_velocity * 0.5, rel=0.1)
     assert np.abs(raised[:2]).max() < 0.05
 

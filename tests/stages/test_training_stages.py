@@ -36,8 +36,8 @@ from iowbc.stages.inputs import leaves_student
 from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
-from iowbc.task.vector.messages import Reset
 from iowbc.task.vector.setup import Setup
+from iowbc.task.vector.worker import Message
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -81,7 +81,7 @@ def test_a_group_on_another_machine_reads_what_lies_there() -> None:
     world = Specification(small_recipe(), there / "g1", there / "rg")
     group = RolloutActor(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
     written = {name: group.state()[f"buffer/{name}"] for name in WRITTEN}
-    answer, files = group.ask((written, Reset()))
+    answer, files = group.ask((written, Message("reset")))
     assert (answer, files) == (None, {})
     assert len(group.state()["buffer/observation"]) == 2
 

@@ -4,7 +4,6 @@ import functools
 import operator
 import os
 import signal
-import statistics
 import subprocess
 import sys
 import textwrap
@@ -42,17 +41,6 @@ def gone(processes: list[int], patience: float = SOON) -> bool:
             return True
         time.sleep(0.02)
     return False
-
-
-def test_a_worker_takes_little_more_of_a_processor_to_start_than_its_imports(make: Make) -> None:
-    env = make(num_envs=8, workers=2)
-    env.reset()
-    started = statistics.mean(sum(psutil.Process(pid).cpu_times()[:2]) for pid in processes_of(env))
-    before = os.times()
-    subprocess.run([sys.executable, "-c", "import iowbc.task.vector.setup"], check=True)
-    after = os.times()
-    imports = after.children_user + after.children_system - before.children_user - before.children_system
-    assert started < 4.0 * imports
 
 
 def test_workers_do_not_import_what_only_the_learner_needs(make: Make) -> None:

@@ -62,7 +62,7 @@ def played(
     controller.reset(scene=scene)
     positions = []
     for _ in range(PERIODS):
-        simulation.target[:] = controller.step(Measured.of(simulation.measured), command).position
+        simulation.target[:] = controller.step(simulation.measured, command).position
         simulation.step()
         positions.append(simulation.worlds[0].qpos[0].copy())
     return np.array(positions), bool(simulation.state.grasped.all())

@@ -53,7 +53,7 @@ def _all(simulation: Simulation, env: int) -> Iterator[Force]:
     state = simulation.state
     outward = BESIDE * state.base_rotation[env, :, 1] * np.array([[1.0], [-1.0]])
     if state.has_object[env]:
-        yield Force("partner", simulation.partner_handle(env), state.partner_force[env].copy())
+        yield Force("partner", simulation.partner.at[env], state.partner_force[env].copy())
         yield Force("push", state.object_position[env].copy(), simulation.impulse_force(env))
         hands = simulation.hand_position(env)
         for hand in range(2):

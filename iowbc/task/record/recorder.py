@@ -12,7 +12,7 @@ from iowbc.task.judge import Judgement
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.record.signals import ACTION_SIGNAL, COUNTERS, ERRORS, KINDS, REASONS
-from iowbc.task.rewards import smooth
+from iowbc.task.rewards import terms
 from iowbc.task.vector.shared import Buffers
 
 TORSO_CENTRE = 0.25
@@ -34,13 +34,13 @@ def write_signals(
         "torso_pitch_command": command[:, PITCH],
         "pelvis_height": moved.height,
         "height_command": command[:, HEIGHT],
-        "saturation": smooth.saturation(state.saturation),
+        "saturation": terms.saturation(state.saturation),
         "slipped": (state.has_object[:, None] & ~state.grasped).any(axis=1),
         "fallen": ending.fallen,
         "dropped": ending.dropped,
         "lagging": ending.lagging,
         "diverged": ending.diverged,
-        "power": smooth.power(state.joint_torque, state.joint_velocity),
+        "power": terms.power(state.joint_torque, state.joint_velocity),
         "phase": memory.phase,
         "time": memory.steps * period,
     }

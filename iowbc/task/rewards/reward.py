@@ -1,16 +1,18 @@
 """The weighted sum of the terms, with its parts."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.reward import Kernel, Later, Reward
-from iowbc.task.rewards.kernel import kernel
-from iowbc.task.rewards.own import load_terms
+from iowbc.recipe.task.reward import Kernel, Later, OwnTerm, Reward
+from iowbc.task.own_function import load_function
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
+
+CONTRACT = "it takes a Step (iowbc/task/rewards/table.py) and returns a finite number for each environment, shape (n,)"
+"""What a term in a user's file has to be."""
 
 
 @dataclass(frozen=True)
@@ -106,3 +108,25 @@ def _weighted(column: int, function: Term, setting: float | Kernel, seconds: flo
     if isinstance(setting, Kernel):
         return WeightedTerm(column, function, setting.weight * seconds, setting.width)
     return WeightedTerm(column, function, setting * seconds, None)
+
+
+def kernel(squared_error: Array, width: float | Array) -> Array:
+    """exp(−e²/width²), (n,) or (n, k): 1 without error, 0.37 at an error of `width`, one or (k,)."""
+    return np.exp(squared_error / -(width * width))
+
+
+def load_terms(recipe: Reward) -> dict[str, Callable[[Step], Array]]:
+    """The recipe's own terms that have a weight, by name: training environments execute their file, and nothing else
+    does. Raises StageFailed for one that cannot be used."""
+    return {name: _own_term(name, term) for name, term in recipe.own_terms.items()}
+
+
+def _own_term(name: str, term: OwnTerm) -> Callable[[Step], Array]:
+    function = load_function(f"task.reward.own.{name}", term, CONTRACT)
+
+    def value(step: Step) -> Array:
+        count = len(step.command)
+        kernels = () if term.width is None else ((count, None),)
+        return function(step, (count,), *kernels, excused=step.state.diverged)
+
+    return value

@@ -1,7 +1,7 @@
 """The terms of the reward, by their dotted path in the recipe's section `task.reward`.
 
-A term is a function and its line here, in any order. Where the recipe gives it a weight and a width, the function
-returns squared errors, (n,) or (n, k), and each is scored by a kernel.
+A term is a line here, in any order; longer formulas are in `terms`. Where the recipe gives it a weight and a width, the
+line returns squared errors, (n,) or (n, k), and each is scored by a kernel.
 """
 
 from collections.abc import Callable
@@ -15,8 +15,8 @@ from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.recipe.task.reward import Reward
 from iowbc.sim.state import SimulationState
 from iowbc.task.motion import Motion
-from iowbc.task.rewards import gait, smooth, sync
-from iowbc.task.rewards import object as equilibrium
+from iowbc.task.rewards import terms
+from iowbc.task.rewards.terms import squared_norm
 
 
 @dataclass(frozen=True)
@@ -67,54 +67,51 @@ class Step:
     ended: Mask
     """Environments that fell or dropped the object in this step, (n,)."""
 
+    @property
+    def support_error(self) -> Array:
+        """θ_S − θ_S_ref, (n, 15) [rad]."""
+        return self.state.joint_position[:, self.support] - self.support_reference
+
 
 Term = Callable[[Step], Array | Mask]
 
 TERMS: dict[str, Term] = {
-    "sync.support_reference": lambda s: sync.support_reference(
-        s.state.joint_position[:, s.support], s.support_reference
-    ),
-    "sync.lateral_reference": lambda s: sync.support_reference(
-        s.state.joint_position[:, s.support][:, s.lateral], s.support_reference[:, s.lateral]
-    ),
-    "sync.system_velocity": lambda s: sync.system_velocity(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
-    "sync.yaw_rate": lambda s: sync.yaw_rate(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
-    "sync.progress": lambda s: sync.progress(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
-    "sync.turning": lambda s: sync.turning(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
-    "sync.heading": lambda s: sync.heading(s.heading_error),
-    "sync.height": lambda s: sync.height(s.motion.height, s.command[:, HEIGHT]),
-    "sync.torso_pitch": lambda s: sync.torso_pitch(s.motion.torso_pitch, s.command[:, PITCH]),
-    "sync.torso_roll": lambda s: sync.torso_roll(s.motion.torso_roll),
-    "object.position": lambda s: equilibrium.position(s.motion.object_offset, s.object_place, s.held),
-    "object.orientation": lambda s: equilibrium.orientation(s.state.object_quaternion, s.held),
-    "object.link_contact": lambda s: equilibrium.link_contact(
-        s.state.link_object_force, s.recipe.object.largest_link_contact
-    ),
-    "object.beside": lambda s: equilibrium.beside(
+    "sync.support_reference": lambda s: squared_norm(s.support_error),
+    "sync.lateral_reference": lambda s: squared_norm(s.support_error[:, s.lateral]),
+    "sync.system_velocity": lambda s: squared_norm(s.filtered_velocity[:, :YAW_RATE] - s.target_velocity),
+    "sync.yaw_rate": lambda s: np.square(s.filtered_velocity[:, YAW_RATE] - s.command[:, YAW_RATE]),
+    "sync.progress": lambda s: terms.progress(s.filtered_velocity[:, :YAW_RATE], s.target_velocity),
+    "sync.turning": lambda s: terms.turning(s.filtered_velocity[:, YAW_RATE], s.command[:, YAW_RATE]),
+    "sync.heading": lambda s: np.square(s.heading_error),
+    "sync.height": lambda s: np.square(s.motion.height - s.command[:, HEIGHT]),
+    "sync.torso_pitch": lambda s: np.square(s.motion.torso_pitch - s.command[:, PITCH]),
+    "sync.torso_roll": lambda s: np.square(s.motion.torso_roll),
+    "object.position": lambda s: squared_norm(s.motion.object_offset - s.object_place) * s.held,
+    "object.orientation": lambda s: terms.tilt(s.state.object_quaternion, s.held),
+    "object.link_contact": lambda s: np.minimum(s.state.link_object_force, s.recipe.object.largest_link_contact),
+    "object.beside": lambda s: terms.beside(
         s.motion.object_offset, s.object_place, s.recipe.object.largest_beside, s.pushed
     ),
-    "object.vertical_velocity": lambda s: equilibrium.vertical_velocity(
-        s.state.object_linear_velocity, s.height_rate, s.held
-    ),
-    "smooth.joint_acceleration": lambda s: smooth.joint_acceleration(s.state.joint_acceleration),
-    "smooth.action_rate": lambda s: smooth.action_rate(s.action, s.previous_action),
-    "smooth.action_curvature": lambda s: smooth.action_curvature(s.action, s.previous_action, s.earlier_action),
-    "smooth.effort": lambda s: smooth.effort(
+    "object.vertical_velocity": lambda s: np.square(s.state.object_linear_velocity[:, 2] - s.height_rate) * s.held,
+    "smooth.joint_acceleration": lambda s: squared_norm(s.state.joint_acceleration),
+    "smooth.action_rate": lambda s: squared_norm(s.action - s.previous_action),
+    "smooth.action_curvature": lambda s: squared_norm(s.action - 2.0 * s.previous_action + s.earlier_action),
+    "smooth.effort": lambda s: terms.effort(
         s.state.joint_torque, s.state.torque_limit, s.recipe.smooth.comfortable_effort
     ),
-    "smooth.power": lambda s: smooth.power(s.state.joint_torque, s.state.joint_velocity),
-    "smooth.base_rates": lambda s: smooth.base_rates(s.state.base_angular_velocity),
-    "smooth.vertical_velocity": lambda s: smooth.vertical_velocity(s.motion.base_velocity, s.height_rate),
-    "smooth.saturation": lambda s: smooth.saturation(s.state.saturation[:, s.support]),
-    "gait.contact_timing": lambda s: gait.contact_timing(s.state.foot_contact, s.stance),
-    "gait.swing_height": lambda s: gait.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
-    "gait.foot_slip": lambda s: gait.foot_slip(s.state.foot_velocity, s.state.foot_force),
-    "gait.touchdown": lambda s: gait.touchdown(
+    "smooth.power": lambda s: terms.power(s.state.joint_torque, s.state.joint_velocity),
+    "smooth.base_rates": lambda s: squared_norm(s.state.base_angular_velocity[:, :2]),
+    "smooth.vertical_velocity": lambda s: np.square(s.motion.base_velocity[:, 2] - s.height_rate),
+    "smooth.saturation": lambda s: terms.saturation(s.state.saturation[:, s.support]),
+    "gait.contact_timing": lambda s: terms.contact_timing(s.state.foot_contact, s.stance),
+    "gait.swing_height": lambda s: terms.swing_height(s.state.foot_position[:, :, 2], s.swing_profile, ~s.stance),
+    "gait.foot_slip": lambda s: terms.foot_slip(s.state.foot_velocity, s.state.foot_force),
+    "gait.touchdown": lambda s: terms.touchdown(
         s.state.foot_position[:, :, 2], s.state.foot_velocity[:, :, 2], s.recipe.gait.touchdown_height
     ),
-    "gait.standing": lambda s: gait.standing(s.state.foot_contact, s.stepping),
+    "gait.standing": lambda s: (~s.state.foot_contact).sum(axis=1) * ~s.stepping,
     "gait.recovery": lambda s: s.stepping & ~s.commanded,
-    "gait.foot_distance": lambda s: gait.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
+    "gait.foot_distance": lambda s: terms.foot_distance(s.motion.foot_position, s.recipe.gait.smallest_foot_distance),
     "yielding.force": lambda s: s.unyielded_force,
     "alive": lambda s: np.ones(len(s.command)),
     "termination": lambda s: s.ended,

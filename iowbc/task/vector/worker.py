@@ -8,18 +8,30 @@ import pickle
 import signal
 import sys
 import traceback
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import IO, TYPE_CHECKING
+from typing import IO, Any
 
 from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
 
-if TYPE_CHECKING:
-    from iowbc.task.vector.messages import Message
-
 ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc.task.vector.worker import main; main()"
 """With this Python becomes a worker. Its arguments are the parent's module path, as JSON, and its process number;
 whether to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A call of a method of a group's environments, wherever they are stepped."""
+
+    method: str
+    arguments: tuple[Any, ...] = ()
+    changes: bool = True
+    """Whether the environments' future depends on it."""
+
+    def carry_out(self, batch: Any) -> Any:
+        """The answer of the group's environments."""
+        return getattr(batch, self.method)(*self.arguments)
 
 
 def main() -> None:

@@ -20,9 +20,8 @@ from iowbc.errors import WorkerFailed
 from iowbc.processes import SINGLE_THREADED
 from iowbc.rollouts.blocks import shares_in_blocks
 from iowbc.task.record.signals import COUNTERS
-from iowbc.task.vector import worker
-from iowbc.task.vector.messages import Message
 from iowbc.task.vector.shared import Buffers, Fields, create_shared, private_buffers
+from iowbc.task.vector.worker import ASKED, Message
 
 STARTING = 300.0
 """How long workers may take to build their environments [s]."""
@@ -216,7 +215,7 @@ def _start(memory: int) -> WorkerProcess:
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
         popen = subprocess.Popen(
-            [sys.executable, "-c", worker.ASKED, *map(str, arguments)],
+            [sys.executable, "-c", ASKED, *map(str, arguments)],
             stdin=subprocess.DEVNULL,
             pass_fds=descriptors,
             env=environment,
