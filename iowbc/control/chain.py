@@ -104,18 +104,12 @@ class Chain(Constants):
         origin = xp.cumsum(xp.concatenate([first, before]), 0)
         return Frames(after, origin, rotated(after, self._axis))
 
-    def inward(self, angle: Array, points: Array) -> Array:
-        """Points (3, k, n) [m] of the frame that the chains hang on, as the last bodies see them; angles as in
-        `frames`."""
+    def inward(self, angle: Array, vectors: Array, *, directions: bool = False) -> Array:
+        """Points (3, k, n) [m], or directions, of the frame that the chains hang on, as the last bodies see them;
+        angles as in `frames`."""
         for rotation, offset in zip(self._local(angle), self._offset, strict=True):
-            points = rotated_back(rotation, points - offset)
-        return points
-
-    def turned_inward(self, angle: Array, directions: Array) -> Array:
-        """As `inward`, of directions."""
-        for rotation in self._local(angle):
-            directions = rotated_back(rotation, directions)
-        return directions
+            vectors = rotated_back(rotation, vectors if directions else vectors - offset)
+        return vectors
 
     def _local(self, angle: Array) -> Array:
         """Rotation of each body in the frame of the one before, (hinges, 3, 3, chains, n)."""

@@ -30,24 +30,24 @@ class FootPlacement(Constants):
     legs: Legs
     joints: tuple[tuple[int, ...], ...]
     """Places of hip pitch, knee and ankle pitch, left and right, among all joints."""
-    period: float
-    """[s]."""
 
     @classmethod
-    def of(cls, robot: Robot, settings: GaitPrior, period: float) -> Self | None:
-        """The feedback of a robot whose control period is `period` [s], or none where it is switched off."""
+    def of(cls, robot: Robot, settings: GaitPrior) -> Self | None:
+        """The feedback of a robot, or none where it is switched off."""
         if settings.placement is None:
             return None
         left, right = leg_joints(robot)
         places = tuple((int(robot.support[left[j]]), int(robot.support[right[j]])) for j in SAGITTAL)
-        return cls(settings, leg_geometry(robot), places, period)
+        return cls(settings, leg_geometry(robot), places)
 
-    def __call__(self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array) -> Array:
-        """Forward offset of each foot from its nominal place in the stride one control period later, (n, 2) [m].
+    def __call__(
+        self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array, period: float
+    ) -> Array:
+        """Forward offset of each foot from its nominal place in the stride a control period [s] later, (n, 2) [m].
 
         `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
         """
-        gait, period, feedback = self.settings, self.period, self.settings.placement
+        gait, feedback = self.settings, self.settings.placement
         assert feedback is not None
         foot, running = foot_phase(phase), stepping[:, None]
         standing = 1.0 * expected_stance(foot, stepping > 0.5, gait.stance)

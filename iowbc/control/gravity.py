@@ -41,7 +41,7 @@ class ArmGravity(Constants):
         origin o_i and the links' centres c_k; the load's part is Jᵀ of its weight.
         """
         xp, frames = namespace(arms), frames or self._arms.frames(by_arm(arms))
-        down = GRAVITY * self._waist.turned_inward(waist.T[:, None], gravity.T[:, None])
+        down = GRAVITY * self._waist.inward(waist.T[:, None], gravity.T[:, None], directions=True)
         own = self._mass * frames.origin + rotated(frames.rotation, self._moment)
         mass, moments = self._outward, [own[-1]]
         if load is not None:

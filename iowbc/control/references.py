@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from iowbc.arrays import Array, Constants, Mask, as_slice, namespace
+from iowbc.control import gait
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
-from iowbc.control.gait import is_falling, wants_to_move
+from iowbc.control.foothold import FootPlacement
 from iowbc.control.gravity import ArmGravity
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
@@ -52,6 +53,7 @@ class ReferenceLayer(Constants):
         self.waist, self._waist_pitch = as_slice(robot.waist), as_slice(robot.waist_pitch)
         self._settings = references.gait
         self._stride = Stride.of(robot, references.gait)
+        self._placement = FootPlacement.of(robot, references.gait)
 
     def clamp(self, command: Array) -> Array:
         """The command with height and torso pitch brought into the feasible map; (n, 11)."""
@@ -111,12 +113,29 @@ class ReferenceLayer(Constants):
             return support
         return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping, foothold)
 
+    def pace(
+        self,
+        phase: Array,
+        stepping: Mask,
+        foothold: Array,
+        measured: Measured,
+        support: Array,
+        command: Array,
+        dt: float,
+    ) -> tuple[Array, Mask, Array]:
+        """Gait phase (n,), whether the clock runs (n,), and footholds (n, 2) [m] one control period later."""
+        moving = self.wants_steps(measured, support, command)
+        phase, stepping = gait.advance(phase, stepping, moving, self._settings, dt)
+        if self._placement is not None:
+            foothold = self._placement(foothold, measured, command, phase, 1.0 * stepping, dt)
+        return phase, stepping, foothold
+
     def wants_steps(self, measured: Measured, support: Array, command: Array) -> Mask:
         """True where the gait clock has a reason to run, (n,): a commanded velocity, or a fall to be caught."""
-        moving, recovery = wants_to_move(command, self._settings), self._settings.recovery
+        moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
         if recovery is None:
             return moving
-        return moving | is_falling(measured, self.start_pitch(support, command), recovery)
+        return moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants, Mask, namespace
+from iowbc.arrays import Array, Constants, namespace
 from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.command import COMMAND, YAW_RATE, approach, rate_limits
-from iowbc.control.foothold import FootPlacement
 from iowbc.control.observation import ObservationLayout, Sensed
 from iowbc.control.references import ReferenceLayer
 from iowbc.control.sensors import Measured
@@ -92,8 +91,7 @@ class ControlStep(Constants):
         """`policy`: from a history (n, K, size of s_t) to the mean action (n, support joints)."""
         self.references, self.layout, self.policy = references, layout, policy
         self.bound, self.scale = task.action.bound, action_scale(robot, task.action)
-        self._gait, self._period = task.references.gait, 1.0 / task.control_frequency
-        self._placement = FootPlacement.of(robot, task.references.gait, self._period)
+        self._period = 1.0 / task.control_frequency
         self._largest_step = rate_limits(task.commands.rates) * self._period
         self._order = np.argsort(np.concatenate([robot.support, robot.interaction])).tolist()
         self._blank, support, arms = np.zeros((1, history, layout.size)), len(robot.support), len(robot.interaction)
@@ -130,11 +128,12 @@ class ControlStep(Constants):
         command = xp.where(begun, limited, state.command)
         arms, posture = self.references.advance(state.arms, state.posture, command, grasp, self._period)
         arms, posture = xp.where(begun, arms, state.arms), xp.where(begun, posture, state.posture)
-        phase, stepping = self._clock(state, measured, command, posture)
-        foothold = state.foothold
-        if self._placement is not None:
-            placed = self._placement(foothold, measured, command, phase, 1.0 * stepping)
-            foothold = xp.where(begun, placed, foothold)
+        before, ran = state.phase[:, 0], state.stepping[:, 0] > 0.5
+        phase, runs, foothold = self.references.pace(
+            before, ran, state.foothold, measured, posture, command, self._period
+        )
+        phase, foothold = xp.where(begun[:, 0], phase, before), xp.where(begun, foothold, state.foothold)
+        stepping = (begun[:, 0] & runs) | (~begun[:, 0] & ran)
         support = self.references.with_stride(posture, command, phase, stepping, foothold)
         sensed = Sensed(
             measured=measured,
@@ -155,13 +154,6 @@ class ControlStep(Constants):
         clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
         after = State(command, arms, posture, turned, phase[:, None], clock, foothold, one, action, history)
         return Step(self._joints(support + self.scale * action, held), action, support, after)
-
-    def _clock(self, state: State, measured: Measured, command: Array, posture: Array) -> tuple[Array, Mask]:
-        """The gait clock of this step: phase (n,) and whether it runs (n,)."""
-        xp, phase, stepping = namespace(command), state.phase[:, 0], state.stepping[:, 0] > 0.5
-        begun, moving = state.begun[:, 0] > 0.5, self.references.wants_steps(measured, posture, command)
-        advanced, runs = gait.advance(phase, stepping, moving, self._gait, self._period)
-        return xp.where(begun, advanced, phase), (begun & runs) | (~begun & stepping)
 
     def _joints(self, support: Array, arms: Array) -> Array:
         """Values of both branches in MJCF order, (n, joints)."""

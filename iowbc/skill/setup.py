@@ -1,9 +1,7 @@
 """What a process needs to know to build its part of the games."""
 
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
@@ -102,18 +100,3 @@ class GameSetup:
             block=block_size(self.count),
             buffers=buffers,
         )
-
-    def as_json(self) -> str:
-        """Text from which `from_json` makes the same setup."""
-        values = {"specification": self.specification.as_json(), "count": self.count, "seed": self.seed}
-        plans = None if self.plans is None else [asdict(plan) for plan in self.plans]
-        return json.dumps(values | {"partners": self.partners, "plans": plans})
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Inverse of `as_json`."""
-        values = json.loads(text)
-        plans = values.pop("plans")
-        values["specification"] = Specification.from_json(values["specification"])
-        values["partners"] = tuple(values["partners"])
-        return cls(**values, plans=None if plans is None else tuple(Plan(**plan) for plan in plans))

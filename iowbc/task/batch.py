@@ -27,8 +27,14 @@ from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
-from iowbc.task.record.divergences import keep_divergences
-from iowbc.task.record.recorder import count_endings, count_pushes, count_step, write_signals, write_trial_signals
+from iowbc.task.record.recorder import (
+    count_endings,
+    count_pushes,
+    count_step,
+    keep_divergences,
+    write_signals,
+    write_trial_signals,
+)
 from iowbc.task.schedule import Schedule
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers

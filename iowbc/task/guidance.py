@@ -6,11 +6,9 @@ import numpy as np
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask, as_slice
-from iowbc.control import gait
 from iowbc.control.action import action_scale
 from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, YAW_RATE
-from iowbc.control.foothold import FootPlacement
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
@@ -39,9 +37,8 @@ class Guidance:
         `holding`: those that begin with an object in the hands, `pushing`: those with a crate before them, (n,).
         """
         task = specification.recipe.task
-        self._settings, self._period = task.references.gait, period
+        self._period = period
         self.references = ReferenceLayer(robot, task.references, specification.rg)
-        self._placement = FootPlacement.of(robot, task.references.gait, period)
         self.commander = Commander(task, self.references, scripts, holding, pushing, period)
         self.grasp = np.stack([both_wrists(getattr(task.references.grasps, name)) for name in scenes])
         """Base grasp of both wrists, heading frame, (n, 2, 3) [m]."""
@@ -67,7 +64,7 @@ class Guidance:
 
     def advance(self, memory: Memory, key: Keys, measured: Measured) -> None:
         """Command, references and gait clock of the step to come; keys of the episodes, (n,)."""
-        settings, period = self._settings, self._period
+        period = self._period
         height = memory.command[:, HEIGHT].copy()
         self.commander.advance(memory, key)
         memory.height_rate[:] = (memory.command[:, HEIGHT] - height) / period
@@ -76,13 +73,10 @@ class Guidance:
         )
         self._frames = None
         memory.arms[:], memory.posture[:] = arms, posture
-        moving = self.references.wants_steps(measured, posture, memory.command)
-        phase, stepping = gait.advance(memory.phase, memory.stepping, moving, settings, period)
-        memory.phase[:], memory.stepping[:] = phase, stepping
-        foothold = None
-        if self._placement is not None:
-            foothold = self._placement(memory.foothold, measured, memory.command, phase, 1.0 * stepping)
-            memory.foothold[:] = foothold
+        phase, stepping, foothold = self.references.pace(
+            memory.phase, memory.stepping, memory.foothold, measured, posture, memory.command, period
+        )
+        memory.phase[:], memory.stepping[:], memory.foothold[:] = phase, stepping, foothold
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, foothold)
 
     def turn(self, memory: Memory) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.recipe import Recipe
@@ -25,23 +25,3 @@ class Specification:
         """The same for a policy that does not see s_priv: without the parts of it that are in a user's file, which
         nothing then executes."""
         return replace(self, recipe=self.recipe.deployed)
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain values, read back by `from_json`; folders in full, for another process."""
-        return {
-            "recipe": self.recipe.model_dump(mode="json"),
-            "robot": str(self.robot.resolve()),
-            "rg": None if self.rg is None else str(self.rg.resolve()),
-            "drake": None if self.drake is None else self.drake.model_dump(mode="json"),
-        }
-
-    @classmethod
-    def from_json(cls, values: dict[str, Any]) -> Self:
-        """Inverse of `as_json`."""
-        rg, drake = values["rg"], values["drake"]
-        return cls(
-            Recipe.model_validate(values["recipe"]),
-            Path(values["robot"]),
-            None if rg is None else Path(rg),
-            None if drake is None else Drake.model_validate(drake),
-        )

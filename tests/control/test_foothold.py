@@ -18,7 +18,7 @@ PERIOD, STEP = 0.02, 1e-6
 
 @pytest.fixture(scope="module")
 def placement(robot: Robot) -> FootPlacement:
-    made = FootPlacement.of(robot, PRIOR, PERIOD)
+    made = FootPlacement.of(robot, PRIOR)
     assert made is not None
     return made
 
@@ -55,7 +55,7 @@ def measured(robot: Robot, position: Any, velocity: Any, pitch: float, rate: flo
 def moving(robot: Robot, speed: float) -> Measured:
     """A robot in its default posture that turns over its feet at such a speed."""
     position = robot.default_position
-    unit = FootPlacement.of(robot, PRIOR, PERIOD)
+    unit = FootPlacement.of(robot, PRIOR)
     assert unit is not None
     still = np.zeros(len(position))
     per_rate = unit.speed(measured(robot, position, still, 0.0, 1.0)).mean()
@@ -84,7 +84,7 @@ def test_a_swinging_foot_lands_where_the_speed_beyond_the_commanded_one_asks_for
     command[:, 0] = 0.3
     foothold, ones, swinging = np.zeros((1, 2)), np.ones(1), 1 if start == 0.0 else 0
     for phase in np.arange(PRIOR.stance - 0.5, 0.5, PRIOR.frequency * PERIOD) + start:
-        foothold = placement(foothold, moving(robot, 0.3 + excess), command, np.array([phase % 1.0]), ones)
+        foothold = placement(foothold, moving(robot, 0.3 + excess), command, np.array([phase % 1.0]), ones, PERIOD)
     assert foothold[0, swinging] == pytest.approx(0.2 * excess, rel=0.1)
     assert foothold[0, 1 - swinging] == 0.0, "the other foot stands"
 
@@ -94,12 +94,12 @@ def test_a_foot_on_the_ground_comes_back_and_no_step_is_longer_than_allowed(
 ) -> None:
     command, ones = np.zeros((1, 11)), np.ones(1)
     fast = moving(robot, 9.0)
-    landed = placement(np.array([[0.2, 0.0]]), fast, command, np.array([0.2]), ones)
+    landed = placement(np.array([[0.2, 0.0]]), fast, command, np.array([0.2]), ones, PERIOD)
     assert landed[0, 0] == pytest.approx(0.2 * np.exp(-PERIOD / FEEDBACK.return_time))
-    landing = placement(np.array([[0.0, 0.25]]), fast, command, np.array([0.49]), ones)
+    landing = placement(np.array([[0.0, 0.25]]), fast, command, np.array([0.49]), ones, PERIOD)
     assert landing[0, 1] == pytest.approx(0.25)
-    np.testing.assert_array_equal(placement(np.full((1, 2), 0.2), fast, command, np.zeros(1), np.zeros(1)), 0.0)
+    np.testing.assert_array_equal(placement(np.full((1, 2), 0.2), fast, command, np.zeros(1), np.zeros(1), PERIOD), 0.0)
 
 
 def test_without_the_setting_there_is_none(robot: Robot) -> None:
-    assert FootPlacement.of(robot, GaitPrior(), PERIOD) is None
+    assert FootPlacement.of(robot, GaitPrior()) is None

@@ -1,10 +1,8 @@
 """What a process needs to know to build its part of the environments."""
 
-import json
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -64,31 +62,6 @@ class Setup:
             buffers=buffers,
             episodes=None if self.episodes is None else self.episodes[first:last],
             divergences=self.divergences,
-        )
-
-    def as_json(self) -> str:
-        """Text from which `from_json` makes the same setup."""
-        return json.dumps(
-            {
-                "specification": self.specification.as_json(),
-                "count": self.count,
-                "seed": self.seed,
-                "episodes": None if self.episodes is None else [episode.as_json() for episode in self.episodes],
-                "divergences": None if self.divergences is None else str(self.divergences.resolve()),
-            }
-        )
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Inverse of `as_json`."""
-        values = json.loads(text)
-        episodes, divergences = values["episodes"], values["divergences"]
-        return cls(
-            specification=Specification.from_json(values["specification"]),
-            count=values["count"],
-            seed=values["seed"],
-            episodes=None if episodes is None else tuple(Episode.from_json(episode) for episode in episodes),
-            divergences=None if divergences is None else Path(divergences),
         )
 
 

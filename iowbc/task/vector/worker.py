@@ -59,8 +59,7 @@ def _serve(connection: Connection, memory: int) -> None:
     try:
         from iowbc.task.vector.shared import attach_shared
 
-        kind, text, first, last = connection.recv()
-        setup = kind.from_json(text)
+        setup, first, last = connection.recv()
         batch = setup.batch(first, last, attach_shared(memory, setup.buffer_fields(), setup.count).rows(first, last))
         gc.freeze()  # what lives as long as the process need not be looked through at every collection
         connection.send((True, None))

@@ -66,9 +66,6 @@ class Building(Protocol):
     def batch(self, first: int, last: int, buffers: Buffers) -> Any:
         """The environments from `first` to `last`, the latter excluded."""
 
-    def as_json(self) -> str:
-        """Text from which the class's `from_json` makes the same."""
-
 
 class InProcess:
     """All environments in this process."""
@@ -124,7 +121,7 @@ class WorkerProcesses:
                 self._poll.register(process.connection.fileno(), select.POLLIN)
                 self._processes.append(process)
             for index, ((first, last), process) in enumerate(zip(self.groups, self._processes, strict=True)):
-                process.connection.send((type(setup), setup.as_json(), first, last))
+                process.connection.send((setup, first, last))
                 self._asked.add(index)
             self._wait(STARTING)
         except BaseException:
