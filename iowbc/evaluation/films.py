@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.errors import NoRenderer
-from iowbc.evaluation.trials.batch_policy import in_batch
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.rollout import Acting, in_batch, play_in
 from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.evaluation import Video

@@ -1,6 +1,6 @@
 """The student's loss: KL(teacher || student) (paper eq. 7), and the error of the load read from its latent."""
 
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 import torch
@@ -14,18 +14,6 @@ from iowbc.robot.mirror import MirrorMap
 Symmetry = Literal["construction", "augment", "none"]
 
 
-class LossMirrors(Protocol):
-    """LossMirrors of facts and actions."""
-
-    @property
-    def facts_mirror(self) -> MirrorMap:
-        """Of the facts that the latent is to tell."""
-
-    @property
-    def action_mirror(self) -> MirrorMap:
-        """Of the action."""
-
-
 class DistillationLoss(nn.Module):
     """The student's network with all that is learnt beside it: its standard deviation, and what reads its latent."""
 
@@ -37,21 +25,23 @@ class DistillationLoss(nn.Module):
         settings: Distillation,
         teacher_log_std: Tensor,
         network: StudentNetwork,
-        mirrors: LossMirrors,
+        facts_mirror: MirrorMap,
+        action_mirror: MirrorMap,
         symmetry: Symmetry,
     ) -> None:
-        """`teacher_log_std`: not below the recipe's floor, (A,)."""
+        """`teacher_log_std`: not below the recipe's floor, (A,); the mirrors: of the facts that the latent is to
+        tell, and of the action."""
         super().__init__()
         self.settings, self.network = settings, network
         self.register_buffer("teacher_log_std", teacher_log_std.clone())
-        self.actions, facts = len(teacher_log_std), len(mirrors.facts_mirror)
+        self.actions, facts = len(teacher_log_std), len(facts_mirror)
         symmetric = symmetry == "construction"
-        place = std_places(self.actions, mirrors.action_mirror if symmetric else None)
+        place = std_places(self.actions, action_mirror if symmetric else None)
         kinds = np.unique(place, return_index=True)[1]
         self.register_buffer("std_place", torch.from_numpy(place), persistent=False)
         self.log_stds = nn.Parameter(teacher_log_std[kinds].clone(), requires_grad=settings.std == "learnt")
         """One for each pair of actions that the mirror swaps, and one for each other."""
-        both = (swap(settings.latent // 2), mirrors.facts_mirror) if symmetric else None
+        both = (swap(settings.latent // 2), facts_mirror) if symmetric else None
         self.reader = perceptron(settings.latent, (settings.latent,), facts, settings.activation, both)
 
     @property

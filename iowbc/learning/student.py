@@ -84,7 +84,7 @@ class StudentTraining:
         self.network.normalizer.std.copy_(teacher.normalizer.std[rows.observation])
         floor = float(np.log(settings.std_floor))
         log_std = torch.stack([one.log_std for one in teachers]).mean(0).clamp(min=floor)
-        self.loss = DistillationLoss(settings, log_std, self.network, rows, symmetry)
+        self.loss = DistillationLoss(settings, log_std, self.network, rows.facts_mirror, rows.action_mirror, symmetry)
         self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
         self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)

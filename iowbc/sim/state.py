@@ -92,34 +92,14 @@ class SimulationState:
     @classmethod
     def empty(cls, n: int, joints: int) -> Self:
         """Arrays for n environments of a robot with so many joints, upright at the origin."""
-        mask = {
-            "saturation": (joints,),
-            "foot_contact": (2,),
-            "has_object": (),
-            "grasped": (2,),
-            "slipped": (2,),
-            "diverged": (),
-        }
-        real = {
-            "joint_position": (joints,),
-            "joint_velocity": (joints,),
-            "joint_acceleration": (joints,),
-            "joint_torque": (joints,),
-            "torque_limit": (joints,),
-            "base_quaternion": (4,),
-            "base_rotation": (3, 3),
-            "torso_rotation": (3, 3),
-            "object_quaternion": (4,),
-            "foot_position": (2, 3),
-            "foot_velocity": (2, 3),
-            "foot_force": (2, 3),
-            "grip_force": (2, 3),
-            "external_force": (6,),
-            "hand_weight_share": (),
-            "link_object_force": (),
-            "partner_energy": (),
-            "partner_share": (),
-        }
+        mask = {"saturation": (joints,), "foot_contact": (2,), "grasped": (2,), "slipped": (2,)}
+        mask |= dict.fromkeys(("has_object", "diverged"), ())
+        of_joints = ("joint_position", "joint_velocity", "joint_acceleration", "joint_torque", "torque_limit")
+        of_sides = ("foot_position", "foot_velocity", "foot_force", "grip_force")
+        single = ("hand_weight_share", "link_object_force", "partner_energy", "partner_share")
+        real: dict[str, tuple[int, ...]] = dict.fromkeys(of_joints, (joints,)) | dict.fromkeys(of_sides, (2, 3))
+        real |= dict.fromkeys(single, ()) | dict.fromkeys(("base_quaternion", "object_quaternion"), (4,))
+        real |= dict.fromkeys(("base_rotation", "torso_rotation"), (3, 3)) | {"external_force": (6,)}
         arrays: dict[str, Any] = {}
         for field in fields(cls):
             if field.name in mask:

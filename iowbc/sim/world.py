@@ -13,16 +13,14 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
-from iowbc.sim.grip import Grip
-from iowbc.sim.model import compile_scene
+from iowbc.sim.grip import Grip, Squeeze
+from iowbc.sim.model import compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
 from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
 from iowbc.sim.soles import Soles
-from iowbc.sim.squeeze import Squeeze
-from iowbc.sim.stability import require_stable
 from iowbc.sim.state import SimulationState
 from iowbc.sim.timing import Timing
 

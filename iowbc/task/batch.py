@@ -90,7 +90,7 @@ class Batch:
             scenes=scenes,
             holding=self._holding,
             pushing=pushing,
-            scripts=schedule.scripts,
+            scripts=schedule.planned("script"),
             period=period,
         )
         self.judge = Judge(
@@ -101,8 +101,8 @@ class Batch:
             training=episodes is None,
             period=period,
         )
-        self._pushes = PlannedPushes(schedule.pushes, period)
-        self._pulls = PlannedPulls(schedule.pulls, period)
+        self._pushes = PlannedPushes(schedule.planned("push"), period)
+        self._pulls = PlannedPulls(schedule.planned("pull"), period)
         self._bound, self._scale = task.action.bound, action_scale(self.robot, task.action)
         arms = None if recipe.eval.public is None else recipe.eval.public.arms
         self._own_arms = np.flatnonzero([arms == "own" or (arms == "free" and name == FREE) for name in scenes])

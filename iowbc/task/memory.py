@@ -1,7 +1,7 @@
 """What the task remembers of each environment between two control steps."""
 
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -11,12 +11,8 @@ from iowbc.task.curriculum import AXES
 from iowbc.task.rewards.table import TRACKED
 
 COUNTERS = ("episode", "draws", "steps", "limit", "goal_until", "undisturbed", "walked")
-"""Integers."""
-SCALARS = (
-    *("height_rate", "phase", "heading_offset", "heading_reference", "lag", "commanded", "covered", "heading_error"),
-    "total",
-)
-"""Real numbers, one an environment."""
+FLAGS = ("walking", "infeasible", "failed", "stepping")
+"""Integers, and truths; everything else is real but for `failed_key`."""
 OF_EPISODE = (
     *("action", "earlier_action", "filtered_velocity", "excess_force", "lag", "tracking"),
     *("walked", "commanded", "covered", "heading_error", "total"),
@@ -104,30 +100,13 @@ class Memory:
     @classmethod
     def blank(cls, n: int, arms: int, support: int) -> Self:
         """All zero."""
-        counters = {name: np.zeros(n, np.int64) for name in COUNTERS}
-        return cls(
-            **counters,
-            **{name: np.zeros(n) for name in SCALARS},
-            tracking=np.zeros((n, len(TRACKED))),
-            stepping=np.zeros(n, np.bool_),
-            walking=np.zeros(n, np.bool_),
-            infeasible=np.zeros(n, np.bool_),
-            failed=np.zeros(n, np.bool_),
-            failed_key=np.zeros(n, np.uint64),
-            level=np.zeros((n, len(AXES))),
-            played=np.zeros((n, len(AXES))),
-            command=np.zeros((n, len(COMMAND))),
-            goal=np.zeros((n, len(COMMAND))),
-            foothold=np.zeros((n, 2)),
-            arms=np.zeros((n, arms)),
-            posture=np.zeros((n, support)),
-            support=np.zeros((n, support)),
-            action=np.zeros((n, support)),
-            earlier_action=np.zeros((n, support)),
-            filtered_velocity=np.zeros((n, 3)),
-            excess_force=np.zeros((n, 2)),
-            object_place=np.zeros((n, 3)),
-        )
+        kinds: dict[str, Any] = dict.fromkeys(COUNTERS, np.int64) | dict.fromkeys(FLAGS, np.bool_)
+        kinds["failed_key"] = np.uint64
+        widths = {"tracking": len(TRACKED), "foothold": 2, "filtered_velocity": 3, "excess_force": 2, "object_place": 3}
+        widths |= dict.fromkeys(("level", "played"), len(AXES)) | dict.fromkeys(("command", "goal"), len(COMMAND))
+        widths |= {"arms": arms} | dict.fromkeys(("posture", "support", "action", "earlier_action"), support)
+        shapes = {field.name: (n, widths[field.name]) if field.name in widths else (n,) for field in fields(cls)}
+        return cls(**{name: np.zeros(shape, kinds.get(name, np.float64)) for name, shape in shapes.items()})
 
     def clear(self, which: Indices) -> None:
         """Forgets what belongs to the episode that has ended in some environments, (k,)."""

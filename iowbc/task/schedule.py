@@ -1,6 +1,7 @@
 """Which episode each environment plays: drawn ones that the curriculum makes harder, or planned trials."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +9,9 @@ from numpy.typing import NDArray
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.recipe.task.task import Task
-from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty, initial_levels, next_levels, played_levels
 from iowbc.task.endings import Ending
-from iowbc.task.episodes import Episode, PlannedPull, PlannedPush
+from iowbc.task.episodes import Episode
 from iowbc.task.memory import Memory
 from iowbc.task.progress import course
 
@@ -49,20 +49,9 @@ class Schedule:
         names = sorted({name for episode in trials for name in episode.fixed})
         return {name: np.array([episode.fixed.get(name, np.nan) for episode in trials]) for name in names}
 
-    @property
-    def scripts(self) -> list[CommandScript | None]:
-        """Script of each environment, if it has one."""
-        return [None] * len(self.key) if self._trials is None else [episode.script for episode in self._trials]
-
-    @property
-    def pushes(self) -> list[PlannedPush | None]:
-        """The push planned for each environment, if there is one."""
-        return [None] * len(self.key) if self._trials is None else [episode.push for episode in self._trials]
-
-    @property
-    def pulls(self) -> list[PlannedPull | None]:
-        """The pull planned for each environment, if there is one."""
-        return [None] * len(self.key) if self._trials is None else [episode.pull for episode in self._trials]
+    def planned(self, part: str) -> list[Any]:
+        """A part of the episode that is planned for each environment, such as its script, if it has one."""
+        return [None] * len(self.key) if self._trials is None else [getattr(episode, part) for episode in self._trials]
 
     @property
     def repeats(self) -> bool:

@@ -1,7 +1,6 @@
 """The student's networks and what they learn down."""
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +20,6 @@ from iowbc.robot.mirror import MirrorMap
 OBSERVATION = MirrorMap(np.array([1, 0, 2, 3]), np.array([1, 1, -1, 1], np.float32))
 ACTION = MirrorMap(np.array([1, 0, 2]), np.array([-1, -1, 1], np.float32))
 FACTS = MirrorMap(np.array([0, 1]), np.array([1, -1], np.float32))
-
-
-@dataclass(frozen=True)
-class Sides:
-    facts_mirror: MirrorMap = FACTS
-    action_mirror: MirrorMap = ACTION
 
 
 def architecture(symmetric: bool, history: int = 9) -> dict[str, Any]:
@@ -135,7 +128,7 @@ def loss(symmetry: Symmetry = "construction", **changes: Any) -> DistillationLos
     torch.manual_seed(0)
     settings = Distillation(latent=12).model_copy(update=changes)
     network = StudentNetwork(**architecture(symmetry == "construction"))
-    return DistillationLoss(settings, torch.full((3,), math.log(0.3)), network, Sides(), symmetry)
+    return DistillationLoss(settings, torch.full((3,), math.log(0.3)), network, FACTS, ACTION, symmetry)
 
 
 def test_at_a_shared_deviation_the_divergence_is_the_squared_error_over_twice_the_variance() -> None:

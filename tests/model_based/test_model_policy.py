@@ -9,9 +9,8 @@ import pytest
 from stage_jobs import make_job
 
 from iowbc.evaluation.acting import evaluated_policy
-from iowbc.evaluation.trials.batch_policy import PolicyInBatch
 from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
-from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.recipe.evaluation.sequences import STANDING
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder

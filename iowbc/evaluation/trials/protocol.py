@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from iowbc.evaluation.trials.batch_policy import PolicyInBatch
 from iowbc.evaluation.trials.plan import (
     PlannedSweep,
     Trial,
@@ -19,7 +18,7 @@ from iowbc.evaluation.trials.plan import (
     planned_sweeps,
     push_trials,
 )
-from iowbc.evaluation.trials.rollout import Acting, play_episodes
+from iowbc.evaluation.trials.rollout import Acting, PolicyInBatch, play_episodes
 from iowbc.evaluation.trials.table import measure_of, trial_row
 from iowbc.files import newest_checked, write_checked
 from iowbc.recipe.recipe import Recipe
