@@ -5,7 +5,6 @@ The speed is that of the standing leg, or of the one that has stood longer, by j
 foot swings, its place goes to where it should land; on the ground it comes back under the pelvis as a pendulum's would.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -64,14 +63,8 @@ class FootPlacement(Constants):
         xp, legs, gravity = namespace(measured.heading), self.legs, measured.projected_gravity
         angle = xp.arctan2(gravity[:, 0], -gravity[:, 2])[:, None]
         rate = measured.base_angular_velocity[:, 1:2]
-        segments: Sequence[tuple[Array, Array]] = (
-            (legs.hip_x, legs.hip_z),
-            (legs.thigh_x, legs.thigh_z),
-            (legs.shank_x, legs.shank_z),
-            (legs.sole_x, legs.sole_z),
-        )
-        speed = -rate * pitched(direction(angle), *segments[0])[1]
-        for joint, segment in zip(self.joints, segments[1:], strict=True):
+        speed = -rate * pitched(direction(angle), *legs.hip)[1]
+        for joint, segment in zip(self.joints, (legs.thigh, legs.shank, legs.sole), strict=True):
             angle = angle + measured.joint_position[:, list(joint)]
             rate = rate + measured.joint_velocity[:, list(joint)]
             speed = speed - rate * pitched(direction(angle), *segment)[1]

@@ -1,6 +1,6 @@
 """Where the joints of the legs are, with all of them at zero."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,33 +12,29 @@ from iowbc.robot.mjcf import Hinge
 AXES = ("y", "x", "z", "y", "y", "x")
 """Axes of a leg's joints from the hip outward: hip pitch, roll, yaw, knee, ankle pitch, roll."""
 
+Pair = tuple[Array, Array]
+"""Coordinates in the sagittal plane, forward and up."""
+
 
 @dataclass(frozen=True)
 class Legs(Constants):
-    """Geometry of both legs, left and right, with all joints at zero: x forward, z up, [m]; arrays of shape (2,)."""
+    """Geometry of both legs, left and right, with all joints at zero: [m]; arrays of shape (2,)."""
 
     side: Array
     """The sole's distance to the left of the base."""
-    hip_x: Array
-    hip_z: Array
+    hip: Pair
     """The hip pitch axis ahead of and above the base."""
-    thigh_x: Array
-    thigh_z: Array
+    thigh: Pair
     """The knee from the hip pitch axis."""
-    shank_x: Array
-    shank_z: Array
+    shank: Pair
     """The ankle pitch axis from the knee."""
-    sole_x: Array
-    sole_z: Array
+    sole: Pair
     """The sole's centre from the ankle pitch axis."""
-    roll_x: Array
-    roll_z: Array
+    roll: Pair
     """The hip roll axis from the hip pitch axis."""
-    yaw_x: Array
-    yaw_z: Array
+    yaw: Pair
     """The hip yaw axis from the hip pitch axis."""
-    tilt_x: Array
-    tilt_z: Array
+    tilt: Pair
     """Direction of the hip yaw axis."""
     ankle_roll_z: Array
     """The ankle roll axis above the sole's centre."""
@@ -69,45 +65,36 @@ def leg_joints(robot: Robot) -> list[list[int]]:
 
 def leg_geometry(robot: Robot) -> Legs:
     """The legs' geometry, from the robot's description."""
-    rows = []
-    for sole_body, sole in zip(robot.sole_bodies, robot.soles, strict=True):
-        place, direction = [], []
-        position, rotation = np.zeros(3), np.eye(3)
-        for body in robot.tree.chain(sole_body, robot.base):
-            position = position + rotation @ body.position
-            rotation = rotation @ rotations.matrix(body.quaternion)
-            if body.hinge is not None:
-                place.append(position)
-                direction.append(rotation @ body.hinge.axis)
-        end = robot.tree.forward(dict.fromkeys(robot.joints, 0.0), robot.base, sole)[0]
-        hip, roll, yaw, knee, ankle, ankle_roll = place
-        thigh, shank = knee - hip, ankle - knee
-        thigh_squared, shank_squared = (link[0] * link[0] + link[2] * link[2] for link in (thigh, shank))
-        rows.append(
-            Legs(
-                side=end[1],
-                hip_x=hip[0],
-                hip_z=hip[2],
-                thigh_x=thigh[0],
-                thigh_z=thigh[2],
-                shank_x=shank[0],
-                shank_z=shank[2],
-                sole_x=(end - ankle)[0],
-                sole_z=(end - ankle)[2],
-                roll_x=(roll - hip)[0],
-                roll_z=(roll - hip)[2],
-                yaw_x=(yaw - hip)[0],
-                yaw_z=(yaw - hip)[2],
-                tilt_x=direction[2][0],
-                tilt_z=direction[2][2],
-                ankle_roll_z=(ankle_roll - end)[2],
-                thigh_squared=thigh_squared,
-                shank_squared=shank_squared,
-                twice_product=2.0 * np.sqrt(thigh_squared * shank_squared),
-                crooked=np.arctan2(-shank[0], -shank[2]) - np.arctan2(-thigh[0], -thigh[2]),
-            )
-        )
-    return Legs(**{field.name: np.array([getattr(row, field.name) for row in rows]) for field in fields(Legs)})
+    legs = [_vectors(robot, *pair) for pair in zip(robot.sole_bodies, robot.soles, strict=True)]
+    both = {name: np.array([leg[name] for leg in legs]) for name in legs[0]}
+    side, ankle_roll = both.pop("side")[:, 1], both.pop("ankle_roll")[:, 2]
+    thigh, shank = both["thigh"], both["shank"]
+    thigh_squared, shank_squared = (link[:, 0] * link[:, 0] + link[:, 2] * link[:, 2] for link in (thigh, shank))
+    return Legs(
+        side=side,
+        **{name: (vectors[:, 0], vectors[:, 2]) for name, vectors in both.items()},
+        ankle_roll_z=ankle_roll,
+        thigh_squared=thigh_squared,
+        shank_squared=shank_squared,
+        twice_product=2.0 * np.sqrt(thigh_squared * shank_squared),
+        crooked=np.arctan2(-shank[:, 0], -shank[:, 2]) - np.arctan2(-thigh[:, 0], -thigh[:, 2]),
+    )
+
+
+def _vectors(robot: Robot, sole_body: str, sole: str) -> dict[str, Array]:
+    """Of one leg, by the names of `Legs`, (3,) each; `side`: the sole's centre from the base."""
+    place, direction = [], []
+    position, rotation = np.zeros(3), np.eye(3)
+    for body in robot.tree.chain(sole_body, robot.base):
+        position = position + rotation @ body.position
+        rotation = rotation @ rotations.matrix(body.quaternion)
+        if body.hinge is not None:
+            place.append(position)
+            direction.append(rotation @ body.hinge.axis)
+    end = robot.tree.forward(dict.fromkeys(robot.joints, 0.0), robot.base, sole)[0]
+    hip, roll, yaw, knee, ankle, ankle_roll = place
+    vectors = {"side": end, "hip": hip, "thigh": knee - hip, "shank": ankle - knee, "sole": end - ankle}
+    return vectors | {"roll": roll - hip, "yaw": yaw - hip, "tilt": direction[2], "ankle_roll": ankle_roll - end}
 
 
 def _axis(hinge: Hinge) -> str:
@@ -122,7 +109,7 @@ def direction(angle: Array) -> tuple[Array, Array]:
     return xp.cos(angle), xp.sin(angle)
 
 
-def pitched(direction: tuple[Array, Array], x: Array, z: Array) -> tuple[Array, Array]:
+def pitched(direction: tuple[Array, Array], x: Array, z: Array) -> Pair:
     """Vectors of the sagittal plane turned as a positive pitch turns them: what points up leans forward."""
     cosine, sine = direction
     return cosine * x + sine * z, cosine * z - sine * x

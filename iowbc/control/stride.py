@@ -94,7 +94,7 @@ class Stride(Constants):
         time = gait.stance / gait.frequency * gait.stride
         part = travel(foot, swing, gait.stance) * time * stepping[:, None]
         rate = command[:, YAW_RATE : YAW_RATE + 1]
-        place_x = xp.cos(pitch) * legs.hip_x + xp.sin(pitch) * legs.hip_z + ankle_x + legs.sole_x
+        place_x = xp.cos(pitch) * legs.hip[0] + xp.sin(pitch) * legs.hip[1] + ankle_x + legs.sole[0]
         sway = gait.sway * (xp.sin(2.0 * np.pi * phase) * stepping)[:, None]
         return (
             part * (command[:, 0:1] - rate * legs.side),
@@ -126,8 +126,8 @@ def travel(foot: Array, swing: Array, stance: float) -> Array:
 
 def _ankle(legs: Legs, knee: Array) -> tuple[Array, Array]:
     """The ankle ahead of and above the hip pitch axis, in the thigh's frame, (n, 2) [m]."""
-    x, z = pitched(direction(knee), legs.shank_x, legs.shank_z)
-    return legs.thigh_x + x, legs.thigh_z + z
+    x, z = pitched(direction(knee), *legs.shank)
+    return legs.thigh[0] + x, legs.thigh[1] + z
 
 
 def _sideways(legs: Legs, thigh: Array, knee: Array, left: Array, turn: Array) -> tuple[Array, Array, Array]:
@@ -138,11 +138,11 @@ def _sideways(legs: Legs, thigh: Array, knee: Array, left: Array, turn: Array) -
     """
     leaning = direction(thigh)
     ankle_x, ankle_z = _ankle(legs, knee)
-    sole_x, sole_z = legs.sole_x, legs.sole_z + legs.ankle_roll_z
+    sole_x, sole_z = legs.sole[0], legs.sole[1] + legs.ankle_roll_z
     roll_x, roll_z = leaning[0], -leaning[1]
-    yaw_x, yaw_z = pitched(leaning, legs.tilt_x, legs.tilt_z)
-    from_roll = pitched(leaning, ankle_x - legs.roll_x, ankle_z - legs.roll_z)
-    from_yaw = pitched(leaning, ankle_x - legs.yaw_x, ankle_z - legs.yaw_z)
+    yaw_x, yaw_z = pitched(leaning, *legs.tilt)
+    from_roll = pitched(leaning, ankle_x - legs.roll[0], ankle_z - legs.roll[1])
+    from_yaw = pitched(leaning, ankle_x - legs.yaw[0], ankle_z - legs.yaw[1])
     roll_lever = roll_z * (from_roll[0] + sole_x) - roll_x * (from_roll[1] + sole_z)
     yaw_lever = yaw_z * (from_yaw[0] + sole_x) - yaw_x * (from_yaw[1] + sole_z)
     whole = roll_lever * yaw_z - yaw_lever * roll_z

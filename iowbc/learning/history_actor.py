@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from iowbc.learning.networks import Mirrors, Normalizer, StudentNetwork, mirror_as_json
+from iowbc.learning.networks import Mirrors, Normalizer, StudentNetwork, mirror_as_json, mirrors_as_json
 from iowbc.learning.perceptron import Hidden, Perceptron
 from iowbc.recipe.teacher import Teacher
 from iowbc.robot.mirror import MirrorMap
@@ -20,7 +20,6 @@ def student_architecture(teacher: Teacher, observation: int, actions: int, mirro
     sign = np.asarray(rows.sign)
     own = MirrorMap(rows.permutation[:observation], sign[:observation])
     privileged = MirrorMap(rows.permutation[observation:] - observation, sign[observation:])
-    symmetric = teacher.symmetry == "construction"
     return {
         "observation": observation,
         "history": teacher.history.length,
@@ -31,7 +30,7 @@ def student_architecture(teacher: Teacher, observation: int, actions: int, mirro
         "activation": teacher.activation,
         "clip": teacher.normalization_clip,
         "encoder": teacher.history.encoder,
-        "mirrors": [mirror_as_json(own), mirror_as_json(action)] if symmetric else None,
+        "mirrors": mirrors_as_json((own, action), teacher.symmetry),
         "privileged": mirror_as_json(privileged) if teacher.history.estimate else None,
     }
 

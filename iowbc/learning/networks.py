@@ -30,6 +30,11 @@ def mirror_as_json(mirror: MirrorMap) -> dict[str, list[float]]:
     return {"permutation": mirror.permutation.tolist(), "sign": np.asarray(mirror.sign).tolist()}
 
 
+def mirrors_as_json(mirrors: Mirrors, symmetry: str) -> Any:
+    """Both mirrors as plain values, where networks are symmetric by construction."""
+    return [mirror_as_json(mirror) for mirror in mirrors] if symmetry == "construction" else None
+
+
 def mirror_from_json(plain: Any) -> MirrorMap:
     """Inverse of `mirror_as_json`."""
     return MirrorMap(np.array(plain["permutation"], np.int64), np.array(plain["sign"], np.float32))

@@ -23,7 +23,7 @@ from iowbc.learning.as_numpy import acting_policy
 from iowbc.learning.computing import SideBySide, reduced
 from iowbc.learning.gaussian import divergence, entropy, log_density
 from iowbc.learning.history_actor import student_architecture
-from iowbc.learning.networks import Mirrors, mirror_as_json
+from iowbc.learning.networks import Mirrors, mirrors_as_json
 from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples, neighbours
@@ -262,14 +262,13 @@ def _policy_arguments(teacher: Teacher, env: Any, mirrors: Mirrors, value_only: 
         size = env.observation_space.shape[0] - len(mirrors[0])
         observation = size // (teacher.history.length - 1)
         student = student_architecture(teacher, observation, env.action_space.shape[0], mirrors)
-    symmetric = teacher.symmetry == "construction"
     return {
         "hidden": list(teacher.hidden),
         "activation": teacher.activation,
         "clip": teacher.normalization_clip,
         "initial_std": teacher.initial_std,
         "std_learning_rate": teacher.std_learning_rate,
-        "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
+        "mirrors": mirrors_as_json(mirrors, teacher.symmetry),
         "value_only": list(value_only),
         "student": student,
     }

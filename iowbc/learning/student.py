@@ -15,7 +15,7 @@ from iowbc.learning.as_numpy import student_policy, teacher_policy
 from iowbc.learning.distillation import Experience, mirror_half, spread
 from iowbc.learning.distillation_loss import DistillationLoss, Symmetry
 from iowbc.learning.environments import Environments
-from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json
+from iowbc.learning.networks import StudentNetwork, TeacherNetwork, mirror_as_json, mirrors_as_json
 from iowbc.recipe.distillation import Distillation
 from iowbc.robot.mirror import MirrorMap, side_by_side
 from iowbc.rollouts.blocks import block_size
@@ -62,7 +62,6 @@ class StudentTraining:
         self.teachers, self.teacher_of = tuple(map(teacher_policy, teachers)), teacher_of
         teacher = teachers[0]
         size, actions = rows.observation.stop, environments.action_space.shape[0]
-        mirrors = [mirror_as_json(rows.observation_mirror), mirror_as_json(rows.action_mirror)]
         inherits = settings.start == "teacher"
         self.architecture: dict[str, Any] = {
             "observation": size,
@@ -74,7 +73,7 @@ class StudentTraining:
             "activation": architecture["activation"] if inherits else settings.activation,
             "clip": teacher.normalizer.clip,
             "encoder": settings.encoder,
-            "mirrors": mirrors if symmetry == "construction" else None,
+            "mirrors": mirrors_as_json((rows.observation_mirror, rows.action_mirror), symmetry),
             "privileged": mirror_as_json(rows.privileged_mirror) if inherits else None,
         }
         self.network = StudentNetwork(**self.architecture)

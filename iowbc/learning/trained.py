@@ -10,7 +10,7 @@ from torch import Tensor
 
 from iowbc.learning.gaussian import std_places
 from iowbc.learning.history_actor import HistoryActor, student_architecture
-from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork, mirror_as_json
+from iowbc.learning.networks import Mirrors, StudentNetwork, TeacherNetwork, mirrors_as_json
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.storage import Network
 from iowbc.recipe.teacher import Teacher
@@ -29,7 +29,14 @@ def trained_network(
     network: Network
     with torch.random.fork_rng(devices=()):
         if settings.history is None:
-            architecture = _teacher_architecture(settings, len(mean), mirrors)
+            architecture = {
+                "inputs": len(mean),
+                "actions": actions,
+                "hidden": list(settings.hidden),
+                "activation": settings.activation,
+                "clip": settings.normalization_clip,
+                "mirrors": mirrors_as_json(mirrors, settings.symmetry),
+            }
             network = TeacherNetwork(**architecture)
             network.body.load_state_dict(_part("actor.", arrays))
         else:
@@ -61,15 +68,3 @@ def take_over(policy: ActorCritic, network: Network) -> None:
 
 def _part(beginning: str, arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:
     return {name.removeprefix(beginning): value for name, value in arrays.items() if name.startswith(beginning)}
-
-
-def _teacher_architecture(settings: Teacher, inputs: int, mirrors: Mirrors) -> dict[str, Any]:
-    symmetric = settings.symmetry == "construction"
-    return {
-        "inputs": inputs,
-        "actions": len(mirrors[1]),
-        "hidden": list(settings.hidden),
-        "activation": settings.activation,
-        "clip": settings.normalization_clip,
-        "mirrors": [mirror_as_json(mirror) for mirror in mirrors] if symmetric else None,
-    }

@@ -9,7 +9,6 @@ from iowbc.arrays import Indices, as_slice
 from iowbc.robot.description import Robot
 from iowbc.sim.objects import HANDS
 
-BASE = slice(0, 7)
 BASE_LINEAR = slice(0, 3)
 BASE_ANGULAR = slice(3, 6)
 

@@ -123,7 +123,6 @@ class Simulation:
         width = self._sensing.noise_width + partner.NOISE_WIDTH
         self._noise = np.zeros((n, width + width % 2))
         self.divergences: deque[Divergence] = deque(maxlen=recipe.physics.divergences_kept)
-        self.divergence_count = 0
 
     @property
     def infeasible(self) -> NDArray[np.bool_]:
@@ -283,7 +282,6 @@ class Simulation:
         return self._pressed + np.minimum(needed, self._strength)
 
     def _keep_divergences(self, world: World, ids: Indices, given: Period) -> None:
-        self.divergence_count += len(ids)
         for index in ids:
             row = int(world.rows[index])
             arrays = world.record(int(index)) | given.of(row)

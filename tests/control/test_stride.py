@@ -129,8 +129,8 @@ def test_at_rest_the_posture_is_left_alone(robot: Robot, stride: Stride) -> None
 
 def test_the_mirrored_command_half_a_stride_later_gives_the_mirrored_stride(robot: Robot, stride: Stride) -> None:
     random, rows = np.random.default_rng(0), 64
-    legs = {name: np.full(2, getattr(stride.legs, name).mean()) for name in vars(stride.legs) if name != "side"}
-    even = replace(stride, legs=replace(stride.legs, **legs, side=stride.legs.side[0] * np.array([1.0, -1.0])))
+    legs = stride.legs.converted(lambda values: np.full(2, values.mean()))
+    even = replace(stride, legs=replace(legs, side=stride.legs.side[0] * np.array([1.0, -1.0])))
     posture = robot.default_position[robot.support] + 0.1 * random.normal(size=(rows, 15))
     command, phase = random.uniform(-0.4, 0.4, (rows, 11)), random.uniform(size=rows)
     pitch, ones = random.uniform(-0.2, 0.4, rows), np.ones(rows)

@@ -5,7 +5,7 @@ import pytest
 
 from iowbc.arrays import Array
 from iowbc.control.command import rate_limits
-from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still, given_commands
+from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still
 from iowbc.evaluation.trials.plan import SPLITS, planned_sweeps, trial_seed
 from iowbc.evaluation.trials.quick import quick_trials
 from iowbc.evaluation.trials.scripts import drawn_script
@@ -28,7 +28,7 @@ def drawn(seed: int, *, pushing: bool = False, scripts: DrawnScripts = SCRIPTS) 
 
 
 def given(script: CommandScript) -> Array:
-    return given_commands(script, round(script.duration / DT), DT)
+    return script.at(DT * np.arange(round(script.duration / DT)))
 
 
 @pytest.mark.parametrize("pushing", [False, True])

@@ -6,7 +6,7 @@ import pytest
 from iowbc.control.command import rate_limits
 from iowbc.control.gait import wants_to_move
 from iowbc.evaluation.paper import TABLES
-from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still, given_commands
+from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still
 from iowbc.evaluation.trials.plan import command_script
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING, STAGNATION
@@ -21,7 +21,7 @@ DT = 0.02
 def test_a_statue_does_not_beat_the_paper(suite: str, sequence: tuple[Segment, ...]) -> None:
     script = command_script(sequence, COMMANDS)
     assert script.duration == 20.0
-    given = given_commands(script, 1000, DT)
+    given = script.at(DT * np.arange(1000))
     deviations = deviations_standing_still(given, COMMANDS, DT)
     for part in (slice(None), wants_to_move(given, References().gait)):
         still = deviations.means(part=part)
@@ -35,13 +35,13 @@ def test_a_statue_does_not_beat_the_paper(suite: str, sequence: tuple[Segment, .
 
 @pytest.mark.parametrize("sequence", [LIFTING, PUSHING, STAGNATION])
 def test_commands_change_no_faster_than_they_may(sequence: tuple[Segment, ...]) -> None:
-    given = given_commands(command_script(sequence, COMMANDS), 1000, DT)
+    given = command_script(sequence, COMMANDS).at(DT * np.arange(1000))
     steepest = np.abs(np.diff(given, axis=0)).max(axis=0) / DT
     assert (steepest <= rate_limits(COMMANDS.rates) * (1 + 1e-9)).all(), steepest
 
 
 def test_lifting_asks_for_every_kind_of_motion() -> None:
-    given = given_commands(command_script(LIFTING, COMMANDS), 1000, DT)
+    given = command_script(LIFTING, COMMANDS).at(DT * np.arange(1000))
     low, high = given.min(axis=0), given.max(axis=0)
     assert (low[0], high[0], high[1]) == (-0.3, 0.5, 0.2)
     assert (low[2], high[2]) == (-0.4, 0.4)
@@ -52,7 +52,7 @@ def test_lifting_asks_for_every_kind_of_motion() -> None:
 
 
 def test_pushing_asks_for_nothing_that_an_unheld_crate_cannot_follow() -> None:
-    given = given_commands(command_script(PUSHING, COMMANDS), 1000, DT)
+    given = command_script(PUSHING, COMMANDS).at(DT * np.arange(1000))
     assert given[:, 0].min() == 0.0
     assert not given[:, 1].any()
     assert (given[:, 3].min(), given[:, 3].max()) == pytest.approx((0.5, 0.76))

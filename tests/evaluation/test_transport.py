@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.errors import given_commands
 from iowbc.evaluation.trials.table import succeeded
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
 from iowbc.recipe.evaluation.evaluation import Success
@@ -18,7 +17,7 @@ def given(*velocities: tuple[float, float, float]) -> Array:
     """Five seconds of each velocity, in order."""
     segments = tuple(CommandSegment(5.0, (*velocity, *REST)) for velocity in velocities)
     script = CommandScript(segments)
-    return given_commands(script, round(script.duration / DT), DT)
+    return script.at(DT * np.arange(round(script.duration / DT)))
 
 
 def walked(commands: Array, heading: float, speed: float) -> Array:

@@ -44,3 +44,18 @@ def make(recipe: Recipe, folder: Path) -> Iterator[Callable[..., VectorEnv]]:
     yield maker
     for env in made:
         env.close()
+
+
+@pytest.fixture
+def opened(folder: Path) -> Iterator[Callable[..., VectorEnv]]:
+    """Opens two environments of a recipe."""
+    made: list[VectorEnv] = []
+
+    def maker(recipe: Recipe, workers: int = 0, **options: Any) -> VectorEnv:
+        made.append(VectorEnv(Specification(recipe, folder), num_envs=2, workers=workers, seed=1, **options))
+        made[-1].reset()
+        return made[-1]
+
+    yield maker
+    for env in made:
+        env.close()

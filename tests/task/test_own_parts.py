@@ -34,20 +34,6 @@ def named_parts(parts: dict[str, Any]) -> Recipe:
     return Recipe.model_validate({"name": "mine", "task": task})
 
 
-@pytest.fixture
-def opened(folder: Path) -> Any:
-    made: list[VectorEnv] = []
-
-    def maker(recipe: Recipe, workers: int = 0, **options: Any) -> VectorEnv:
-        made.append(VectorEnv(Specification(recipe, folder), num_envs=2, workers=workers, seed=1, **options))
-        made[-1].reset()
-        return made[-1]
-
-    yield maker
-    for env in made:
-        env.close()
-
-
 def parts(env: VectorEnv, rows: Any) -> tuple[Any, Any]:
     """The part of one's own and what it copies."""
     places = env.layout.slices

@@ -17,7 +17,6 @@ from iowbc.recipe.section import deciding
 from iowbc.stages.registry import STAGES
 from iowbc.task.commands.script import CommandScript, CommandSegment
 from iowbc.task.episodes import Episode
-from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
 HALF = "import numpy as np\n\n\ndef half(step):\n    return np.full(len(step.command), 0.5)\n"
@@ -31,20 +30,6 @@ def own_recipe(folder: Path, source: str = HALF, /, **term: Any) -> Recipe:
     given = {"task": {"reward": {"own": {"mine": entry}}, "scenes": {"free": 1.0, "lift": 0.0}}}
     (folder / "mine.yaml").write_text(yaml.safe_dump(given))
     return load_recipe(folder / "mine.yaml").recipe
-
-
-@pytest.fixture
-def opened(folder: Path) -> Any:
-    made: list[VectorEnv] = []
-
-    def maker(recipe: Recipe, workers: int = 0, **options: Any) -> VectorEnv:
-        made.append(VectorEnv(Specification(recipe, folder), num_envs=2, workers=workers, seed=1, **options))
-        made[-1].reset()
-        return made[-1]
-
-    yield maker
-    for env in made:
-        env.close()
 
 
 def test_a_term_of_ones_own_counts_by_its_weight_in_worker_processes_too(opened: Open, tmp_path: Path) -> None:

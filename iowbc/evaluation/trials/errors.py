@@ -8,7 +8,6 @@ from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
-from iowbc.task.commands.script import CommandScript
 
 ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 """The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""
@@ -27,13 +26,6 @@ class Deviations(NamedTuple):
         """The four errors over a part of the trial, by `ERRORS` and a suffix; NaN where the part is empty."""
         parts = {f"{name}{suffix}": values[part] for name, values in zip(ERRORS, self, strict=True)}
         return {name: float(np.mean(values)) if len(values) else np.nan for name, values in parts.items()}
-
-
-def given_commands(script: CommandScript, steps: int, dt: float) -> Array:
-    """The commands that a script gives in force in each of the first control steps, (steps, 11)."""
-    times, values = script.knots()
-    at = dt * np.arange(steps)
-    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
 
 
 def start_heading(trace: Trace) -> float:

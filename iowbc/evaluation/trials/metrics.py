@@ -67,8 +67,8 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Me
     """
     if len(trace) == 0:
         raise ValueError("a trial without a single step has no metrics")
-    whole = errors.given_commands(script, round(script.duration / trace.dt), trace.dt)
-    given = errors.given_commands(script, len(trace), trace.dt)
+    whole = script.at(trace.dt * np.arange(round(script.duration / trace.dt)))
+    given = script.at(trace.dt * np.arange(len(trace)))
     moving = wants_to_move(given, measure.gait)
     deviations = errors.deviations_from_given(trace, given, measure.window)
     still = errors.deviations_standing_still(whole, measure.commands, trace.dt)

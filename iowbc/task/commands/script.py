@@ -45,10 +45,10 @@ class CommandScript:
         """Total time of the segments [s]."""
         return sum(segment.duration for segment in self.segments)
 
-    def at(self, time: float) -> Array:
-        """The command at a time from the start [s], shape (11,)."""
+    def at(self, time: float | Array) -> Array:
+        """The commands at times from the start (...) [s], shape (..., 11)."""
         times, values = self.knots()
-        return np.array([np.interp(time, times, column) for column in values.T])
+        return np.stack([np.interp(time, times, column) for column in values.T], axis=-1)
 
     def knots(self) -> tuple[Array, Array]:
         """The piecewise linear command as times (k,) [s] and values (k, 11)."""

@@ -1,8 +1,11 @@
-"""Memory that the parent and its workers share: anonymous, so that nothing is left behind whoever dies."""
+"""Arrays of many environments, whichever processes step them: memory that parent and workers share, and snapshots.
+
+The memory is anonymous, so that nothing is left behind whoever dies.
+"""
 
 import mmap
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,3 +66,24 @@ def _place(fields: Fields, rows: int) -> tuple[dict[str, int], int]:
         size = rows * int(np.prod(shape, dtype=int)) * np.dtype(dtype).itemsize
         end += -(-size // ALIGNMENT) * ALIGNMENT
     return offsets, max(end, 1)
+
+
+def join(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """The state of consecutive groups of environments as that of all."""
+    names = list(dict.fromkeys(name for part in parts for name in part))
+    return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
+
+
+def split(arrays: Mapping[str, NDArray[Any]], scenes: Sequence[Sequence[str]]) -> list[dict[str, NDArray[Any]]]:
+    """Inverse of `join` for groups of environments with these scenes, in order."""
+    parts: list[dict[str, NDArray[Any]]] = [{} for _ in scenes]
+    for name, values in arrays.items():
+        start = 0
+        for part, group in zip(parts, scenes, strict=True):
+            count = group.count(name.split("/")[1]) if name.startswith("scene/") else len(group)
+            if count:
+                part[name] = values[start : start + count]
+            start += count
+        if start != len(values):
+            raise ValueError(f"state of other environments: {name} has {len(values)} rows, expected {start}")
+    return parts

@@ -25,7 +25,7 @@ from iowbc.task.record.statistics import Statistics
 from iowbc.task.rewards.reward import load_terms, term_names
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
-from iowbc.task.vector.snapshots import join, split
+from iowbc.task.vector.shared import join, split
 from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 
