@@ -92,13 +92,8 @@ class SimulationState:
     @classmethod
     def empty(cls, n: int, joints: int) -> Self:
         """Arrays for n environments of a robot with so many joints, upright at the origin."""
-        mask: dict[str, tuple[int, ...]] = {
-            "saturation": (joints,),
-            "foot_contact": (2,),
-            "grasped": (2,),
-            "slipped": (2,),
-        }
-        mask |= dict.fromkeys(("has_object", "diverged"), ())
+        mask: dict[str, tuple[int, ...]] = dict.fromkeys(("foot_contact", "grasped", "slipped"), (2,))
+        mask |= {"saturation": (joints,), "has_object": (), "diverged": ()}
         of_joints = ("joint_position", "joint_velocity", "joint_acceleration", "joint_torque", "torque_limit")
         of_sides = ("foot_position", "foot_velocity", "foot_force", "grip_force")
         single = ("hand_weight_share", "link_object_force", "partner_energy", "partner_share")
