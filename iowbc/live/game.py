@@ -10,8 +10,7 @@ from iowbc.learning.networks import TeacherNetwork
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import GameMarks
 from iowbc.live.moment import Moment, Witness
-from iowbc.live.played import PAST, Played
-from iowbc.live.track import track_of
+from iowbc.live.track import PAST, Played, track_of
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
 from iowbc.skill.evaluation.games import acted
@@ -63,12 +62,10 @@ class GameSession(Played):
         self.reset()
 
     def begin(self, request: GameRequest) -> None:
-        """See `Played`."""
         self._game.close()
         self._open(request)
 
     def reset(self) -> None:
-        """See `Played`."""
         self._seen = self._game.reset().observations["robot"]
         batch, state = self._game.batch, self._lower.simulation.state
         self._steps, self._grip, batch.hand[:] = 0, None, np.nan
@@ -82,7 +79,6 @@ class GameSession(Played):
         self.track.moments.append(self._look())
 
     def step(self) -> None:
-        """See `Played`."""
         if self.track.ending:
             return
         batch = self._game.batch
@@ -121,7 +117,6 @@ class GameSession(Played):
             hand[:2] = (point - beside)[:2]
 
     def close(self) -> None:
-        """See `Played`."""
         self._game.close()
 
     def _look(self) -> Moment:

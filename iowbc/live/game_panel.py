@@ -32,19 +32,16 @@ class GamePanel(ControlPanel):
 
     @property
     def conditions(self) -> GameRequest:
-        """See `ControlPanel`."""
         return GameRequest(self.task.value, int(self.seed.value), self.rival.value)
 
     def steer(self) -> None:
         """The mouse steers."""
 
     def press(self, button: Button) -> None:
-        """See `ControlPanel`."""
         if button == "next task":
             self.task.value = self._names[(self._names.index(self.task.value) + 1) % len(self._names)]
 
     def figures_at(self, track: Track, place: int) -> str:
-        """See `ControlPanel`."""
         moment = track.moments[place]
         first = max(0, place + 1 - round(WINDOW / track.period))
         pulls = [np.linalg.norm(track.moments[index].forces[0].force) for index in range(first, place + 1)]
