@@ -14,8 +14,7 @@ from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import recall
-from iowbc.pipeline.store.links import named_folder
+from iowbc.pipeline.store.last_used import named_folder, recall
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.results.table import Table, drawn, read_tables
@@ -87,7 +86,7 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
     what it has without any.
     """
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
-    overrides = recall(runs, recipe).get("overrides", [])
+    overrides = recall(runs, recipe).overrides
     lasting = not overrides or any(override.startswith("name=") for override in overrides)
     own = last_used(Store(runs), recipe) if lasting else {}
     others = {

@@ -1,6 +1,6 @@
 """`iowbc sweep`: a recipe with every combination of some values, several runs at a time, and what came of them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,6 @@ from iowbc.commands.run import engine, run_recipe
 from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.console.board import Board, RunView
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -68,7 +67,7 @@ class ReadyPoint:
     request: Request
 
 
-def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, list[ReadyPoint]]:
+def ready(asked: SweepRequest) -> tuple[Sweep, list[ReadyPoint]]:
     """The points of a sweep. Raises `RecipeError` for all that is wrong before any runs."""
     if asked.recipe.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
@@ -77,7 +76,7 @@ def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, li
     points = []
     for point in found.points:
         request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
-        points.append(ReadyPoint(point, prepared(point.loaded, request, registry), request))
+        points.append(ReadyPoint(point, prepared(point.loaded, request.runs, request.options), request))
     return found, points
 
 
@@ -98,9 +97,9 @@ def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
+def plan_sweep(asked: SweepRequest, console: Console, as_json: bool = False) -> None:
     """Print a row for each point of a sweep with what would run, and all together. Raises `RecipeError`."""
-    sweep, points = ready(asked, registry)
+    sweep, points = ready(asked)
     found = planned([one.planner for one in points])
     if as_json:
         data = [_data(one.point, found[one.point.name]) for one in points]
@@ -115,12 +114,12 @@ def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 
-def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, quiet: bool = False) -> int:
+def sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
     """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
 
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
     """
-    found, points = ready(asked, registry)
+    found, points = ready(asked)
     _require_origins(asked.recipe, points)
     runs, execution = asked.recipe.runs, points[0].planner.loaded.recipe.execution
     require_training("sweep")

@@ -225,7 +225,7 @@ def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
     runs.tracking.mkdir(parents=True, exist_ok=True)
     with _log(runs) as log:
         return subprocess.Popen(
-            [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root.absolute())],
+            [sys.executable, "-m", "iowbc.pipeline.tracking.delivery", str(runs.root.absolute())],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
