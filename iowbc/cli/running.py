@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from iowbc.cli.options import AsJson, RunsFolder, console, runs_folder
+from iowbc.cli.options import AsJson, RunsFolder, console
 from iowbc.commands import completion
 from iowbc.commands.process import outlasting_readers
 
@@ -165,6 +165,7 @@ def request_of(
 ) -> "Request":
     from iowbc.commands.request import Request
     from iowbc.pipeline.stage_plan import Options
+    from iowbc.pipeline.store.runs import Runs
 
     asked = Options(force=frozenset(force or ()), **options)
-    return Request(recipe, tuple(overrides or ()), runs_folder(runs), asked)
+    return Request(recipe, tuple(overrides or ()), Runs(runs or Path("runs")), asked)

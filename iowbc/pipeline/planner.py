@@ -13,8 +13,7 @@ from iowbc.pipeline.stage_plan import Options, StagePlan, estimated
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import Workspace
-from iowbc.processes import available_cores
+from iowbc.pipeline.store.workspace import read_progress
 from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.section import deciding
@@ -37,11 +36,6 @@ class Planner:
     def __post_init__(self) -> None:
         self.robot_digest = folder_digest(self.robot)
         self.deciding = deciding(self.loaded.recipe)
-
-    @property
-    def workers(self) -> int:
-        """Worker processes of a stage: as asked for, or the recipe's, or as many as there are cores."""
-        return self.options.workers or self.loaded.recipe.execution.workers or available_cores()
 
     def plan(self, known: "Plans | None" = None) -> list[StagePlan]:
         """A step for each stage, as things stand; nothing is changed. `known`: plans made in the same moment."""
@@ -104,7 +98,8 @@ class Planner:
             "robot": self.robot_digest,
         }
         former = self._closest(stage.name, ingredients)
-        step = StagePlan(stage, code=stage_code(stage))
+        there = {name: artifact for name, artifact in inputs.items() if artifact is not None}
+        step = StagePlan(stage, code=stage_code(stage), inputs=there)
         if former is not None:
             step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
         if unknown:
@@ -141,13 +136,13 @@ class Planner:
     def _resumed(self, step: StagePlan) -> StagePlan:
         """A step that runs, with what it goes on from: an earlier attempt, or an artifact that ends earlier."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
-        record, forced = Workspace(self.store.runs, stage.name, step.known_key).record, stage.name in self.options.force
+        record, forced = read_progress(self.store.runs.work / step.known_key), stage.name in self.options.force
         if record and (record.forced or not forced):
             notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
             if record.done and record.total and record.seconds:  # the rest at its own rate
                 expected = record.seconds * max(0.0, record.total / record.done - 1.0)
         if not forced:
-            predecessor = self._predecessor(stage, step.ingredients or {})
+            predecessor = self._predecessor(stage, step.ingredients)
         if predecessor is not None:
             notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
             expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)

@@ -21,6 +21,7 @@ from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
+from iowbc.processes import available_cores
 from iowbc.recipe.reading.document import as_yaml
 
 
@@ -71,14 +72,15 @@ class Runner:
     execute: Callable[[Stage, Job], None] = lambda stage, job: stage.run(job)
     """Carries a stage out, with the same result wherever; in this process by default."""
     workers: int = 0
-    """Processes of a stage; 0 for the planner's."""
+    """Processes of a stage; 0: as asked for, or the recipe's, or as many as there are cores."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)
     made: list[str] = field(default_factory=list)
     """Stages that were not cached."""
 
     def __post_init__(self) -> None:
         self.loaded, self.store, self.options = self.planner.loaded, self.planner.store, self.planner.options
-        self.workers = self.workers or self.planner.workers
+        asked = self.options.workers or self.loaded.recipe.execution.workers
+        self.workers = self.workers or asked or available_cores()
         self.views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
 
     def run(self) -> dict[str, Artifact]:
@@ -142,16 +144,13 @@ class Runner:
                     workspace.remove()
 
     def _decide(self, stage: Stage, whole: bool) -> StagePlan:
-        return self.planner.decide(stage, self._inputs(stage), whole=whole)
-
-    def _inputs(self, stage: Stage) -> dict[str, Artifact]:
         read = {name: self.artifacts[name] for name in stage.reads(self.loaded.recipe)}
         for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
                 origin = self.planner.origins[stage.name, name].loaded.file
                 raise PipelineFailed(f"{stage.name} reads an artifact of {origin}; first `iowbc run {origin}`")
             read[name] = artifact
-        return read
+        return self.planner.decide(stage, read, whole=whole)
 
     def _reused(self, step: StagePlan) -> Artifact:
         assert step.artifact is not None
@@ -170,25 +169,24 @@ class Runner:
 
     def _made(self, step: StagePlan, workspace: Workspace) -> Artifact:
         stage, key, view = step.stage, workspace.key, self.views[step.stage.name]
-        ingredients, resolved = step.ingredients or {}, as_yaml(self.loaded.recipe)
-        earlier = workspace.record
+        ingredients, resolved = step.ingredients, as_yaml(self.loaded.recipe)
         forced = stage.name in self.options.force
-        resumed = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
+        earlier = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
         workspace.describe(ingredients, resolved)
         view.metric, view.curve = workspace.state.metric, [*workspace.state.curve]
         view.began = time.monotonic() - workspace.seconds
         self._show(stage, "runs", short(step.notes or step.reasons, 1))
         view.note = ""
-        changed = changed_code(earlier.code, step.code) if resumed and earlier else []
+        changed = changed_code(earlier.code, step.code) if earlier else []
         if changed:
             self.display.say(f"{stage.name}: code changed since its first attempt: {', '.join(changed)}")
         if self.tracker is not None:
-            self.tracker.stage(stage.name, key, ingredients.get("recipe", {}), resumed)
+            self.tracker.stage(stage.name, key, ingredients.get("recipe", {}), earlier is not None)
         job = Job(
             recipe=self.loaded.recipe,
             key=key,
             robot=self.planner.robot,
-            inputs={name: artifact.folder for name, artifact in self._inputs(stage).items()},
+            inputs={name: artifact.folder for name, artifact in step.inputs.items()},
             out=workspace.out,
             work=workspace.scratch,
             workers=self.workers,

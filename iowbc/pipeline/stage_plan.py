@@ -36,7 +36,9 @@ class StagePlan:
     stage: Stage
     key: str | None = None
     """None while an input's content is not known."""
-    ingredients: Mapping[str, Any] | None = None
+    ingredients: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, Artifact] = field(default_factory=dict)
+    """Artifacts that it reads, as far as they are there."""
     artifact: Artifact | None = None
     """The stored artifact with this key, whole; also where it would be replaced."""
     reasons: tuple[str, ...] = ()

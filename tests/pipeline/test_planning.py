@@ -193,7 +193,7 @@ def test_what_is_left_of_an_interrupted_stage_is_reckoned_from_its_own_rate(work
     workspace.begin("small", False, {})
     workspace.progress(25, 100, "")
     workspace.write()
-    assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.record.seconds)
+    assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.state.seconds)
 
 
 def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_path: Path) -> None:
@@ -203,10 +203,10 @@ def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_p
     workspace.write()
     again = Workspace(Runs(tmp_path), "teacher", "key")
     assert again.begin("small", False, {})
-    record = again.record
+    record = again.state
     assert (record.done, record.total, record.note) == (25, 100, "at 25")
     again.begin("small", True, {})
-    assert again.record.done == 0, "a forced attempt begins anew"
+    assert again.state.done == 0, "a forced attempt begins anew"
 
 
 def rewritten(folder: Path, **entries: Any) -> None:

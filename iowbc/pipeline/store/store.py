@@ -24,7 +24,7 @@ class Store:
     def find(self, stage: str, key: str, *, published: bool = False) -> Artifact | None:
         """The artifact that was made here, or the published one, or None. Raises `Damaged` where its manifest is not
         what was written."""
-        folder = self.runs.published / stage / key if published else self.folder(stage, key)
+        folder = (self.runs.published if published else self.runs.store) / stage / key
         return read_artifact(folder, stage, key, published=published) if folder.is_dir() else None
 
     def checked(self, stage: str, key: str, *, published: bool = False) -> tuple[Artifact | None, str]:

@@ -69,17 +69,12 @@ class Workspace:
         """Of the present attempt."""
         self._begun = self._written = 0.0
 
-    @property
-    def record(self) -> Progress | None:
-        """Record of the last attempt; None where there was none."""
-        return _record(self.root)
-
-    def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> bool:
-        """Make room for an attempt; returns whether it continues an earlier one.
+    def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> Progress | None:
+        """Make room for an attempt; returns the record of the earlier one that it continues.
 
         A forced attempt continues only one that was forced too. `command`: what goes on with it when it is stopped.
         """
-        earlier = self.record
+        earlier = read_progress(self.root)
         if forced and not (earlier and earlier.forced):
             shutil.rmtree(self.root, ignore_errors=True)
             earlier = None
@@ -91,7 +86,7 @@ class Workspace:
         counted = {"attempts": former.attempts + 1, "before": former.seconds, "forced": forced or former.forced}
         self.state = former.model_copy(update={**own, **counted, "code": code, "command": command})
         self.write()
-        return earlier is not None
+        return earlier
 
     def describe(self, ingredients: Mapping[str, Any], recipe: str) -> None:
         """Write what the key was computed from, and the recipe, as the artifact will have them beside it."""
@@ -129,8 +124,8 @@ class Workspace:
         shutil.rmtree(self.root, ignore_errors=True)
 
 
-def _record(root: Path) -> Progress | None:
-    """`Progress` of a work folder; None where that is missing or not as it was written."""
+def read_progress(root: Path) -> Progress | None:
+    """The record of the last attempt in a work folder; None where that is missing or not as it was written."""
     try:
         return Progress.model_validate_json((root / PROGRESS).read_bytes())
     except (OSError, ValueError):
@@ -140,7 +135,7 @@ def _record(root: Path) -> Progress | None:
 def unfinished(runs: Runs) -> list[tuple[Path, Progress]]:
     """Work folders whose output is not in the store yet, and their records, newest first."""
     found = [
-        (path, _record(path) or Progress())
+        (path, read_progress(path) or Progress())
         for path in runs.work.glob("*")
         if path.is_dir() and ((path / "out").is_dir() or not any(runs.store.glob(f"*/{path.name}")))
     ]
