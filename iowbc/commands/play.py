@@ -93,7 +93,7 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
     plan = planned(store, word)
     skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        from iowbc.live.game_panel import GamePanel
+        from iowbc.live.game import GamePanel
 
         with _game(store, console, skill, request) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
