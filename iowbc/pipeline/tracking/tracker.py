@@ -194,7 +194,8 @@ def sweep_record(
 ) -> RunRecord:
     """The run above those of a sweep's points, which record themselves; one that did not finish is continued.
 
-    settings: of each point by its name."""
+    settings: of each point by its name.
+    """
     digest = data_digest({"sweep": name, "points": {point: dict(varied) for point, varied in settings.items()}})
     axes: dict[str, dict[str, None]] = {}
     for path, value in (item for varied in settings.values() for item in varied.items()):
