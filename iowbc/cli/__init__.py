@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from iowbc.cli import listing, measuring, playing, preparing, running
+from iowbc.cli import driving, listing, measuring, playing, preparing, running
 from iowbc.commands.process import described, leave, let_go, prepare_streams
 from iowbc.processes import name_glfw
 
@@ -28,8 +28,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "export": playing.export,
     "gc": listing.gc,
     "play": playing.play,
-    "robot": playing.robot,
-    "robot-sim": playing.robot_sim,
+    "robot": driving.robot,
+    "robot-sim": driving.robot_sim,
     "ui": listing.ui,
     "schema": preparing.schema,
     "doctor": preparing.doctor,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from iowbc.cli.options import AsJson, RunsFolder, console, runs_folder
+from iowbc.cli.options import AsJson, RunsFolder, console
 from iowbc.commands import completion
 from iowbc.commands.process import outlasting_readers
 
@@ -68,17 +68,14 @@ def run(
     """Run a recipe: run every stage that is not cached, and resume interrupted ones."""
     from iowbc.commands.plan import plan as print_plan
     from iowbc.commands.run import run as run_recipe
-    from iowbc.stages.registry import STAGES
 
     options: dict[str, Any] = {"workers": workers, "engine": engine, "address": address}
     request = request_of(recipe, overrides, runs, force, until=until, on_code_change=on_code_change, **options)
     if dry_run:
-        print_plan(request, STAGES, console())
+        print_plan(request, console())
         return
     with outlasting_readers():
-        raise typer.Exit(
-            run_recipe(request, STAGES, console(), "quiet" if quiet else "verbose" if verbose else "usual")
-        )
+        raise typer.Exit(run_recipe(request, console(), "quiet" if quiet else "verbose" if verbose else "usual"))
 
 
 def sweep(
@@ -111,16 +108,15 @@ def sweep(
     """Run a recipe with every combination of given values; shared stages run once."""
     from iowbc.commands.sweep import SweepRequest, plan_sweep
     from iowbc.commands.sweep import sweep as run_sweep
-    from iowbc.stages.registry import STAGES
 
     options: dict[str, Any] = {"workers": workers, "engine": engine, "address": address}
     request = request_of(recipe, overrides, runs, until=until, on_code_change=on_code_change, **options)
     asked = SweepRequest(request, file, jobs, points)
     if dry_run:
-        plan_sweep(asked, STAGES, console(), as_json)
+        plan_sweep(asked, console(), as_json)
     else:
         with outlasting_readers():
-            raise typer.Exit(run_sweep(asked, STAGES, console(), quiet))
+            raise typer.Exit(run_sweep(asked, console(), quiet))
 
 
 def plan(
@@ -137,13 +133,12 @@ def plan(
     """Show whether each stage is cached or would run, the reason, and the expected time."""
     from iowbc.commands.plan import plan as print_plan
     from iowbc.commands.sweep import SweepRequest, plan_sweep
-    from iowbc.stages.registry import STAGES
 
     request = request_of(recipe, overrides, runs, force, until=until, on_code_change=on_code_change)
     if as_sweep or file is not None:
-        plan_sweep(SweepRequest(request, file, None), STAGES, console(), as_json)
+        plan_sweep(SweepRequest(request, file, None), console(), as_json)
     else:
-        print_plan(request, STAGES, console(), as_json)
+        print_plan(request, console(), as_json)
 
 
 def publish(
@@ -161,9 +156,8 @@ def publish(
 ) -> None:
     """Copy a recipe's finished artifacts to the repository (runs/published), where a fresh clone finds them."""
     from iowbc.commands.publish import publish_recipe
-    from iowbc.stages.registry import STAGES
 
-    publish_recipe(request_of(recipe, overrides, runs, until=until), STAGES, console(), without or ())
+    publish_recipe(request_of(recipe, overrides, runs, until=until), console(), without or ())
 
 
 def request_of(
@@ -171,6 +165,7 @@ def request_of(
 ) -> "Request":
     from iowbc.commands.request import Request
     from iowbc.pipeline.stage_plan import Options
+    from iowbc.pipeline.store.runs import Runs
 
     asked = Options(force=frozenset(force or ()), **options)
-    return Request(recipe, tuple(overrides or ()), runs_folder(runs), asked)
+    return Request(recipe, tuple(overrides or ()), Runs(runs or Path("runs")), asked)

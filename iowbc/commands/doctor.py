@@ -18,6 +18,7 @@ from rich.text import Text
 
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.writability import obstacle
 from iowbc.processes import available_cores
 
 Verdict = Literal["good", "doubtful", "bad"]
@@ -175,13 +176,8 @@ def _memory() -> Finding:
 
 
 def _disk(runs: Runs) -> Finding:
-    try:
-        runs.root.mkdir(parents=True, exist_ok=True)
-        probe = runs.root / f".probe-{os.getpid()}"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        return Finding("disk", "bad", f"{runs.root} cannot be written: {error.strerror}; give another with --runs")
+    if reason := obstacle(runs.root):
+        return Finding("disk", "bad", f"{runs.root} cannot be written: {reason}; give another with --runs")
     free = shutil.disk_usage(runs.root).free
     text = f"{free / 1e9:.1f} GB free in {runs.root.absolute()}"
     return Finding("disk", "good" if free > LEAST_DISK else "doubtful", text)

@@ -13,8 +13,7 @@ from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError, nearest
 from iowbc.files import OLD
 from iowbc.pipeline.console.wording import size
-from iowbc.pipeline.store.last_used import ever_used
-from iowbc.pipeline.store.links import remove_dangling
+from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.publishing import PUBLISHING
 from iowbc.pipeline.store.store import Store
@@ -96,7 +95,7 @@ def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
     for recipe in scope.recipes:
         keys = ever_used(runs, recipe).keys() - others
         yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)
-        yield runs.recipes / f"{recipe}.json"
+        yield record_path(runs, recipe)
     if scope.work:
         yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))
         for path in runs.tracking.glob("*.jsonl"):

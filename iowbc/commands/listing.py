@@ -18,11 +18,10 @@ from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import ever_used, recall
-from iowbc.pipeline.store.links import named_folder
+from iowbc.pipeline.store.last_used import ever_used, named_folder, recall
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import unfinished
+from iowbc.pipeline.store.workspace import Progress, unfinished
 from iowbc.pipeline.tracking.delivery import DAMAGED_LINE
 from iowbc.pipeline.tracking.tracker import backlog
 from iowbc.recipe.recipe import PIPELINE, Recipe
@@ -36,14 +35,13 @@ def print_status(store: Store, console: Console, as_json: bool = False) -> None:
     going_on, recipes = unfinished(store.runs), known_recipes(store)
     for folder, record in going_on:
         _print_work(store, console, folder, record)
-    stopped = [record.get("command") for folder, record in going_on if not holder(store.runs, folder.name)]
+    stopped = [record.command for folder, record in going_on if not holder(store.runs, folder.name)]
     for command in dict.fromkeys(filter(None, stopped)):
         tell(console, f"to go on: {command}")
     if recipes:
         table = plain_table("recipe", "finished stages", "last")
         for recipe in recipes:
-            stages = recall(store.runs, recipe).get("stages", {})
-            last = max((float(use["time"]) for use in stages.values()), default=0.0)
+            last = max((use.time for use in recall(store.runs, recipe).stages.values()), default=0.0)
             table.add_row(recipe, ", ".join(last_used(store, recipe)), ago(last))
         console.print(table)
     if not (going_on or recipes):
@@ -58,37 +56,30 @@ def print_status(store: Store, console: Console, as_json: bool = False) -> None:
         console.print(text, highlight=False)
 
 
-def _print_work(store: Store, console: Console, folder: Path, record: Mapping[str, Any]) -> None:
+def _print_work(store: Store, console: Console, folder: Path, record: Progress) -> None:
     """A stage that is being made, or was left unfinished: who works on it, how far it is, and its small curve."""
     who = holder(store.runs, folder.name)
-    state = ("runs", "bold yellow") if who else (f"stopped {ago(float(record.get('updated', 0.0)))}", "magenta")
-    title = f" of {record.get('recipe', '?')} ({folder.name[:KEY_LENGTH]}): "
+    state = ("runs", "bold yellow") if who else (f"stopped {ago(record.updated)}", "magenta")
+    title = f" of {record.recipe} ({folder.name[:KEY_LENGTH]}): "
     by = f", {who}" if who else ""
-    console.print(Text.assemble((str(record.get("stage", "?")), "bold"), title, state, by))
-    total = float(record.get("total", 0.0))
-    share = [f"{100 * float(record.get('done', 0.0)) / total:.0f} %"] if total else []
-    spent = f"{duration(float(record.get('seconds', 0.0)))} spent"
-    note = [str(record["note"])] if record.get("note") else []
-    attempt = f"attempt {record.get('attempts', '?')}"
-    console.print(Padding(Text(", ".join([*share, spent, attempt, *note])), (0, 0, 0, 2)))
-    values = [value for _, value in record.get("curve", [])]
-    if values:
-        text = f"{record.get('metric')} {sparkline(values)} {values[-1]:.4g}"
+    console.print(Text.assemble((record.stage, "bold"), title, state, by))
+    parts = (record.share, f"{duration(record.seconds)} spent", f"attempt {record.attempts or '?'}", record.note)
+    console.print(Padding(Text(", ".join(filter(None, parts))), (0, 0, 0, 2)))
+    if values := [value for _, value in record.curve]:
+        text = f"{record.metric} {sparkline(values)} {values[-1]:.4g}"
         console.print(Padding(Text(text), (0, 0, 0, 2)))
 
 
 def _data(store: Store) -> dict[str, Any]:
     working = [
         {
-            "stage": record.get("stage"),
-            "recipe": record.get("recipe"),
+            **record.model_dump(include={"stage", "recipe", "done", "total", "seconds", "attempts", "updated", "note"}),
             "key": folder.name,
             "holder": asdict(who) if (who := holder(store.runs, folder.name)) else None,
-            **{name: record.get(name) for name in ("done", "total", "seconds", "attempts", "updated", "note")},
         }
         for folder, record in unfinished(store.runs)
     ]
-    recipes = {name: recall(store.runs, name).get("stages", {}) for name in known_recipes(store)}
+    recipes = {name: recall(store.runs, name).stages for name in known_recipes(store)}
     return {"unfinished": working, "recipes": recipes, "unsent": len(backlog(store.runs))}
 
 

@@ -16,7 +16,7 @@ from iowbc.pipeline.store.last_used import recall
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import unfinished
+from iowbc.pipeline.store.workspace import Progress, unfinished
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
@@ -81,8 +81,8 @@ def nameable(store: Store) -> dict[str, tuple[str, ...]]:
 
 def last_used(store: Store, recipe: str) -> dict[str, Artifact]:
     """By stage: the artifacts that a recipe used last, as far as they are still stored."""
-    used = recall(store.runs, recipe).get("stages", {})
-    found = {stage: store.find_any(stage, use["key"]) for stage, use in used.items()}
+    used = recall(store.runs, recipe).stages
+    found = {stage: store.find_any(stage, use.key) for stage, use in used.items()}
     return {stage: artifact for stage, artifact in found.items() if artifact is not None}
 
 
@@ -95,7 +95,7 @@ def _recipe(store: Store, word: str, name: str, recipes: Sequence[str]) -> Run:
         return Run(word, shipped, list(shipped.values())[-1].recipe)
     used = last_used(store, name)
     others = {stage: artifact for stage, artifact in shipped.items() if stage not in used}
-    return Run(word, used, recall(store.runs, name)["recipe"], others)
+    return Run(word, used, recall(store.runs, name).recipe, others)
 
 
 def _name_in(word: str) -> str:
@@ -199,22 +199,21 @@ def in_training(store: Store, word: str, stage: str | None) -> InTraining | None
     if wanted not in STAGES or not STAGES[wanted].presentation.trained_by:
         return None
     for folder, record in unfinished(store.runs):
-        if (record.get("stage"), record.get("recipe")) == (wanted, Path(name).stem):
+        if (record.stage, record.recipe) == (wanted, Path(name).stem):
             return _training(store, folder, record)
     return None
 
 
-def _training(store: Store, folder: Path, record: Mapping[str, Any]) -> InTraining:
+def _training(store: Store, folder: Path, record: Progress) -> InTraining:
     checkpoint, ingredients, recipe = folder / CHECKPOINT, read_json(folder / INGREDIENTS), read_yaml(folder / RECIPE)
-    total = float(record.get("total", 0.0))
     state = "is being trained" if holder(store.runs, folder.name) else "was interrupted"
-    share = f", {100 * float(record.get('done', 0.0)) / total:.0f} % done" if total else ""
-    playable = record["stage"] == PLAYED and checkpoint.is_file() and bool(recipe and ingredients)
+    share = f", {record.share} done" if record.share else ""
+    playable = record.stage == PLAYED and checkpoint.is_file() and bool(recipe and ingredients)
     then = f"; this is its checkpoint of {ago(checkpoint.stat().st_mtime)}" if playable else ""
     return InTraining(
-        stage=str(record["stage"]),
+        stage=record.stage,
         key=folder.name,
-        text=f"{record['stage']} of {record['recipe']} {state}{share}{then}",
+        text=f"{record.stage} of {record.recipe} {state}{share}{then}",
         checkpoint=checkpoint,
         ingredients=ingredients,
         recipe=recipe if playable else None,

@@ -10,9 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from iowbc.commands.printed import hanging, plain_table, print_json, tell
-from iowbc.commands.request import Request, in_order, prepared, recipes
+from iowbc.commands.request import Request, in_order, planners
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
-from iowbc.pipeline.ingredients import key_values
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import StagePlan
@@ -37,24 +36,22 @@ Planned = Mapping[str, Sequence[PlannedStage]]
 """The stages of each recipe, by its name."""
 
 
-def plan(request: Request, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
+def plan(request: Request, console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a study a table of what would run of each recipe."""
-    asked = [prepared(one, request, registry) for one in recipes(request)]
-    each = [one for planner in asked for one in in_order(planner)]
+    each = [one for planner in planners(request) for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}
     for one in each:  # a recipe may be asked for, and be what another one begins from
         known = longest.setdefault((one.loaded.file, one.loaded.overrides), one)
         if len(one.stages) > len(known.stages):
             longest[one.loaded.file, one.loaded.overrides] = one
-    planners = list(longest.values())
+    found = list(longest.values())
     if as_json:
-        names = [planner.loaded.recipe.name for planner in planners]
-        steps = [[step_data(step) for step in planner.plan()] for planner in planners]
-        print_json(console, [{"recipe": name, "stages": own} for name, own in zip(names, steps, strict=True)])
-    elif len(planners) == 1:
-        _print(planners[0].plan(), console)
+        data = [{"recipe": one.loaded.recipe.name, "stages": list(map(step_data, one.plan()))} for one in found]
+        print_json(console, data)
+    elif len(found) == 1:
+        _print(found[0].plan(), console)
     else:
-        _print_several(planned(planners), console)
+        _print_several(planned(found), console)
 
 
 def planned(planners: Sequence[Planner]) -> Planned:
@@ -76,7 +73,7 @@ def _identity(planner: Planner, stage: Stage, before: Mapping[str, str]) -> str:
     """Stands for a stage's key while those of the stages that it reads are not known."""
     ingredients = {
         "stage": stage.name,
-        "recipe": key_values(planner.loaded.recipe, planner.deciding, stage),
+        "recipe": stage.key_values(planner.loaded.recipe, planner.deciding),
         "robot": planner.robot_digest,
         "inputs": {name: before[name] for name in stage.reads(planner.loaded.recipe)},
         "borrowed": {name: one.named for name, one in stage.borrows(planner.loaded.recipe).items()},

@@ -3,14 +3,13 @@
 import contextlib
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from iowbc.commands.lookup import (
-    InTraining,
     in_training,
     input_of,
     made_from,
@@ -22,7 +21,7 @@ from iowbc.commands.lookup import (
 from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
 from iowbc.commands.printed import filming, tell
 from iowbc.commands.process import close_on_termination
-from iowbc.commands.request import Request, prepared
+from iowbc.commands.request import prepared
 from iowbc.commands.results import evaluated_actor
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
@@ -33,10 +32,9 @@ from iowbc.pipeline.store.last_used import recall, require_whole
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.finding import SUFFIXES
-from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import policy_stage
-from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from iowbc.evaluation.play import Source
@@ -44,7 +42,15 @@ if TYPE_CHECKING:
     from iowbc.live.game import GameSession
 
 SKILL = "skill"
-NOTHING: Mapping[str, Artifact] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What is known of a recipe's file that is played; nothing of another word."""
+
+    recipe: Recipe | None = None
+    artifacts: Mapping[str, Artifact] = field(default_factory=dict)
+    """By stage: the stored ones that it plans to use."""
 
 
 def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
@@ -84,14 +90,15 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
         there = f"ssh -L {port}:{HOST}:{port} THIS_MACHINE"
         console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
 
-    skill = skill_to_play(store, word, stage)
+    plan = planned(store, word)
+    skill = skill_to_play(store, word, stage, plan)
     if skill is not None:
-        from iowbc.live.game_panel import GamePanel
+        from iowbc.live.game import GamePanel
 
         with _game(store, console, skill, request) as game, serving(port) as server:
             Page(server, game, panel=GamePanel).run(ready)
         return
-    source, actor = _driven(store, console, word, stage)
+    source, actor = _driven(store, console, word, stage, plan)
 
     from iowbc.live.session import Session
 
@@ -99,13 +106,21 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
         Page(server, session, actor).run(ready)
 
 
-def skill_to_play(store: Store, word: str, stage: str | None) -> Artifact | None:
-    """The skill that a word and `--stage` name; None where they name no skill, or another stage. Raises `RecipeError`
-    for a recipe's file that is none."""
+def planned(store: Store, word: str) -> Planned:
+    """The plan of a recipe's file. Raises `RecipeError` for one that is wrong."""
+    if Path(word).suffix not in SUFFIXES or not os.path.isfile(word):
+        return Planned()
+    loaded = load_recipe(word)
+    steps = prepared(loaded, store.runs, Options()).plan()
+    return Planned(loaded.recipe, {step.stage.name: step.artifact for step in steps if step.cached and step.artifact})
+
+
+def skill_to_play(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact | None:
+    """The skill that a word and `--stage` name; None where they name no skill, or another stage."""
     if stage not in (None, SKILL) or Path(word).is_dir():
         return None
-    if (loaded := _recipe_in(word)) is not None:
-        return _planned(store, loaded).get(SKILL) if SKILL in loaded.recipe.stages else None
+    if plan.recipe is not None:
+        return plan.artifacts.get(SKILL)
     with contextlib.suppress(UsageError):  # of a first training, of which nothing is finished yet
         return named(store, word).usable.get(SKILL)
     return None
@@ -129,7 +144,9 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
     return GameSession(world_of(skill.recipe, generator).deployed, load_student(student.folder), robot, asked)
 
 
-def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tuple[Source, Actor | None]":
+def _driven(
+    store: Store, console: Console, word: str, stage: str | None, plan: Planned
+) -> "tuple[Source, Actor | None]":
     """The policy to drive by hand, and the trials of its evaluation."""
     evaluation = None
     if not Path(word).is_dir():
@@ -140,7 +157,7 @@ def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tu
         require_whole(store.runs, [played])
         source = _whole_source(store, played)
     else:
-        source = named_source(store, console, word, stage)
+        source = named_source(store, console, word, stage, plan=plan)
     actor = None
     try:
         actor = None if evaluation is None else evaluated_actor(store, evaluation)
@@ -149,24 +166,32 @@ def _driven(store: Store, console: Console, word: str, stage: str | None) -> "tu
     return source, actor
 
 
-def named_source(store: Store, console: Console, word: str, stage: str | None, scene: str | None = None) -> "Source":
+def named_source(
+    store: Store,
+    console: Console,
+    word: str,
+    stage: str | None,
+    scene: str | None = None,
+    plan: Planned | None = None,
+) -> "Source":
     """The source that a word and `--stage` name, with a line on the console while it is trained. Raises `UsageError`,
-    also for a `scene` that its recipe has not.
+    also for a `scene` that its recipe has not. `plan`: of the word, where it is known.
 
     A recipe's file names the artifacts that `iowbc plan` calls cached; it, or the recipe of a name, says by its own
     `eval` what is played of them.
     """
-    from iowbc.evaluation.play import asked_by, exported_source
+    from iowbc.evaluation.play import Source, asked_by, exported_source
 
     if os.path.isfile(Path(word, CONTRACT)):
         return exported_source(Path(word))
     training = in_training(store, word, stage)
     if training is not None and training.recipe is not None:
         tell(console, training.text)
-        return _training_source(store, training)
-    loaded = _recipe_in(word)
+        generator = made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
+        return Source(world_of(training.recipe, generator), training.checkpoint, training.key)
+    plan = plan or planned(store, word)
     try:
-        artifact = playable(store, word, stage, NOTHING if loaded is None else _planned(store, loaded))
+        artifact = playable(store, word, stage, plan)
     except UsageError:
         if training is None:
             raise
@@ -174,7 +199,8 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         raise UsageError(f"{training.text}; {text}") from None
     if training is not None:
         tell(console, f"{training.text}; this is a finished one")
-    asked = _evaluation(store, word) if loaded is None else loaded.recipe.eval
+    known = {} if plan.recipe else recall(store.runs, word.partition("/")[0]).recipe
+    asked = plan.recipe.eval if plan.recipe else Evaluation.model_validate(known["eval"]) if "eval" in known else None
     require_whole(store.runs, [artifact])
     if artifact.published:
         tell(console, f"{artifact.manifest.stage} of {artifact.manifest.recipe}, as it came with the repository")
@@ -183,16 +209,6 @@ def named_source(store: Store, console: Console, word: str, stage: str | None, s
         require_known(scene, "scene", [*scenes, *(asked.scenes if asked else ())])
     source = _whole_source(store, artifact)
     return source if asked is None else asked_by(source, asked)
-
-
-def _recipe_in(word: str) -> LoadedRecipe | None:
-    return load_recipe(word) if Path(word).suffix in SUFFIXES and os.path.isfile(word) else None
-
-
-def _evaluation(store: Store, word: str) -> Evaluation | None:
-    """The `eval` section of a recipe that is named, also as `RECIPE/STAGE`; None for a key."""
-    recipe = recall(store.runs, word.partition("/")[0]).get("recipe", {})
-    return Evaluation.model_validate(recipe["eval"]) if "eval" in recipe else None
 
 
 def _whole_source(store: Store, artifact: Artifact) -> "Source":
@@ -208,16 +224,10 @@ def _whole_source(store: Store, artifact: Artifact) -> "Source":
     return _source(artifact, generator)
 
 
-def _planned(store: Store, loaded: LoadedRecipe) -> dict[str, Artifact]:
-    """By stage: the stored artifacts that a recipe's file plans to use, of those that leave a policy."""
-    request = Request(str(loaded.file), (), store.runs, Options())
-    steps = prepared(loaded, request, STAGES).plan()
-    return {step.stage.name: step.artifact for step in steps if step.cached and step.artifact is not None}
-
-
-def playable(store: Store, word: str, stage: str | None, planned: Mapping[str, Artifact] = NOTHING) -> Artifact:
+def playable(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact:
     """The policy that a word and `--stage` name, before all one that its file plans to use. Raises `UsageError`."""
-    found = planned if any(name in planned for name in policy_stages()) else named(store, word).usable
+    leave = any(name in plan.artifacts for name in policy_stages())
+    found = plan.artifacts if leave else named(store, word).usable
     ready = [name for name in policy_stages() if name in found]
     if not ready or (stage is not None and stage not in ready):
         raise UsageError(
@@ -234,11 +244,3 @@ def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
     world = world_of(artifact.recipe, generator)
     student = artifact.manifest.stage == "distill" or world.recipe.teacher.history is not None
     return Source(world.deployed if student else world, artifact.folder)
-
-
-def _training_source(store: Store, training: InTraining) -> "Source":
-    """The newest checkpoint of a training, with the world of its recipe."""
-    from iowbc.evaluation.play import Source
-
-    generator = made_from(store, training.ingredients, "rg-fit", f"{training.stage} {training.key[:12]}")
-    return Source(world_of(training.recipe or {}, generator), training.checkpoint, training.key)

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 from iowbc.full_disk import FULL, nothing_fits, what_is_full
 
@@ -88,19 +88,23 @@ def let_go() -> None:
 def outlasting_readers() -> Iterator[None]:
     """Inside, what cannot be written any more is dropped: a lost terminal or a full log file does not end a run."""
     former = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = map(_outlasting, former)
+    for stream in former:
+        stream.flush()
+    sys.stdout, sys.stderr = (
+        io.TextIOWrapper(
+            io.BufferedWriter(_Outlasting(stream.fileno(), "wb", closefd=False)),
+            encoding=stream.encoding,
+            errors="replace",
+            line_buffering=True,
+        )
+        for stream in former
+    )
     try:
         yield
     finally:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         sys.stdout, sys.stderr = former
-
-
-def _outlasting(stream: TextIO) -> TextIO:
-    stream.flush()
-    buffer = io.BufferedWriter(_Outlasting(stream.fileno(), "wb", closefd=False))
-    return io.TextIOWrapper(buffer, encoding=stream.encoding, errors="replace", line_buffering=True)
 
 
 class _Outlasting(io.FileIO):

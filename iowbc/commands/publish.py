@@ -1,36 +1,33 @@
 """`iowbc publish`: put a recipe's finished artifacts into the repository, so that a fresh clone starts from them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from rich.console import Console
 
 from iowbc.commands.printed import shown_path, tell
-from iowbc.commands.request import Request, prepared, recipes
+from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
-from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.publishing import publish, published_size
 from iowbc.pipeline.writability import require_writable_runs
 
 
-def publish_recipe(
-    request: Request, registry: Mapping[str, Stage], console: Console, without: Sequence[str] = ()
-) -> None:
+def publish_recipe(request: Request, console: Console, without: Sequence[str] = ()) -> None:
     """Copy what the recipe's stages have to `runs/published/`, but for the files named in `without`, and verify it.
 
     Raises `UsageError` where a stage has not run, and where no artifact has a file of such a name. Code that changed
     since an artifact was made is no obstacle, and is said.
     """
-    planners = [prepared(loaded, request, registry) for loaded in recipes(request)]
-    steps = [step for planner in planners for step in planner.plan()]
+    found = planners(request)
+    steps = [step for planner in found for step in planner.plan()]
     missing = [step.stage.name for step in steps if not step.cached]
     if missing:
         raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command([])}")
     require_writable_runs(request.runs)
     notes = {step.key: step.notes for step in steps}
     made = [step.artifact for step in steps]
-    started = [found for planner in planners for stage in planner.stages for found in planner.borrowed(stage).values()]
-    artifacts = {found.manifest.key: found for found in (*made, *started) if found is not None}
+    started = [one for planner in found for stage in planner.stages for one in planner.borrowed(stage).values()]
+    artifacts = {one.manifest.key: one for one in (*made, *started) if one is not None}
     names = {name for artifact in artifacts.values() for name in artifact.manifest.files}
     for name in without:
         if name not in names:

@@ -1,7 +1,7 @@
 """A request of `iowbc run` and `iowbc plan`, checked before anything heavy is imported."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from iowbc.errors import Problem, RecipeError
 from iowbc.pipeline.planner import Planner, Plans, planner_for
-from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.digests import folder_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.reading.study import load_study
+from iowbc.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from iowbc.robot.description import Robot
@@ -47,26 +47,37 @@ class Request:
         return shlex.join(words)
 
 
-def recipes(request: Request) -> tuple[LoadedRecipe, ...]:
-    """The recipe of a request, or all variants of the study that it names. Raises `RecipeError`."""
+def planners(request: Request) -> list[Planner]:
+    """The planner of a request's recipe, or of each variant of the study that it names. Raises `RecipeError`."""
     variants = load_study(request.word, request.overrides)
     if variants and request.options.force:
         files = ", ".join(str(variant.file) for variant in variants)
         text = f"names a stage of each variant, which they may share; force it in one of them: {files}"
         raise RecipeError([Problem(f"--force {min(request.options.force)}", text)])
-    return variants or (load_recipe(request.word, request.overrides),)
+    found = variants or (load_recipe(request.word, request.overrides),)
+    return [prepared(loaded, request.runs, request.options) for loaded in found]
 
 
-def prepared(loaded: LoadedRecipe, request: Request, registry: Mapping[str, Stage]) -> Planner:
-    """The planner of a recipe. Raises `RecipeError` for all that is wrong before a run."""
+def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
+    """The planner of a recipe. Raises `RecipeError` for all that is wrong before a run, also with all that the robot
+    does not have or cannot reach."""
+    from iowbc.reference.ranges import wrong_ranges
     from iowbc.robot.description import robot_folder
 
     try:
-        robot = robot_folder(loaded.recipe.robot)
+        folder = robot_folder(loaded.recipe.robot)
     except FileNotFoundError as error:
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
-    check_against_robot(loaded, robot)
-    return planner_for(loaded, registry, Store(request.runs), robot, request.options)
+    try:
+        robot = _robot(folder, folder_digest(folder))
+    except (OSError, ValueError) as error:
+        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
+    problems = [
+        Problem(loaded.place(path), f"key '{path}': {text}") for path, text in wrong_ranges(robot, loaded.recipe.rg)
+    ]
+    if problems:
+        raise RecipeError(problems)
+    return planner_for(loaded, STAGES, Store(runs), folder, options)
 
 
 def in_order(planner: Planner) -> list[Planner]:
@@ -83,18 +94,3 @@ def _robot(folder: Path, digest: str) -> "Robot":
     from iowbc.robot.description import load_robot
 
     return load_robot(folder)
-
-
-def check_against_robot(loaded: LoadedRecipe, folder: Path) -> None:
-    """Raises `RecipeError` with all that the robot does not have or cannot reach."""
-    from iowbc.reference.ranges import wrong_ranges
-
-    try:
-        robot = _robot(folder, folder_digest(folder))
-    except (OSError, ValueError) as error:
-        raise RecipeError([Problem(loaded.place("robot"), f"key 'robot' = '{loaded.recipe.robot}': {error}")]) from None
-    problems = [
-        Problem(loaded.place(path), f"key '{path}': {text}") for path, text in wrong_ranges(robot, loaded.recipe.rg)
-    ]
-    if problems:
-        raise RecipeError(problems)

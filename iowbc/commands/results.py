@@ -14,8 +14,7 @@ from iowbc.commands.printed import shown_path, tell
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.last_used import recall
-from iowbc.pipeline.store.links import named_folder
+from iowbc.pipeline.store.last_used import named_folder, recall
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.results.table import Table, drawn, read_tables
@@ -76,7 +75,7 @@ def headline(stage: str, metrics: Mapping[str, float]) -> list[tuple[str, float]
 def main_tables(folders: Iterable[Path]) -> str:
     """The main tables in the folders of artifacts or of a comparison, in Markdown."""
     found = [path for folder in folders for path in (folder / "tables").glob("*.md")]
-    chosen = sorted((path for path in found if path.stem in TABLES), key=_rank)
+    chosen = sorted((path for path in found if path.stem in TABLES), key=lambda path: _rank(path.stem))
     return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in chosen)
 
 
@@ -87,7 +86,7 @@ def next_commands(runs: Runs, recipe: str, artifacts: Mapping[str, Artifact]) ->
     what it has without any.
     """
     elsewhere = [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
-    overrides = recall(runs, recipe).get("overrides", [])
+    overrides = recall(runs, recipe).overrides
     lasting = not overrides or any(override.startswith("name=") for override in overrides)
     own = last_used(Store(runs), recipe) if lasting else {}
     others = {
@@ -106,19 +105,21 @@ def _print_tables(artifact: Artifact, folder: Path, console: Console) -> None:
     for name in sorted(shown, key=DRAWN.index):
         console.print()
         console.print(drawn(shown[name], console.width))
-    others = [path.name for path in sorted(folder.glob("*.md"), key=_rank) if path.stem not in shown]
+    others = [
+        path.name for path in sorted(folder.glob("*.md"), key=lambda path: _rank(path.stem)) if path.stem not in shown
+    ]
     if others:
         tell(console, f"more tables  {shown_path(folder)}: {', '.join(others)}")
 
 
 def split_tables(tables: Sequence[Table]) -> tuple[list[Table], list[Table]]:
     """The main tables in their order, and the others."""
-    main = [table for table in tables if table.name in TABLES]
-    return sorted(main, key=lambda table: TABLES.index(table.name)), [one for one in tables if one not in main]
+    ranked = sorted(tables, key=lambda table: _rank(table.name))
+    return [one for one in ranked if one.name in TABLES], [one for one in ranked if one.name not in TABLES]
 
 
-def _rank(path: Path) -> tuple[int, str]:
-    return TABLES.index(path.stem) if path.stem in TABLES else len(TABLES), path.name
+def _rank(name: str) -> tuple[int, str]:
+    return TABLES.index(name) if name in TABLES else len(TABLES), name
 
 
 def tables_of(artifact: Artifact) -> list[Table]:

@@ -44,7 +44,7 @@ def robot(
     commands: str,
     object_pose: str | None,
     log: Path | None,
-    waived: Collection[str],
+    waive: Collection[str] | None,
     dry_run: bool,
     lockstep: bool,
     seconds: float,
@@ -70,7 +70,7 @@ def robot(
         stack.callback(bus.close)
         tell(console, f"{controller.contract.recipe}: listening on {network} for {LISTENING:g} s")
         standing = Ranges(controller.contract).standing
-        _report(console, checks(controller, listen(bus, LISTENING), standing, LIMITS), waived)
+        _report(console, checks(controller, listen(bus, LISTENING), standing, LIMITS), waive or ())
         if dry_run:
             return
         about = {

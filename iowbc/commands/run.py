@@ -1,6 +1,6 @@
 """`iowbc run`: from a recipe file to an exit code, with signals, console and tracking around it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -11,14 +11,13 @@ from iowbc.commands.compare import compare, film_together
 from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
-from iowbc.commands.request import Request, in_order, prepared, recipes
+from iowbc.commands.request import Request, in_order, planners
 from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.runner import Runner, run_here
-from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.runner import Runner
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
@@ -34,18 +33,17 @@ Manner = Literal["usual", "quiet", "verbose"]
 """Amount of a run's output."""
 
 
-def run(request: Request, registry: Mapping[str, Stage], console: Console, manner: Manner = "usual") -> int:
+def run(request: Request, console: Console, manner: Manner = "usual") -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
 
     The variants of a study run in order, up to the first that does not end; then they are compared.
     """
-    loaded = recipes(request)
-    ready = [prepared(one, request, registry) for one in loaded]
+    ready = planners(request)
     require_training("run")
     require_writable_runs(request.runs)
     try:
         with (
-            engine(request.options, loaded[0].recipe.execution) as cluster,
+            engine(request.options, ready[0].loaded.recipe.execution) as cluster,
             StopRequest(shown=console.is_terminal and manner == "usual") as stop,
         ):
             if cluster is not None and manner != "quiet":
@@ -61,7 +59,7 @@ def run(request: Request, registry: Mapping[str, Stage], console: Console, manne
     except KeyboardInterrupt:
         return INTERRUPTED
     if len(ready) > 1 and request.options.until is None and manner != "quiet":
-        compare_variants(request, loaded, console)
+        compare_variants(request, [planner.loaded for planner in ready], console)
     return DONE
 
 
@@ -130,15 +128,9 @@ def run_recipe(
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             display = _display(loaded, console, lambda: stop.text, manner)
-            runner = Runner(
-                planner,
-                display,
-                tracker,
-                stop,
-                command=rest,
-                execute=run_here if cluster is None else cluster.run,
-                workers=workers,
-            )
+            runner = Runner(planner, display, tracker, stop, rest, workers=workers)
+            if cluster is not None:
+                runner.execute = cluster.run
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE)
             if tracker is not None:

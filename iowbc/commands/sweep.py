@@ -1,6 +1,6 @@
 """`iowbc sweep`: a recipe with every combination of some values, several runs at a time, and what came of them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +16,12 @@ from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
 from iowbc.commands.request import Request, in_order, prepared
 from iowbc.commands.run import engine, run_recipe
 from iowbc.errors import Problem, RecipeError, UsageError
-from iowbc.pipeline.console.board import Board, RunView
+from iowbc.pipeline.console.board import Board
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.tracking.tracker import SweepRecord
+from iowbc.pipeline.tracking.tracker import RunRecord, sweep_record
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.sweep import MOST_POINTS, Point, Sweep, load_sweep
@@ -59,26 +58,13 @@ class SweepRequest:
         return replace(self.recipe, verb="sweep", further=further).command([])
 
 
-@dataclass(frozen=True)
-class ReadyPoint:
-    """A point that can run."""
-
-    point: Point
-    planner: Planner
-    request: Request
-
-
-def ready(asked: SweepRequest, registry: Mapping[str, Stage]) -> tuple[Sweep, list[ReadyPoint]]:
-    """The points of a sweep. Raises `RecipeError` for all that is wrong before any runs."""
+def ready(asked: SweepRequest) -> tuple[Sweep, list[Planner]]:
+    """The points of a sweep, and the planner of each. Raises `RecipeError` for all that is wrong before any runs."""
     if asked.recipe.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
     found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file, asked.most, _tell_count)
-    points = []
-    for point in found.points:
-        request = replace(asked.recipe, word=point.word, overrides=point.loaded.overrides)
-        points.append(ReadyPoint(point, prepared(point.loaded, request, registry), request))
-    return found, points
+    return found, [prepared(point.loaded, asked.recipe.runs, asked.recipe.options) for point in found.points]
 
 
 def _tell_count(count: int) -> None:
@@ -86,9 +72,9 @@ def _tell_count(count: int) -> None:
         Console(stderr=True).print(f"plans {count:,} points", highlight=False)
 
 
-def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:
+def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
     """Raises `UsageError` where points begin from what another recipe has not made yet: they would all wait for it."""
-    missing = [origin for one in points for origin in in_order(one.planner)[:-1]]
+    missing = [origin for one in planners for origin in in_order(one)[:-1]]
     first = [
         replace(asked, verb="run", word=str(origin.loaded.file), overrides=(), options=origin.options).command([])
         for origin in missing
@@ -98,12 +84,12 @@ def _require_origins(asked: Request, points: Sequence[ReadyPoint]) -> None:
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def plan_sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, as_json: bool = False) -> None:
+def plan_sweep(asked: SweepRequest, console: Console, as_json: bool = False) -> None:
     """Print a row for each point of a sweep with what would run, and all together. Raises `RecipeError`."""
-    sweep, points = ready(asked, registry)
-    found = planned([one.planner for one in points])
+    sweep, planners = ready(asked)
+    found = planned(planners)
     if as_json:
-        data = [_data(one.point, found[one.point.name]) for one in points]
+        data = [_data(point, found[point.name]) for point in sweep.points]
         print_json(console, {"sweep": sweep.name, "points": data})
     else:
         console.print(plan_table(found, "point"))
@@ -115,23 +101,23 @@ def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 
-def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, quiet: bool = False) -> int:
+def sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
     """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
 
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
     """
-    found, points = ready(asked, registry)
-    _require_origins(asked.recipe, points)
-    runs, execution = asked.recipe.runs, points[0].planner.loaded.recipe.execution
+    found, planners = ready(asked)
+    _require_origins(asked.recipe, planners)
+    runs, execution = asked.recipe.runs, planners[0].loaded.recipe.execution
     require_training("sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
     record_sweep(found, folder)
-    before = planned([one.planner for one in points])
+    before = planned(planners)
     if not quiet:
         console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
     endings: Endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
-    record: SweepRecord | None = None
+    record: RunRecord | None = None
     try:
         with (
             engine(asked.recipe.options, execution) as cluster,
@@ -139,16 +125,19 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
         ):
             if cluster is not None and not quiet:
                 console.print(cluster.text, highlight=False)
-            jobs, workers = _shared_out(points, asked, cluster)
+            jobs, workers = _shared_out(planners, asked, cluster)
             if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
                 settings = {point.name: point.settings for point in found.points}
-                record = SweepRecord(runs, found.name, execution.experiment, settings, execution.tracking_patience)
+                record = sweep_record(runs, found.name, settings, execution)
                 record.send()
             origin = None if record is None else record.origin
-            tasks = [_task(one, stop, folder, origin, cluster, workers) for one in points]
-            views = {task.name: RunView(task.name, log=task.log) for task in tasks}
+            tasks = [
+                _task(point, planner, asked.recipe, stop, folder, origin, cluster, workers)
+                for point, planner in zip(found.points, planners, strict=True)
+            ]
+            logs = {task.name: task.log for task in tasks}
             start = PointProcess if cluster is None else lambda task: PointThread(task, cluster.abort)
-            with Board(console, execution.line_interval, quiet, lambda: stop.text, views) as board:
+            with Board(console, logs, execution.line_interval, quiet, lambda: stop.text) as board:
                 endings = run_points(tasks, jobs, stop, board, start)
     except KeyboardInterrupt:
         pass  # the endings say so
@@ -164,24 +153,32 @@ def sweep(asked: SweepRequest, registry: Mapping[str, Stage], console: Console, 
     return code
 
 
-def _shared_out(points: Sequence[ReadyPoint], asked: SweepRequest, cluster: "Cluster | None") -> tuple[int, int]:
+def _shared_out(planners: Sequence[Planner], asked: SweepRequest, cluster: "Cluster | None") -> tuple[int, int]:
     """Points that run at the same time, and each one's part of the cores, for those that do not say what they want."""
     cores = available_cores() if cluster is None else cluster.cores
-    actors = max(one.planner.loaded.recipe.execution.rollout_actors or 1 for one in points)
-    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores // actors, len(points))))
+    actors = max(one.loaded.recipe.execution.rollout_actors or 1 for one in planners)
+    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
     most = cores if cluster is None else cluster.largest
     return jobs, max(1, min(most, cores // jobs))
 
 
 def _task(
-    one: ReadyPoint, stop: StopRequest, folder: Path, origin: str | None, cluster: "Cluster | None", workers: int
+    point: Point,
+    planner: Planner,
+    asked: Request,
+    stop: StopRequest,
+    folder: Path,
+    origin: str | None,
+    cluster: "Cluster | None",
+    workers: int,
 ) -> PointRun:
-    wanted = one.planner.options.workers or one.planner.loaded.recipe.execution.workers
+    wanted = planner.options.workers or planner.loaded.recipe.execution.workers
+    request = replace(asked, word=point.word, overrides=point.loaded.overrides)
 
     def run(console: Console) -> RunEnding:
         return run_recipe(
-            one.planner,
-            one.request,
+            planner,
+            request,
             console,
             stop,
             within=origin,
@@ -190,7 +187,7 @@ def _task(
             workers=wanted or workers,
         )
 
-    return PointRun(one.point.name, folder / LOGS / f"{one.point.name}.log", run)
+    return PointRun(point.name, folder / LOGS / f"{point.name}.log", run)
 
 
 def _code(endings: Endings) -> int:
@@ -204,7 +201,7 @@ def _conclude(
     runs: Runs,
     folder: Path,
     console: Console,
-    record: SweepRecord | None,
+    record: RunRecord | None,
     quiet: bool,
 ) -> None:
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results

@@ -13,6 +13,9 @@ from iowbc.live.shapes import BodyMesh, collision_shapes, looks
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import ARROW_RADIUS, COLOURS
 
+View = tuple[tuple[float, ...], tuple[float, ...]]
+VIEW: View = ((1.7, -1.4, 1.2), (0.1, 0.0, 0.6))
+"""First position of a camera, and at what it looks [m]."""
 GHOST = (0.15, 0.45, 0.95)
 GHOST_OPACITY = 0.35
 SUPPORT, BALANCE = (60, 170, 90), (210, 40, 40)
@@ -54,8 +57,12 @@ class GameMarks:
 class Drawing:
     """The scene of a server. `build` it for a model, then `show` its moments."""
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
-        self._scene, self._robot = scene, robot
+    def __init__(self, server: viser.ViserServer, robot: Robot, view: View = VIEW) -> None:
+        """`view`: see `VIEW`."""
+        server.initial_camera.position, server.initial_camera.look_at = view
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._scene, self._robot = server.scene, robot
+        scene = self._scene
         self.drags = Drags()
         self._model: Any = None
         self._at = np.zeros(2)

@@ -11,8 +11,7 @@ from iowbc.errors import Interrupted
 from iowbc.evaluation.side_by_side import Actor
 from iowbc.live.drawing import Drawing
 from iowbc.live.panel import LIVE, ControlPanel, DrivingPanel
-from iowbc.live.played import PAST, Played
-from iowbc.live.track import Track, played_again, trial_titles
+from iowbc.live.track import PAST, Played, Track, played_again, trial_titles
 
 PICTURES = 1.0 / 25.0
 """Time between two pictures [s]."""
@@ -41,8 +40,7 @@ class Page:
         """`panel`: makes the controls that fit the session, with the titles of the evaluated trials."""
         self.server, self.session, self._evaluated = server, session, evaluated
         self.panel = panel(server.gui, session, self._trials)
-        self.drawing = Drawing(server.scene, session.robot)
-        server.initial_camera.position, server.initial_camera.look_at = session.view
+        self.drawing = Drawing(server, session.robot, session.view)
         self.paused = False
         self.track: Track = session.track
         """The track that is shown: the session's own, or a trial."""

@@ -18,9 +18,8 @@ from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Pushed
 from iowbc.live.drawing import ShownParts
 from iowbc.live.moment import Moment
-from iowbc.live.played import PAST, Played
 from iowbc.live.session import Session
-from iowbc.live.track import WINDOW, Track, TrackFigures
+from iowbc.live.track import PAST, WINDOW, Played, Track, TrackFigures
 from iowbc.recipe.task.commands import Commands
 
 Button = Literal["pause", "reset", "push robot", "push object", "next task"]
@@ -50,7 +49,6 @@ class ControlPanel(ABC):
         """`trials`: titles of recorded trials to choose from; none are offered where there are none."""
         self._gui = gui
         self._pressed: SimpleQueue[Button] = SimpleQueue()
-        gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self.status = gui.add_markdown("")
         self.showing = gui.add_dropdown("Show", (LIVE, *trials), initial_value=LIVE, visible=bool(trials))
@@ -134,16 +132,13 @@ class DrivingPanel(ControlPanel):
             self._conditions()
 
     def steer(self) -> None:
-        """See `ControlPanel`."""
         self._session.wanted[:] = self.command
 
     def press(self, button: Button) -> None:
-        """See `ControlPanel`."""
         what: Pushed = "robot" if button == "push robot" else "object"
         self._session.push(what, self.direction.value, self.impulse.value)
 
     def figures_at(self, track: Track, place: int) -> str:
-        """See `ControlPanel`."""
         return figures(track.moments[place], track.readings(place))
 
     def _commands(self, commands: Commands) -> list[viser.GuiSliderHandle]:
@@ -193,7 +188,6 @@ class DrivingPanel(ControlPanel):
 
     @property
     def conditions(self) -> PlayRequest:
-        """The episode that is asked for."""
         return replace(
             self._request,
             scene=self.scene.value,

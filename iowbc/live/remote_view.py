@@ -18,7 +18,6 @@ from iowbc.live.drag import Pushed, spring_pulls
 from iowbc.live.drawing import Drawing, ShownParts
 from iowbc.live.moment import Moment, SimulationWitness
 from iowbc.live.page import PICTURES
-from iowbc.live.played import Played
 from iowbc.live.server import serving
 from iowbc.robot.description import Robot
 from iowbc.sim.rendering.forces import Force
@@ -93,9 +92,7 @@ def _serve(requests: Connection, port: int, robot: Robot, model: Any) -> None:
 def draw(server: viser.ViserServer, requests: Connection, robot: Robot, model: Any) -> None:
     """Draws one picture after the other. Raises EOFError or OSError once the simulation has ended."""
     pressed = threading.Event()
-    drawing = Drawing(server.scene, robot)
-    server.initial_camera.position, server.initial_camera.look_at = Played.view
-    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    drawing = Drawing(server, robot)
     status = server.gui.add_markdown("")
     button = server.gui.add_button("Release the robot", hint="From its band or fixture")
     button.on_click(lambda _: pressed.set())

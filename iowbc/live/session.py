@@ -14,8 +14,7 @@ from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Drag, Pushed, spring_pulls
 from iowbc.live.moment import Witness
-from iowbc.live.played import PAST, Played
-from iowbc.live.track import recorded, track_of
+from iowbc.live.track import PAST, Played, recorded, track_of
 from iowbc.recipe.evaluation.segment import Segment
 
 AN_HOUR = (Segment(duration=600.0),) * 6
@@ -52,12 +51,10 @@ class Session(Played):
         self._policy = open_policy(self.source, self.environment)
 
     def begin(self, request: PlayRequest) -> None:
-        """A new episode under other conditions; the command stays."""
         self.environment.close()
         self._open(request)
 
     def reset(self) -> None:
-        """The episode from its start."""
         environment = self.environment
         self._observation = environment.reset()
         self._policy.reset(np.ones(1, np.bool_))
@@ -70,7 +67,6 @@ class Session(Played):
         self.track.moments.append(self._look(0.0))
 
     def refresh(self) -> bool:
-        """Takes the newest checkpoint, if the policy is one and was written again; whether it was."""
         policy = self.source.policy
         try:
             if not policy.is_file() or policy.stat().st_mtime <= self.written:
@@ -81,7 +77,6 @@ class Session(Played):
         return True
 
     def step(self) -> None:
-        """One control period. After an episode's end, told in `track.ending`, nothing moves until a reset."""
         if self.track.ending:
             return
         self._apply()
@@ -128,5 +123,4 @@ class Session(Played):
         return total
 
     def close(self) -> None:
-        """Ends the simulation."""
         self.environment.close()

@@ -1,9 +1,10 @@
-"""A stretch of an episode that was taken down, its figures, and trials of an evaluation that are played again."""
+"""Episodes of a page, what was taken down of them, and trials of an evaluation that are played again."""
 
+from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -14,11 +15,16 @@ from iowbc.evaluation.trials.errors import ERRORS, deviations_from_clamped
 from iowbc.evaluation.trials.interaction import load_metrics
 from iowbc.evaluation.trials.rollout import RECORDED, in_batch, play_in, trace_of
 from iowbc.evaluation.trials.table import replayed
+from iowbc.live.drag import Drag
+from iowbc.live.drawing import VIEW, GameMarks
 from iowbc.live.moment import Moment, Witness
 from iowbc.recipe.evaluation.evaluation import Success
+from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
 
+PAST = 60.0
+"""Length of the past of an episode that is kept, and can be looked at [s]."""
 WINDOW = 3.0
 """Figures are means over so long a time [s]; the weight in the hands leaves out its first second."""
 
@@ -86,6 +92,54 @@ class Track:
             weight_in_hands=load_metrics(trace, self.held_weight, Success().least_weight)["weight_in_hands"],
             saturated={name: float(share) for name, share in zip(self.joints, shares, strict=True) if share > 0},
         )
+
+
+class Played(ABC):
+    """Episodes for a page. Close it, or use it as a context manager."""
+
+    track: Track
+    """The present episode, with what is remembered of it."""
+    request: Any
+    """The conditions of the episode, as `begin` takes them."""
+    robot: Robot
+    period: float
+    """Time of a step [s]."""
+    marks: GameMarks | None = None
+    """Path, walls and handle of a game."""
+    view = VIEW
+    """First position of a camera, and at what it looks [m]."""
+    checkpoint = ""
+    """Which checkpoint of a training plays."""
+
+    @abstractmethod
+    def begin(self, request: Any) -> None:
+        """A new episode under other conditions."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """The episode from its start."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """One control period. After an episode's end, told in `track.ending`, nothing moves until a reset."""
+
+    @abstractmethod
+    def drag(self, drags: Sequence[Drag]) -> None:
+        """Takes notice of what mice drag until the next call."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Ends the simulation."""
+
+    def refresh(self) -> bool:
+        """Takes the newest checkpoint, if the policy is one and was written again; whether it was."""
+        return False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self.close()
 
 
 def recorded(environment: VectorEnv) -> dict[str, Array]:

@@ -1,22 +1,19 @@
 """The plan of a recipe: stages that would run, and why."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from iowbc.errors import Damaged, Problem, RecipeError, shown
 from iowbc.pipeline.code import changed_code, stage_code
-from iowbc.pipeline.estimate import estimated
-from iowbc.pipeline.ingredients import key_values, slice_value
 from iowbc.pipeline.nested import MISSING, differences, nested
-from iowbc.pipeline.stage import Borrowed, Stage
-from iowbc.pipeline.stage_plan import Options, StagePlan
+from iowbc.pipeline.stage import Borrowed, Stage, slice_value
+from iowbc.pipeline.stage_plan import Options, StagePlan, estimated
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.store.workspace import Workspace
-from iowbc.processes import available_cores
+from iowbc.pipeline.store.workspace import read_progress
 from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.section import deciding
@@ -40,20 +37,11 @@ class Planner:
         self.robot_digest = folder_digest(self.robot)
         self.deciding = deciding(self.loaded.recipe)
 
-    @property
-    def workers(self) -> int:
-        """Worker processes of a stage: as asked for, or the recipe's, or as many as there are cores."""
-        return self.options.workers or self.loaded.recipe.execution.workers or available_cores()
-
     def plan(self, known: "Plans | None" = None) -> list[StagePlan]:
         """A step for each stage, as things stand; nothing is changed. `known`: plans made in the same moment."""
-        known = {} if known is None else known
-        if self not in known:
-            known[self] = self._planned(known)
-        return known[self]
-
-    def _planned(self, known: "Plans") -> list[StagePlan]:
-        steps: dict[str, StagePlan] = {}
+        known, steps = {} if known is None else known, dict[str, StagePlan]()
+        if self in known:
+            return known[self]
         for stage in self.stages:
             inputs = {
                 name: steps[name].artifact if steps[name].cached else None for name in stage.reads(self.loaded.recipe)
@@ -66,7 +54,8 @@ class Planner:
                 made = steps[name].artifact
                 if not steps[stage.name].cached and steps[name].cached and made is not None and not made.whole:
                     steps[name] = replace(steps[name], reasons=(f"{NOT_WHOLE}; {stage.name} reads it",))
-        return list(steps.values())
+        known[self] = list(steps.values())
+        return known[self]
 
     def borrowed(self, stage: Stage, known: "Plans | None" = None) -> dict[str, Artifact | None]:
         """The artifacts of other recipes that a stage reads, by their names among the inputs.
@@ -104,66 +93,56 @@ class Planner:
         ingredients = {
             "stage": stage.name,
             "version": stage.version,
-            "recipe": key_values(self.loaded.recipe, self.deciding, stage),
+            "recipe": stage.key_values(self.loaded.recipe, self.deciding),
             "inputs": {name: artifact.manifest.digest if artifact else None for name, artifact in inputs.items()},
             "robot": self.robot_digest,
         }
         former = self._closest(stage.name, ingredients)
-        step = StagePlan(stage, code=stage_code(stage))
+        there = {name: artifact for name, artifact in inputs.items() if artifact is not None}
+        step = StagePlan(stage, code=stage_code(stage), inputs=there)
         if former is not None:
             step = estimated(step, ingredients, self.store.artifacts(stage.name), former)
         if unknown:
             return replace(step, reasons=tuple(self._reasons(ingredients, former, unknown)))
-        step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients))
-        reasons = [*self._demands(step, whole)]
+        step = self._looked_up(replace(step, key=data_digest(ingredients), ingredients=ingredients), whole)
         if step.artifact is None:
-            reasons += [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
-        return self._resumed(replace(step, reasons=tuple(reasons))) if reasons else step
+            why = [f"damaged: {step.damage}"] if step.damage else self._reasons(ingredients, former, ())
+            step = replace(step, reasons=(*step.reasons, *why))
+        return self._resumed(step) if step.reasons else step
 
-    def _looked_up(self, step: StagePlan) -> StagePlan:
-        """With the stored artifact of its key, where that is whole, and what there is to say about it."""
-        stage, key, notes = step.stage, str(step.key), []
-        artifact, damage = _checked(self.store.find, stage.name, key)
+    def _looked_up(self, step: StagePlan, whole: bool) -> StagePlan:
+        """With the stored artifact of its key, where that is whole, why it is not used, and what there is to say."""
+        stage, notes = step.stage, list[str]()
+        reasons = ["forced by --force"] if stage.name in self.options.force else []
+        artifact, damage = self.store.checked(stage.name, step.known_key)
         if artifact is None:
-            artifact, published_damage = _checked(self.store.find_published, stage.name, key)
+            artifact, published_damage = self.store.checked(stage.name, step.known_key, published=True)
             if published_damage:
                 notes.append(f"the published artifact is ignored, it is damaged: {published_damage}")
         if artifact is not None:
             if damage:
                 notes.append(f"the published artifact is used; the one made here is damaged: {damage}")
-            changed = self._changed_code(step.code, artifact)
+            changed = changed_code(artifact.manifest.code, step.code)
+            text = f"code changed since it was made: {', '.join(changed)}"
+            if whole and not artifact.whole:
+                reasons.append(NOT_WHOLE)
+            elif changed and self.options.on_code_change == "rerun":
+                reasons.append(text)
             if changed and self.options.on_code_change == "report":
-                notes.append(changed)
+                notes.append(text)
             notes.extend(self._looks(stage, artifact))
-        return replace(step, artifact=artifact, damage=damage, notes=tuple(notes))
-
-    def _demands(self, step: StagePlan, whole: bool) -> Iterator[str]:
-        """Why a stored artifact is not used although its key is the right one."""
-        if step.stage.name in self.options.force:
-            yield "forced by --force"
-        if step.artifact is None:
-            return
-        if whole and not step.artifact.whole:
-            yield NOT_WHOLE
-        elif self.options.on_code_change == "rerun" and (changed := self._changed_code(step.code, step.artifact)):
-            yield changed
-
-    def _changed_code(self, code: Mapping[str, str], artifact: Artifact) -> str:
-        changed = changed_code(artifact.manifest.code, code)
-        return f"code changed since it was made: {', '.join(changed)}" if changed else ""
+        return replace(step, artifact=artifact, damage=damage, reasons=tuple(reasons), notes=tuple(notes))
 
     def _resumed(self, step: StagePlan) -> StagePlan:
         """A step that runs, with what it goes on from: an earlier attempt, or an artifact that ends earlier."""
         stage, notes, expected, predecessor = step.stage, list(step.notes), step.expected, None
-        record, forced = Workspace(self.store.runs, stage.name, str(step.key)).record, stage.name in self.options.force
-        if record and (record.get("forced") or not forced):
-            done, total, seconds = (float(record[name]) for name in ("done", "total", "seconds"))
-            share = f", {100 * done / total:.0f} %" if total else ""
-            notes.append(f"goes on from attempt {record['attempts'] or 1}{share}")
-            if done and total and seconds:  # the rest at its own rate
-                expected = seconds * max(0.0, total / done - 1.0)
+        record, forced = read_progress(self.store.runs.work / step.known_key), stage.name in self.options.force
+        if record and (record.forced or not forced):
+            notes.append(", ".join(filter(None, [f"goes on from attempt {record.attempts or 1}", record.share])))
+            if record.done and record.total and record.seconds:  # the rest at its own rate
+                expected = record.seconds * max(0.0, record.total / record.done - 1.0)
         if not forced:
-            predecessor = self._predecessor(stage, step.ingredients or {})
+            predecessor = self._predecessor(stage, step.ingredients)
         if predecessor is not None:
             notes.append(f"extends {predecessor.manifest.key[:8]}, which ends earlier")
             expected = None if expected is None else max(0.0, expected - predecessor.manifest.seconds)
@@ -319,17 +298,6 @@ def _origin(loaded: LoadedRecipe, borrowed: Borrowed, above: Sequence[Path]) -> 
     if origin.recipe.robot != loaded.recipe.robot:
         raise wrong_origin(loaded, borrowed, f"is about another robot, {origin.recipe.robot}")
     return origin
-
-
-def _checked(find: Callable[[str, str], Artifact | None], stage: str, key: str) -> tuple[Artifact | None, str]:
-    """The artifact that a store finds and whose files are what was written, or what is wrong with it."""
-    try:
-        artifact = find(stage, key)
-        if artifact is not None:
-            artifact.verify()
-    except Damaged as error:
-        return None, str(error)
-    return artifact, ""
 
 
 def _shown(value: Any) -> str:

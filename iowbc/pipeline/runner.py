@@ -3,8 +3,9 @@
 import contextlib
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
@@ -13,7 +14,6 @@ from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
 from iowbc.pipeline.machine import host, versions
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.reporting import StageReport
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan
 from iowbc.pipeline.store.artifact import Artifact, read_artifact, seal
@@ -21,15 +21,42 @@ from iowbc.pipeline.store.last_used import remember
 from iowbc.pipeline.store.locks import key_lock
 from iowbc.pipeline.store.workspace import Workspace
 from iowbc.pipeline.tracking.tracker import Tracker
+from iowbc.processes import available_cores
 from iowbc.recipe.reading.document import as_yaml
 
-Execute = Callable[[Stage, Job], None]
-"""Carries a stage out."""
 
+@dataclass
+class StageReport:
+    """The `Report` that a stage receives: to the console, to the tracking journal, and to its record on disk."""
 
-def run_here(stage: Stage, job: Job) -> None:
-    """Carry a stage out in this process."""
-    stage.run(job)
+    view: StageView
+    display: Display
+    tracker: Tracker | None
+    workspace: Workspace
+
+    def metrics(self, values: Mapping[str, float], step: int) -> None:
+        """Record named values at a step; the first name is the stage's main metric."""
+        if not values:
+            return
+        name = self.view.metric if self.view.metric in values else next(iter(values))
+        self.view.measured(name, step, float(values[name]))
+        self.workspace.drawn(self.view.metric, self.view.curve)
+        if self.tracker is not None:
+            self.tracker.metrics(self.view.name, values, step)
+        self.display.moved(self.view)
+
+    def progress(self, done: float, total: float, note: str = "") -> None:
+        self.view.progress(done, total, note)
+        self.workspace.progress(done, total, note)
+        self.display.moved(self.view)
+
+    def files(self, path: Path) -> None:
+        if self.tracker is not None:
+            self.tracker.files(self.view.name, [path])
+
+    def say(self, text: str) -> None:
+        prefix = f"{self.view.name}: "
+        self.display.say(prefix + text.removeprefix(prefix))
 
 
 @dataclass(eq=False)
@@ -42,17 +69,18 @@ class Runner:
     interrupted: Callable[[], bool]
     command: Callable[[], str] = lambda: ""
     """What goes on with this run after the stages in `made`; kept with a stage while it is made."""
-    execute: Execute = run_here
-    """Carries a stage out, with the same result wherever."""
+    execute: Callable[[Stage, Job], None] = lambda stage, job: stage.run(job)
+    """Carries a stage out, with the same result wherever; in this process by default."""
     workers: int = 0
-    """Processes of a stage; 0 for the planner's."""
+    """Processes of a stage; 0: as asked for, or the recipe's, or as many as there are cores."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)
     made: list[str] = field(default_factory=list)
     """Stages that were not cached."""
 
     def __post_init__(self) -> None:
         self.loaded, self.store, self.options = self.planner.loaded, self.planner.store, self.planner.options
-        self.workers = self.workers or self.planner.workers
+        asked = self.options.workers or self.loaded.recipe.execution.workers
+        self.workers = self.workers or asked or available_cores()
         self.views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
 
     def run(self) -> dict[str, Artifact]:
@@ -62,15 +90,8 @@ class Runner:
             for stage in self.planner.stages:
                 if self.interrupted():
                     raise Interrupted
-                self._bring_about(stage)
-        finally:
-            self.display.end()
-        return self.artifacts
-
-    def _bring_about(self, stage: Stage) -> None:
-        try:
-            self.artifacts[stage.name] = self._artifact(stage)
-            remember(self.store.runs, self.loaded, self.artifacts[stage.name])
+                self.artifacts[stage.name] = self._artifact(stage)
+                remember(self.store.runs, self.loaded, self.artifacts[stage.name])
         except Exception as error:
             if isinstance(error, (PipelineFailed, Interrupted)) or not nothing_fits(error):
                 raise
@@ -78,100 +99,94 @@ class Runner:
                 f"{stage.name} failed: no space is left: {what_is_full(error, (self.store.runs.root,))}. "
                 "Its last checkpoint is kept; make some (`iowbc gc` removes what you name)"
             ) from error
+        finally:
+            self.display.end()
+        return self.artifacts
 
     def _artifact(self, stage: Stage, *, whole: bool = False) -> Artifact:
         """The stage's artifact: the stored one where it can be used, else a new one.
 
         whole: a published one does not do that leaves out large files.
         """
-        view = self.views[stage.name]
         step = self._decide(stage, whole)
-        if step.cached and step.artifact is not None:
-            self._clear(step.artifact)
-            return self._reused(step, step.artifact, view)
+        if step.cached:
+            self._clear(stage, step.known_key)
+            return self._reused(step)
         for read in self.planner.stages:
             if read.name in stage.reads(self.loaded.recipe) and not self.artifacts[read.name].whole:
                 self.artifacts[read.name] = self._artifact(read, whole=True)
                 step = self._decide(stage, whole)
-        assert step.key is not None
 
         def waits(holder: object) -> None:
-            self._show(view, "waits", f"{holder} is making it")
+            self._show(stage, "waits", f"{holder} is making it")
             self.display.say(f"{stage.name}: busy, held by {holder}; waiting for it, to use what it makes")
 
-        with key_lock(self.store.runs, step.key, waits, self.interrupted) as held:
+        with key_lock(self.store.runs, step.known_key, waits, self.interrupted) as held:
             if not held:
                 raise Interrupted
-            workspace = Workspace(self.store.runs, stage.name, step.key)
-            self._finish_adding(stage, step.key, workspace)
+            workspace = Workspace(self.store.runs, stage.name, step.known_key)
+            self._finish_adding(workspace)
             step = self._decide(stage, whole)
-            if step.cached and step.artifact is not None:
+            if step.cached:
                 workspace.remove()
-                return self._reused(step, step.artifact, view)
+                return self._reused(step)
             if step.damage:
-                assert step.key is not None
-                aside = self.store.set_aside(stage.name, step.key)
+                aside = self.store.set_aside(stage.name, step.known_key)
                 self.display.say(f"{stage.name}: its artifact is damaged ({step.damage}); set aside in {aside}")
-            return self._made(step, workspace, view)
+            return self._made(step, workspace)
 
-    def _clear(self, artifact: Artifact) -> None:
+    def _clear(self, stage: Stage, key: str) -> None:
         """Remove what a process left that died after it had put this artifact into the store."""
-        workspace = Workspace(self.store.runs, artifact.manifest.stage, artifact.manifest.key)
+        workspace = Workspace(self.store.runs, stage.name, key)
         if workspace.leftover:
-            with key_lock(self.store.runs, artifact.manifest.key, lambda holder: None, lambda: True) as held:
+            with key_lock(self.store.runs, key, lambda holder: None, lambda: True) as held:
                 if held and workspace.leftover:
                     workspace.remove()
 
     def _decide(self, stage: Stage, whole: bool) -> StagePlan:
-        return self.planner.decide(stage, self._inputs(stage), whole=whole)
-
-    def _inputs(self, stage: Stage) -> dict[str, Artifact]:
         read = {name: self.artifacts[name] for name in stage.reads(self.loaded.recipe)}
         for name, artifact in self.planner.borrowed(stage).items():
             if artifact is None:
                 origin = self.planner.origins[stage.name, name].loaded.file
                 raise PipelineFailed(f"{stage.name} reads an artifact of {origin}; first `iowbc run {origin}`")
             read[name] = artifact
-        return read
+        return self.planner.decide(stage, read, whole=whole)
 
-    def _reused(self, step: StagePlan, artifact: Artifact, view: StageView) -> Artifact:
-        notes = ("published", *step.notes) if artifact.published else step.notes
-        self._show(view, "cached", "; ".join(notes))
+    def _reused(self, step: StagePlan) -> Artifact:
+        assert step.artifact is not None
+        self._show(step.stage, "cached", "; ".join(("published", *step.notes) if step.published else step.notes))
         if self.tracker is not None:
-            self.tracker.finished(step.stage.name, artifact, cached=True)
-        return artifact
+            self.tracker.finished(step.stage.name, step.artifact, cached=True)
+        return step.artifact
 
-    def _finish_adding(self, stage: Stage, key: str, workspace: Workspace) -> None:
+    def _finish_adding(self, workspace: Workspace) -> None:
         """Take output into the store that was sealed when its process died on the threshold."""
-        try:
+        with contextlib.suppress(Damaged):
             if workspace.out.is_dir():
-                read_artifact(workspace.out, stage.name, key).verify()
-                self.store.add(workspace.out, stage.name, key)
+                read_artifact(workspace.out, workspace.stage, workspace.key).verify()
+                self.store.add(workspace.out, workspace.stage, workspace.key)
                 workspace.remove()
-        except Damaged:
-            return
 
-    def _made(self, step: StagePlan, workspace: Workspace, view: StageView) -> Artifact:
-        stage, key = step.stage, step.key
-        assert key is not None
-        earlier = workspace.record.get("code", step.code)
-        command = self.command()
-        resumed = workspace.begin(self.loaded.recipe.name, stage.name in self.options.force, dict(step.code), command)
-        workspace.describe(step.ingredients or {}, as_yaml(self.loaded.recipe))
-        view.metric, view.curve = workspace.curve
+    def _made(self, step: StagePlan, workspace: Workspace) -> Artifact:
+        stage, key, view = step.stage, workspace.key, self.views[step.stage.name]
+        ingredients, resolved = step.ingredients, as_yaml(self.loaded.recipe)
+        forced = stage.name in self.options.force
+        earlier = workspace.begin(self.loaded.recipe.name, forced, dict(step.code), self.command())
+        workspace.describe(ingredients, resolved)
+        view.metric, view.curve = workspace.state.metric, [*workspace.state.curve]
         view.began = time.monotonic() - workspace.seconds
-        self._show(view, "runs", short(step.notes or step.reasons, 1))
+        self._show(stage, "runs", short(step.notes or step.reasons, 1))
         view.note = ""
-        changed = changed_code(earlier, step.code)
-        if resumed and changed:
+        changed = changed_code(earlier.code, step.code) if earlier else []
+        if changed:
             self.display.say(f"{stage.name}: code changed since its first attempt: {', '.join(changed)}")
         if self.tracker is not None:
-            self.tracker.stage(stage.name, key, (step.ingredients or {}).get("recipe", {}), resumed)
+            self.tracker.stage(stage.name, key, ingredients.get("recipe", {}), earlier is not None)
         job = Job(
             recipe=self.loaded.recipe,
             key=key,
             robot=self.planner.robot,
-            inputs={name: artifact.folder for name, artifact in self._inputs(stage).items()},
+            inputs={name: artifact.folder for name, artifact in step.inputs.items()},
             out=workspace.out,
             work=workspace.scratch,
             workers=self.workers,
@@ -181,60 +196,57 @@ class Runner:
         )
         try:
             self.execute(stage, job)
-            artifact = self._published(step, workspace)
+            details = {
+                "stage": stage.name,
+                "version": stage.version,
+                "key": key,
+                "recipe": self.loaded.recipe.name,
+                "seconds": workspace.seconds + (step.predecessor.manifest.seconds if step.predecessor else 0.0),
+                "attempts": workspace.state.attempts,
+                "workers": self.workers,
+                "host": host(),
+                "code": dict(step.code),
+                "versions": versions(),
+            }
+            seal(workspace.out, stage.results, details, ingredients, resolved)
+            artifact = self.store.add(workspace.out, stage.name, key)
+            workspace.remove()
         except (Interrupted, KeyboardInterrupt) as error:
-            self._ended(workspace, view, "stopped", "KILLED", str(error))
+            self._ended(workspace, "stopped", "KILLED", str(error))
             text = str(error).removeprefix(f"{stage.name}: ")
             raise Interrupted(f"{stage.name}: {text or 'aborted'}") from error
         except IowbcError as error:
-            self._ended(workspace, view, "failed", "FAILED", str(error))
+            self._ended(workspace, "failed", "FAILED", str(error))
             raise PipelineFailed(f"{stage.name} failed: {error}") from error
         except Exception as error:
             if nothing_fits(error):
-                self._ended(workspace, view, "failed", "FAILED", "no space left")
+                self._ended(workspace, "failed", "FAILED", "no space left")
                 raise
-            details = workspace.root / "error.txt"
+            details_file = workspace.root / "error.txt"
             with contextlib.suppress(OSError):
-                details.write_text(traceback.format_exc(), encoding="utf-8")
+                details_file.write_text(traceback.format_exc(), encoding="utf-8")
             summary = f"{type(error).__name__}: {error}"
-            self._ended(workspace, view, "failed", "FAILED", summary)
+            self._ended(workspace, "failed", "FAILED", summary)
             self.display.say(traceback.format_exc())
-            raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is also in {details}") from error
+            raise PipelineFailed(f"{stage.name} failed: {summary}\nthe traceback is also in {details_file}") from error
         self.made.append(stage.name)
         view.seconds = artifact.manifest.seconds
-        self._show(view, "done")
+        self._show(stage, "done")
         if self.tracker is not None:
             self.tracker.finished(stage.name, artifact, cached=False)
         return artifact
 
-    def _published(self, step: StagePlan, workspace: Workspace) -> Artifact:
-        assert step.key is not None
-        details = {
-            "stage": step.stage.name,
-            "version": step.stage.version,
-            "key": step.key,
-            "recipe": self.loaded.recipe.name,
-            "seconds": workspace.seconds + (step.predecessor.manifest.seconds if step.predecessor else 0.0),
-            "attempts": workspace.attempts,
-            "workers": self.workers,
-            "host": host(),
-            "code": dict(step.code),
-            "versions": versions(),
-        }
-        seal(workspace.out, step.stage.results, details, step.ingredients or {}, as_yaml(self.loaded.recipe))
-        artifact = self.store.add(workspace.out, step.stage.name, step.key)
-        workspace.remove()
-        return artifact
-
-    def _show(self, view: StageView, state: str, note: str = "") -> None:
+    def _show(self, stage: Stage, state: str, note: str = "") -> None:
+        view = self.views[stage.name]
         view.state, view.note = state, note
         self.display.changed(view)
 
-    def _ended(self, workspace: Workspace, view: StageView, state: str, status: str, message: str) -> None:
+    def _ended(self, workspace: Workspace, state: str, status: str, message: str) -> None:
         with contextlib.suppress(OSError):  # a full disk must not hide why the stage ended
             workspace.write()
-        view.seconds = workspace.seconds
-        self._show(view, state)
+        view = self.views[workspace.stage]
+        view.seconds, view.state, view.note = workspace.seconds, state, ""
+        self.display.changed(view)
         if self.tracker is not None:
             with contextlib.suppress(OSError):
                 self.tracker.end(view.name, status, message)

@@ -138,3 +138,19 @@ class Stage:
     presentation: Presentation = Presentation()
     spreads: Callable[[Recipe], bool] = lambda recipe: False
     """True for a recipe of which it leaves its heavy work to `Job.spread` where there is one."""
+
+    def key_values(self, recipe: Recipe, deciding: Mapping[str, Any]) -> dict[str, Any]:
+        """By dotted path: the values of a recipe that decide the result, and the program's defaults beside them."""
+        return {path: slice_value(deciding, path, self) for path in self.slice} | dict(self.defaults(recipe))
+
+
+def slice_value(values: Mapping[str, Any], path: str, stage: Stage) -> Any:
+    """The part at a dotted path of what decides a recipe's results."""
+    if path.split(".")[0] in ("execution", "stages"):
+        raise ValueError(f"stage {stage.name}: '{path}' must not be part of a key")
+    value: Any = values
+    for part in path.split("."):
+        if not isinstance(value, Mapping) or part not in value:
+            raise ValueError(f"stage {stage.name}: its slice names '{path}', which decides nothing in a recipe")
+        value = value[part]
+    return value

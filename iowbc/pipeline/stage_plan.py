@@ -1,13 +1,20 @@
-"""Planned stages, and the options of a run."""
+"""Planned stages with their expected times, and the options of a run."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from statistics import median
 from typing import Any, Literal
 
+from iowbc.pipeline.machine import host
+from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.recipe.recipe import SEEDS
 
-OnCodeChange = Literal["report", "rerun"]
+LAST_RUNS = 5
+"""Runs that an estimate is learnt from: older ones are of an older program or of another load."""
+UNSEEN = (0.8, 1.25)
+"""Factors by which the next run may lie beyond the fastest and the slowest of them, for other programs change times."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +26,7 @@ class Options:
     workers: int | None = None
     engine: Literal["local", "ray"] | None = None
     address: str | None = None
-    on_code_change: OnCodeChange = "report"
+    on_code_change: Literal["report", "rerun"] = "report"
 
 
 @dataclass(frozen=True)
@@ -29,7 +36,9 @@ class StagePlan:
     stage: Stage
     key: str | None = None
     """None while an input's content is not known."""
-    ingredients: Mapping[str, Any] | None = None
+    ingredients: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, Artifact] = field(default_factory=dict)
+    """Artifacts that it reads, as far as they are there."""
     artifact: Artifact | None = None
     """The stored artifact with this key, whole; also where it would be replaced."""
     reasons: tuple[str, ...] = ()
@@ -50,6 +59,12 @@ class StagePlan:
     """The stored artifact that it would go on from."""
 
     @property
+    def known_key(self) -> str:
+        """The key of a stage whose inputs are all known."""
+        assert self.key is not None
+        return self.key
+
+    @property
     def cached(self) -> bool:
         """True where the stored artifact is used as it is."""
         return not self.reasons
@@ -63,3 +78,34 @@ class StagePlan:
     def guess(self) -> float | None:
         """The expected time, or what comes nearest to one [s]."""
         return self.roughly if self.expected is None else self.expected
+
+
+def estimated(
+    step: StagePlan, ingredients: Mapping[str, Any], stored: Iterable[Artifact], closest: Artifact
+) -> StagePlan:
+    """A step with its time: the median of its last runs here that differ in seed and counts alone, else a guess at the
+    rate of `closest`, the stored artifact that differs least."""
+    made = closest.manifest
+    rate_of = made.recipe if made.host == host() else f"{made.recipe} on another machine"
+    own = sorted((one for one in stored if one.manifest.host == host()), key=lambda one: -one.manifest.made)
+    reckoned = (_reckoned(step.stage, one, ingredients) for one in own)
+    times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
+    if not times:
+        guess = _reckoned(step.stage, closest, ingredients)[0]
+        return replace(step, roughly=guess, spread=UNSEEN, rate_of=rate_of)
+    middle = median(times)
+    spread = (UNSEEN[0] * min(times) / middle, UNSEEN[1] * max(times) / middle) if middle else UNSEEN
+    return replace(step, expected=middle, spread=spread, rate_of=rate_of)
+
+
+def _reckoned(stage: Stage, former: Artifact, ingredients: Mapping[str, Any]) -> tuple[float, bool]:
+    """The time that a stage takes at the rate of a stored artifact [s], which is proportional to each of the stage's
+    counts, and whether nothing but seed and counts differs."""
+    old, seconds = former.ingredients, former.manifest.seconds
+    alike = old.get("version") == ingredients["version"]
+    for path, before, after in differences(nested(old.get("recipe", {})), nested(ingredients["recipe"])):
+        if path in stage.counts and MISSING not in (before, after) and before:
+            seconds *= after / before
+        elif path not in SEEDS:
+            alike = False
+    return seconds, alike

@@ -11,14 +11,14 @@ from iowbc.pipeline.store.runs import Runs
 def require_writable_runs(runs: Runs) -> None:
     """Make the folder of runs where it is missing. Raises `UsageError` where it, or a part of it, cannot be written."""
     parts = (runs.store, *runs.store.glob("*"), runs.work, runs.damaged, runs.locks, runs.recipes, runs.tracking)
-    reason = _obstacle(runs.root) or next(filter(None, map(_closed, parts)), "")
+    reason = obstacle(runs.root) or next(filter(None, map(_closed, parts)), "")
     if reason:
         raise UsageError(f"{runs.root} cannot be written: {reason}; {_remedy(runs.root, '--runs')}")
 
 
 def require_writable(folder: Path, option: str) -> None:
     """Make a folder that an option names. Raises `UsageError` where it cannot be written."""
-    reason = _obstacle(folder)
+    reason = obstacle(folder)
     if reason:
         raise UsageError(f"{folder} cannot be written: {reason}; {_remedy(folder, option)}")
 
@@ -36,7 +36,7 @@ def _remedy(folder: Path, option: str) -> str:
     )
 
 
-def _obstacle(folder: Path) -> str:
+def obstacle(folder: Path) -> str:
     """The reason why no file can be made in a folder, which is made where it is missing; empty where one can."""
     if folder.exists() and not folder.is_dir():
         return "it is not a folder"

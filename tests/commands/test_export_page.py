@@ -12,7 +12,7 @@ from iowbc.commands.export import export_page, exported_folder
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.web.bundling import SOURCE, npm_parts, parts_folder
+from iowbc.web.page import SOURCE, npm_parts, parts_folder
 
 
 @pytest.fixture

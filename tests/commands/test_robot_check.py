@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from iowbc.commands.request import check_against_robot
+from iowbc.commands.request import prepared
 from iowbc.errors import RecipeError
+from iowbc.pipeline.stage_plan import Options
+from iowbc.pipeline.store.runs import Runs
 from iowbc.recipe.reading.loading import load_recipe
-from iowbc.robot.description import robot_folder
 
 ELBOW = "rg:\n  sampling:\n    joint_ranges:\n      {name}: {{low: {low}, high: 1.0}}\n"
 
@@ -15,7 +16,7 @@ ELBOW = "rg:\n  sampling:\n    joint_ranges:\n      {name}: {{low: {low}, high: 
 def check(folder: Path, text: str) -> None:
     file = folder / "mine.yaml"
     file.write_text(text)
-    check_against_robot(load_recipe(file), robot_folder("g1"))
+    prepared(load_recipe(file), Runs(folder / "runs"), Options())
 
 
 def test_arm_joints_within_their_limits_pass(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def recorded(runs: Runs, environment: Mapping[str, str]) -> None:
         journal.write("run", id="recipe", parent=None, name="box", tags={DESCRIPTION: "| a |"}, params={})
         journal.write("files", id="recipe", paths=["store/eval/table.md"])
         journal.write("end", id="recipe", status="FINISHED")
-    words = [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root)]
+    words = [sys.executable, "-m", "iowbc.pipeline.tracking.delivery", str(runs.root)]
     assert subprocess.run(words, env=environment, check=False, timeout=120).returncode == 0
 
 

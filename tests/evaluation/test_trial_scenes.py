@@ -5,7 +5,7 @@ import pytest
 
 from iowbc.evaluation.trials.plan import case_trials
 from iowbc.evaluation.trials.protocol import evaluated_world
-from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.stage import slice_value
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
 from iowbc.robot.description import load_robot, robot_folder

@@ -13,8 +13,8 @@ import ray
 from ray import exceptions
 
 from iowbc.errors import Damaged, Interrupted, StageFailed, WorkerFailed
-from iowbc.pipeline.cluster.actor_pool import TRIES, ActorHost, NodeActorPool
 from iowbc.pipeline.cluster.folders import SharedFolder
+from iowbc.pipeline.cluster.spread import TRIES, ActorHost, NodeActorPool
 from iowbc.pipeline.machine import identity
 
 pytestmark = pytest.mark.unit

@@ -13,7 +13,7 @@ from iowbc.errors import RecipeError
 from iowbc.pipeline import planner as planning
 from iowbc.pipeline.code import stage_code
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.stage import slice_value
 from iowbc.pipeline.store.artifact import MANIFEST, Manifest, write_manifest
 from iowbc.pipeline.store.digests import canonical_json, data_digest, syntax_digest
 from iowbc.pipeline.store.runs import Runs
@@ -193,7 +193,7 @@ def test_what_is_left_of_an_interrupted_stage_is_reckoned_from_its_own_rate(work
     workspace.begin("small", False, {})
     workspace.progress(25, 100, "")
     workspace.write()
-    assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.record["seconds"])
+    assert workplace.plan()["teacher"].expected == pytest.approx(3 * workspace.state.seconds)
 
 
 def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_path: Path) -> None:
@@ -203,10 +203,10 @@ def test_a_stage_that_stops_right_after_it_was_resumed_is_as_far_as_before(tmp_p
     workspace.write()
     again = Workspace(Runs(tmp_path), "teacher", "key")
     assert again.begin("small", False, {})
-    record = again.record
-    assert (record["done"], record["total"], record["note"]) == (25, 100, "at 25")
+    record = again.state
+    assert (record.done, record.total, record.note) == (25, 100, "at 25")
     again.begin("small", True, {})
-    assert again.record["done"] == 0, "a forced attempt begins anew"
+    assert again.state.done == 0, "a forced attempt begins anew"
 
 
 def rewritten(folder: Path, **entries: Any) -> None:

@@ -86,7 +86,7 @@ def test_what_was_published_without_its_state_begins_one_all_the_same(
     assert first.manifest.key in str(published)
     shutil.rmtree(first.folder)
     second = workplace.run(start, "teacher.gamma=0.9")["teacher"]
-    found = workplace.store.find_published("teacher", first.manifest.key)
+    found = workplace.store.find("teacher", first.manifest.key, published=True)
     assert found is not None
     assert not found.whole
     assert told == [None, found.folder]

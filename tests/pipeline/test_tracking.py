@@ -20,7 +20,7 @@ TRACKED = RECIPE.replace("track: false", "tracking_patience: 30")
 
 def deliver(runs: Runs) -> int:
     """Send what is left, as the next run would."""
-    command = [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root)]
+    command = [sys.executable, "-m", "iowbc.pipeline.tracking.delivery", str(runs.root)]
     return subprocess.run(command, check=False, timeout=120, stdin=subprocess.DEVNULL).returncode
 
 

@@ -9,14 +9,13 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iowbc.commands.request import Request, prepared
+from iowbc.commands.request import prepared
 from iowbc.errors import Problem, RecipeError
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.runs import Runs
 from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
 from iowbc.recipe.recipe import Recipe
-from iowbc.stages.registry import STAGES
 
 DEFAULTS = flattened(Recipe(name="default").model_dump(mode="json", exclude={"name"}))
 """What a recipe says that says nothing, by dotted path."""
@@ -57,7 +56,7 @@ def as_tree(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def planned(loaded: LoadedRecipe, folder: Path) -> None:
-    planner = prepared(loaded, Request("mine.yaml", (), Runs(folder / "runs"), Options()), STAGES)
+    planner = prepared(loaded, Runs(folder / "runs"), Options())
     assert [step.stage.name for step in planner.plan()] == list(loaded.recipe.stages)
 
 

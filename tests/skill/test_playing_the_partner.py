@@ -10,8 +10,7 @@ from iowbc.arrays import Array
 from iowbc.errors import UsageError
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.live.drag import Drag
-from iowbc.live.game import GameRequest, GameSession
-from iowbc.live.game_panel import GamePanel
+from iowbc.live.game import GamePanel, GameRequest, GameSession
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import serving
 from iowbc.sim.rendering import appearance

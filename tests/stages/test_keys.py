@@ -5,8 +5,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import pytest
 
-from iowbc.pipeline.ingredients import slice_value
-from iowbc.pipeline.stage import Stage
+from iowbc.pipeline.stage import Stage, slice_value
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import Section, deciding

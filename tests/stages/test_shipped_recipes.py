@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from iowbc.cli import app
 from iowbc.evaluation.paper import VARIANTS as VARIANTS_OF_THE_PAPER
 from iowbc.learning.networks import StudentNetwork
-from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.stage import slice_value
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import Recipe

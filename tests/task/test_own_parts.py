@@ -11,7 +11,7 @@ from own_parts import VELOCITY, own_part
 from task_worlds import rollout
 
 from iowbc.errors import RecipeError, StageFailed, WorkerFailed
-from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.stage import slice_value
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding

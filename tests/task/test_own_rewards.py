@@ -10,7 +10,7 @@ import yaml
 from task_worlds import rollout
 
 from iowbc.errors import RecipeError, StageFailed, WorkerFailed
-from iowbc.pipeline.ingredients import slice_value
+from iowbc.pipeline.stage import slice_value
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding

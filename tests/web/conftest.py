@@ -26,7 +26,7 @@ from iowbc.export.onnx_graph import run_torch
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
-from iowbc.web.bundling import npm_parts, parts_folder
+from iowbc.web.page import npm_parts, parts_folder
 
 DRAWING = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """Words with which the browser draws in three dimensions without a GPU."""

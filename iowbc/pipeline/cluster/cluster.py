@@ -13,17 +13,13 @@ from typing import Any
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed, UsageError
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, write_files
-from iowbc.pipeline.cluster.spread import NodeSpread
+from iowbc.pipeline.cluster.spread import POLL, TRIES, NodeSpread
 from iowbc.pipeline.cluster.stage_task import TOKEN, Event, Mailbox, Order, execute
 from iowbc.pipeline.machine import identity
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.store.digests import folder_digest
 from iowbc.processes import available_cores
 
-TRIES = 5
-"""Times that a stage is begun whose node or worker is lost, before it counts as failed."""
-POLL = 0.2
-"""Seconds between two looks at a task."""
 ABORT_PATIENCE = 5.0
 """Seconds that Ray has to end a task that is aborted."""
 SETTINGS = {
@@ -220,13 +216,9 @@ def _connected(address: str, **settings: Any) -> Any:
 def _pass_on(job: Job, event: Event) -> None:
     """Pass on what a task has reported."""
     kind, *rest = event
-    if kind == "metrics":
-        job.report.metrics(*rest)
-    elif kind == "progress":
-        job.report.progress(*rest)
-    elif kind == "say":
-        job.report.say(*rest)
+    if kind == "files":
+        write_files(job.work, rest[0])
     elif kind == "shown":
         job.report.files(job.work / rest[0])
     else:
-        write_files(job.work, rest[0])
+        getattr(job.report, kind)(*rest)

@@ -1,19 +1,156 @@
-"""Work of a stage that other nodes do: calls of functions, and actors."""
+"""Work of a stage that other nodes do: calls of functions, and objects that it holds there.
+
+Ray begins an actor on a node with a free core and reserves none for it afterwards: pools never wait for one another.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from iowbc.errors import Interrupted
-from iowbc.pipeline.cluster.actor_pool import NodeActorPool
+from iowbc.errors import Interrupted, IowbcError, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster.folders import SharedFolder, placed
 from iowbc.pipeline.stage import Member
 
 Result = TypeVar("Result")
 TRIES = 5
-"""Retries by Ray of a call whose node or worker is lost."""
+"""Times in a row that a call, a member or a stage is begun anew whose node or worker is lost, before it has failed."""
 POLL = 0.2
-"""Seconds between two looks at the calls."""
+"""Seconds between two looks at what goes on."""
+
+
+class ActorHost:
+    """Ray's actor on a node: one member, made from these arguments at its first request."""
+
+    def __init__(
+        self, make: Callable[..., Member], arguments: tuple[Any, ...], folders: Mapping[str, SharedFolder]
+    ) -> None:
+        self._make, self._arguments, self._folders = make, arguments, folders
+        self._member: Member | None = None
+
+    def ask(self, state: Any, message: Any, changes: bool) -> tuple[Any, Any]:
+        """The answer, and the state after it where it changes any. `state`: of a member that is not made yet."""
+        if self._member is None:
+            self._member = self._make(
+                *self._arguments, **{name: placed(folder) for name, folder in self._folders.items()}
+            )
+            if state is not None:
+                self._member.restore(state)
+        answer = self._member.ask(message)
+        return answer, self._member.state() if changes else None
+
+
+@dataclass(eq=False)
+class Place:
+    """A member's actor, and its last state and answer."""
+
+    arguments: tuple[Any, ...]
+    actor: Any = None
+    made: bool = False
+    """True once this actor has answered: it holds its state itself."""
+    state: Any = None
+    """After the last request that changed it."""
+    answer: Any = None
+    losses: int = 0
+    """In a row."""
+
+
+class NodeActorPool:
+    """Members that are asked side by side. One that is lost is remade in the state after its last request."""
+
+    def __init__(
+        self,
+        called: str,
+        make: Callable[..., Member],
+        calls: Sequence[tuple[Any, ...]],
+        folders: Mapping[str, SharedFolder],
+        interrupted: Callable[[], bool],
+        say: Callable[[str], None],
+    ) -> None:
+        """See `NodeSpread.actor_pool`. say: prints a line about members that are lost."""
+        import ray
+
+        self._called, self._make, self._folders = called, make, folders
+        self._interrupted, self._say = interrupted, say
+        self._host = ray.remote(ActorHost)
+        self._messages: Sequence[Any] = ()
+        self._changes = False
+        self._asked: dict[Any, Place] = {}
+        """Members that have not answered yet, by Ray's references to their answers."""
+        self._places = [Place(arguments) for arguments in calls]
+        for place in self._places:
+            self._start(place)
+
+    @property
+    def states(self) -> list[Any]:
+        """The state of each member after the last request that changed it."""
+        return [place.state for place in self._places]
+
+    def ask(self, messages: Sequence[Any], *, changes: bool = True) -> None:
+        """Send each member its message. `changes`: whether that changes states."""
+        self._messages, self._changes = messages, changes
+        for place in self._places:
+            self._request(place)
+
+    def answers(self) -> list[Any]:
+        """The members' answers, in order.
+
+        Raises WorkerFailed with what a member raised, StageFailed where one is lost again and again, and `Interrupted`
+        where members have not begun yet when the job is asked to stop.
+        """
+        import ray
+
+        while self._asked:
+            over, late = ray.wait(list(self._asked), num_returns=len(self._asked), timeout=POLL)
+            for reference in over:
+                self._hear(reference)
+            if late and self._interrupted() and any(place.state is None for place in self._asked.values()):
+                raise Interrupted("members had not begun yet")
+        return [place.answer for place in self._places]
+
+    def close(self) -> None:
+        import ray
+
+        for place in self._places:
+            ray.kill(place.actor)
+        self._places = []
+
+    def _start(self, place: Place) -> None:
+        options = {"scheduling_strategy": "SPREAD", "max_restarts": 0}
+        place.actor = self._host.options(**options).remote(self._make, place.arguments, self._folders)
+        place.made = False
+
+    def _request(self, place: Place) -> None:
+        message, state = self._messages[self._places.index(place)], None if place.made else place.state
+        self._asked[place.actor.ask.remote(state, message, self._changes)] = place
+
+    def _hear(self, reference: Any) -> None:
+        import ray
+
+        place = self._asked.pop(reference)
+        try:
+            place.answer, state = ray.get(reference)
+        except ray.exceptions.RayError as error:
+            cause = getattr(error, "cause", None)
+            if isinstance(error, ray.exceptions.RayTaskError) and not isinstance(cause, ray.exceptions.RayError):
+                who = f"{self._called} {self._places.index(place) + 1} of {len(self._places)}, on {error.ip}"
+                raise WorkerFailed(f"{who}:\n{cause if isinstance(cause, IowbcError) else error}") from None
+            self._remake(place, str(error).strip().splitlines()[0])
+            return
+        place.made, place.losses = True, 0
+        if self._changes:
+            place.state = state
+
+    def _remake(self, place: Place, why: str) -> None:
+        import ray
+
+        place.losses += 1
+        if place.losses > TRIES:
+            raise StageFailed(f"lost a {self._called} {place.losses} times in a row, the last time: {why}")
+        self._say(f"a {self._called} was lost; another one takes its place")
+        ray.kill(place.actor)
+        self._start(place)
+        self._request(place)
 
 
 class NodeSpread:

@@ -1,7 +1,7 @@
 """Many runs on the console: the state of each, and the last line of its log."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,28 +23,24 @@ LAST_SHOWN = 5
 
 
 @dataclass
-class RunView(StageView):
-    """State of one of many runs."""
-
-    log: Path = Path()
-    """Log of its output."""
-
-
-@dataclass
 class Board:
     """Shows many runs: a table on a terminal, lines elsewhere."""
 
     console: Console
+    logs: Mapping[str, Path]
+    """Log of the output of each run, by its name."""
     interval: float
     """Seconds between two lines of progress where the output is not a terminal."""
     quiet: bool = False
     stopping: Callable[[], str] = lambda: ""
     """Text about a requested stop; empty before."""
-    views: dict[str, RunView] = field(default_factory=dict)
-    _over: list[RunView] = field(default_factory=list)
+    _over: list[StageView] = field(default_factory=list)
     """In the order in which they have ended."""
     _live: Live | None = None
     _shown: float = field(default_factory=time.monotonic)
+
+    def __post_init__(self) -> None:
+        self.views = {name: StageView(name) for name in self.logs}
 
     def __enter__(self) -> "Board":
         if self.console.is_terminal and not self.quiet:
@@ -61,7 +57,7 @@ class Board:
         """A run begins."""
         view = self.views[name]
         view.state, view.began = "runs", time.monotonic()
-        self._say(f"{name}: runs, log {view.log}")
+        self._say(f"{name}: runs, log {self.logs[name]}")
 
     def ended(self, name: str, state: str, note: str) -> None:
         """A run has ended: `done`, `failed` or `stopped`."""
@@ -81,7 +77,7 @@ class Board:
             self._shown = now
             for view in self.views.values():
                 if view.state == "runs":
-                    self._say(f"{view.name}: {last_line(view.log)}")
+                    self._say(f"{view.name}: {last_line(self.logs[view.name])}")
 
     def _say(self, text: str, *, lost: bool = False) -> None:
         if self._live is None and (lost or not self.quiet):
@@ -99,7 +95,7 @@ class Board:
             table.add_column(name, no_wrap=True, overflow="ellipsis")
         running = [view for view in self.views.values() if view.state == "runs"]
         for view in (*self._over[-LAST_SHOWN:], *running):
-            text = view.note or (last_line(view.log) if view.state == "runs" else "")
+            text = view.note or (last_line(self.logs[view.name]) if view.state == "runs" else "")
             state = Text(view.state, style=STYLES.get(view.state, ""))
             table.add_row(Text(view.name), state, duration(view.spent), Text(text, style="dim"))
         stopping = self.stopping()

@@ -133,8 +133,15 @@ class Artifact:
         """Compare everything with its digest. Raises `Damaged`."""
         manifest = self.manifest
         for name, record in (manifest.files | manifest.beside).items():
-            if name not in manifest.omitted:
-                _verify(self.folder / name, name, record)
+            path = self.folder / name
+            if name in manifest.omitted:
+                continue
+            if not path.is_file():
+                raise Damaged(f"{name} is missing")
+            if path.stat().st_size != record.size:
+                raise Damaged(f"{name} has {path.stat().st_size} bytes instead of {record.size}")
+            if file_digest(path) != record.sha256:
+                raise Damaged(f"{name} differs from its digest")
         if not self.ingredients:
             raise Damaged(f"{INGREDIENTS} does not give the key")
 
@@ -204,12 +211,3 @@ def _sealed(found: Mapping[str, Any]) -> bool:
 
 def _record(path: Path) -> FileRecord:
     return FileRecord(sha256=file_digest(path), size=path.stat().st_size)
-
-
-def _verify(path: Path, name: str, record: FileRecord) -> None:
-    if not path.is_file():
-        raise Damaged(f"{name} is missing")
-    if path.stat().st_size != record.size:
-        raise Damaged(f"{name} has {path.stat().st_size} bytes instead of {record.size}")
-    if file_digest(path) != record.sha256:
-        raise Damaged(f"{name} differs from its digest")

@@ -1,18 +1,43 @@
-"""Artifacts that each recipe used last, for `status` and `show`, and ever, which `gc` spares."""
+"""Artifacts that each recipe used last, for `status` and `show`, and ever, which `gc` spares, and links to them.
 
-import json
+A link is named `runs/<recipe>/<stage>` for what a recipe has, `<stage>-<key>` for what a run with overrides made.
+"""
+
+import os
 import shlex
 import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from iowbc.errors import Damaged, UsageError
 from iowbc.files import write_whole
+from iowbc.pipeline.console.wording import KEY_LENGTH
 from iowbc.pipeline.store.artifact import RECIPE, Artifact
-from iowbc.pipeline.store.links import link
-from iowbc.pipeline.store.runs import Runs, read_json
+from iowbc.pipeline.store.runs import Runs
 from iowbc.recipe.reading.loading import LoadedRecipe
+
+
+class Use(BaseModel):
+    """An artifact that a recipe used."""
+
+    key: str
+    time: float
+    """[s since 1970]."""
+
+
+class LastUsed(BaseModel):
+    """The record of a recipe."""
+
+    file: str = ""
+    overrides: list[str] = []
+    recipe: dict[str, Any] = {}
+    """Resolved; empty where it never finished a stage."""
+    stages: dict[str, Use] = {}
+    ever: dict[str, float] = {}
+    """When it, with any overrides, last used an artifact, by its key [s since 1970]."""
 
 
 def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
@@ -20,35 +45,31 @@ def remember(runs: Runs, loaded: LoadedRecipe, artifact: Artifact) -> None:
 
     What a recipe has without overrides is what its name stands for: a run with some only adds to what was ever used.
     """
-    stage, key = artifact.manifest.stage, artifact.manifest.key
-    path = record_path(runs, loaded.recipe.name)
-    record = _record(path) or {"stages": {}}
-    if not loaded.overrides or record.get("overrides", True):
-        record["file"] = str(loaded.file)
-        record["overrides"] = list(loaded.overrides)
-        record["recipe"] = loaded.recipe.model_dump(mode="json")
-        record["stages"][stage] = {"key": key, "time": time.time()}
-        link(runs, loaded.recipe.name, stage, artifact.folder)
-    elif record["stages"].get(stage, {}).get("key") != key:
-        link(runs, loaded.recipe.name, stage, artifact.folder, with_overrides=True)
-    record.setdefault("ever", {})[key] = time.time()
-    write_whole(path, json.dumps(record, indent=1))
+    stage, key, name = artifact.manifest.stage, artifact.manifest.key, loaded.recipe.name
+    record = _record(runs, name) or LastUsed()
+    if not loaded.overrides or record.overrides or not record.recipe:
+        record.file, record.overrides = str(loaded.file), list(loaded.overrides)
+        record.recipe = loaded.recipe.model_dump(mode="json")
+        record.stages[stage] = Use(key=key, time=time.time())
+        _link(runs, name, stage, artifact.folder)
+    elif stage not in record.stages or record.stages[stage].key != key:
+        _link(runs, name, _with_key(stage, artifact.folder), artifact.folder)
+    record.ever[key] = time.time()
+    write_whole(record_path(runs, name), record.model_dump_json(indent=1))
 
 
 def ever_used(runs: Runs, recipe: str) -> dict[str, float]:
     """When a recipe, with any overrides, last used an artifact, by its key [s since 1970]."""
     record = recall(runs, recipe)
-    last = {str(use["key"]): float(use["time"]) for use in record.get("stages", {}).values()}
-    return last | {str(key): float(moment) for key, moment in record.get("ever", {}).items()}
+    return {use.key: use.time for use in record.stages.values()} | record.ever
 
 
-def recall(runs: Runs, recipe: str) -> dict[str, Any]:
+def recall(runs: Runs, recipe: str) -> LastUsed:
     """The record of a recipe by name; empty where it never finished a stage. Raises `UsageError` where damaged."""
-    path = record_path(runs, recipe)
-    record = _record(path)
-    if record is None and path.exists():
-        raise UsageError(f"{path} is damaged; run the recipe again to remake it")
-    return record or {}
+    record = _record(runs, recipe)
+    if record is None and record_path(runs, recipe).exists():
+        raise UsageError(f"{record_path(runs, recipe)} is damaged; run the recipe again to remake it")
+    return record or LastUsed()
 
 
 def record_path(runs: Runs, recipe: str) -> Path:
@@ -56,47 +77,63 @@ def record_path(runs: Runs, recipe: str) -> Path:
     return runs.recipes / f"{recipe}.json"
 
 
-def remaking(runs: Runs, artifact: Artifact) -> str:
-    """The command that makes an artifact anew: its recipe as it was asked for, or, where that changed, as kept."""
-    made = artifact.manifest
-    record = _record(record_path(runs, made.recipe)) or {}
-    words = ["iowbc", "run", str(artifact.folder / RECIPE)]
-    if record.get("stages", {}).get(made.stage, {}).get("key") == made.key:
-        words[-1] = str(record.get("file", words[-1]))
-        for override in record.get("overrides", []):
-            words += ["--set", str(override)]
-    if runs.root != Path("runs"):
-        words += ["--runs", str(runs.root)]
-    return shlex.join(words)
-
-
 def require_whole(runs: Runs, artifacts: Iterable[Artifact]) -> None:
-    """Raises `UsageError` with the command that makes an artifact anew, where a file of it is not what was written.
-
-    One that is named repeatedly is read once.
-    """
+    """Raises `UsageError` with the command that makes an artifact anew, where a file of it is not what was written: its
+    recipe as it was asked for, or, where that changed, as kept. One that is named repeatedly is read once."""
     for artifact in {artifact.folder: artifact for artifact in artifacts}.values():
         try:
             artifact.verify()
         except Damaged as error:
-            raise UsageError(
-                f"{artifact.folder} is damaged: {error}; to make it anew: {remaking(runs, artifact)}"
-            ) from None
+            made, words = artifact.manifest, ["iowbc", "run", str(artifact.folder / RECIPE)]
+            record = _record(runs, made.recipe)
+            if record is not None and made.stage in record.stages and record.stages[made.stage].key == made.key:
+                words[-1] = record.file or words[-1]
+                words += [word for override in record.overrides for word in ("--set", override)]
+            words += [] if runs.root == Path("runs") else ["--runs", str(runs.root)]
+            raise UsageError(f"{artifact.folder} is damaged: {error}; to make it anew: {shlex.join(words)}") from None
 
 
-def _record(path: Path) -> dict[str, Any] | None:
+def named_folder(runs: Runs, recipe: str, stage: str, artifact: Path) -> Path:
+    """The link below `runs/<recipe>` that leads to an artifact's folder, else that folder."""
+    links = (runs.root / recipe / name for name in (stage, _with_key(stage, artifact)))
+    return next((one for one in links if one.is_symlink() and one.resolve() == artifact.resolve()), artifact)
+
+
+def remove_dangling(runs: Runs) -> None:
+    """Remove the links whose artifacts are gone."""
+    for folder in runs.root.iterdir() if runs.root.is_dir() else ():
+        if folder.is_dir() and folder not in runs.parts and _only_links(folder):
+            for path in folder.iterdir():
+                if not path.exists():
+                    path.unlink()
+            if not any(folder.iterdir()):
+                folder.rmdir()
+
+
+def _link(runs: Runs, recipe: str, name: str, artifact: Path) -> None:
+    """Let `runs/<recipe>/<name>` lead to an artifact's folder; a recipe named like a part of `runs` has no links."""
+    folder = runs.root / recipe
+    if folder in runs.parts or (folder.exists() and not _only_links(folder)):
+        return
+    folder.mkdir(exist_ok=True)
+    fresh = folder / f".{name}.{os.getpid()}"
+    fresh.unlink(missing_ok=True)
+    fresh.symlink_to(os.path.relpath(artifact, folder))
+    os.replace(fresh, folder / name)
+
+
+def _with_key(stage: str, artifact: Path) -> str:
+    return f"{stage}-{artifact.name[:KEY_LENGTH]}"
+
+
+def _only_links(folder: Path) -> bool:
+    return folder.is_dir() and all(path.is_symlink() for path in folder.iterdir())
+
+
+def _record(runs: Runs, recipe: str) -> LastUsed | None:
     """A record that is whole, or None."""
-    record = read_json(path)
-    if not isinstance(record, dict) or not isinstance(record.get("recipe"), dict):
+    try:
+        record = LastUsed.model_validate_json(record_path(runs, recipe).read_bytes())
+    except (OSError, ValueError):
         return None
-    stages, ever = record.get("stages"), record.get("ever", {})
-    if not isinstance(record.get("overrides", []), list):
-        return None
-    if not isinstance(ever, dict) or not all(isinstance(moment, (int, float)) for moment in ever.values()):
-        return None
-    if not isinstance(stages, dict) or not all(
-        isinstance(use, dict) and isinstance(use.get("key"), str) and isinstance(use.get("time"), (int, float))
-        for use in stages.values()
-    ):
-        return None
-    return record
+    return record if record.recipe else None

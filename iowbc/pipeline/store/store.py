@@ -2,6 +2,7 @@
 
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from iowbc.errors import Damaged
@@ -20,25 +21,27 @@ class Store:
         """Folder of the artifact of a stage and key, whether or not it is there."""
         return self.runs.store / stage / key
 
-    def find(self, stage: str, key: str) -> Artifact | None:
-        """The artifact that was made here, or None. Raises `Damaged` where its manifest is not what was written."""
-        folder = self.folder(stage, key)
-        return read_artifact(folder, stage, key) if folder.is_dir() else None
+    def find(self, stage: str, key: str, *, published: bool = False) -> Artifact | None:
+        """The artifact that was made here, or the published one, or None. Raises `Damaged` where its manifest is not
+        what was written."""
+        folder = (self.runs.published if published else self.runs.store) / stage / key
+        return read_artifact(folder, stage, key, published=published) if folder.is_dir() else None
 
-    def find_published(self, stage: str, key: str) -> Artifact | None:
-        """The published artifact, or None. Raises `Damaged` as `find` does."""
-        folder = self.runs.published / stage / key
-        return read_artifact(folder, stage, key, published=True) if folder.is_dir() else None
+    def checked(self, stage: str, key: str, *, published: bool = False) -> tuple[Artifact | None, str]:
+        """The artifact that `find` finds and whose files are what was written, or what is wrong with it."""
+        try:
+            if (artifact := self.find(stage, key, published=published)) is not None:
+                artifact.verify()
+        except Damaged as error:
+            return None, str(error)
+        return artifact, ""
 
     def find_any(self, stage: str, key: str) -> Artifact | None:
         """The artifact that was made here, else the published one; None where there is none with a whole manifest."""
-        for find in (self.find, self.find_published):
-            try:
-                artifact = find(stage, key)
-            except Damaged:
-                continue
-            if artifact is not None:
-                return artifact
+        for published in (False, True):
+            with suppress(Damaged):
+                if (artifact := self.find(stage, key, published=published)) is not None:
+                    return artifact
         return None
 
     def artifacts(self, stage: str | None = None) -> list[Artifact]:

@@ -25,8 +25,14 @@ WRITE_INTERVAL = 1.0
 class Progress(BaseModel):
     """Record of a work folder; a number that was not recorded, or whose name a flipped bit changed, is 0."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(ser_json_inf_nan="constants")
 
+    stage: str = "?"
+    key: str = ""
+    recipe: str = "?"
+    pid: int = 0
+    host: str = ""
+    forced: bool = False
     attempts: int = Field(default=0, strict=True, ge=0, lt=10**9)
     before: Number = 0.0
     """Time spent in earlier attempts [s]."""
@@ -36,9 +42,18 @@ class Progress(BaseModel):
     """Time of the record [s since 1970]."""
     done: Number = 0.0
     total: Number = 0.0
+    note: str = ""
+    metric: str = ""
     curve: list[tuple[Number, float]] = Field(default_factory=list)
-    """Steps and values of the small curve."""
+    """Steps and values of the small curve, named `metric`, over all attempts."""
     code: dict[str, str] = Field(default_factory=dict)
+    command: str = ""
+    """What goes on with it when it is stopped."""
+
+    @property
+    def share(self) -> str:
+        """The part that is done, in percent; empty where the total is not known."""
+        return f"{100 * self.done / self.total:.0f} %" if self.total else ""
 
 
 class Workspace:
@@ -50,46 +65,28 @@ class Workspace:
         self.root = runs.work / key
         self.scratch = self.root / "scratch"
         self.out = self.root / "out"
-        self._state: dict[str, Any] = {}
-        self._begun = 0.0
-        self._written = 0.0
+        self.state = Progress(stage=stage, key=key)
+        """Of the present attempt."""
+        self._begun = self._written = 0.0
 
-    @property
-    def record(self) -> dict[str, Any]:
-        """Record of the last attempt; empty where there was none."""
-        return _record(self.root)
-
-    def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> bool:
-        """Make room for an attempt; returns whether it continues an earlier one.
+    def begin(self, recipe: str, forced: bool, code: dict[str, str], command: str = "") -> Progress | None:
+        """Make room for an attempt; returns the record of the earlier one that it continues.
 
         A forced attempt continues only one that was forced too. `command`: what goes on with it when it is stopped.
         """
-        earlier = self.record
-        if forced and not earlier.get("forced"):
+        earlier = read_progress(self.root)
+        if forced and not (earlier and earlier.forced):
             shutil.rmtree(self.root, ignore_errors=True)
-            earlier = {}
+            earlier = None
         shutil.rmtree(self.out, ignore_errors=True)
         self.scratch.mkdir(parents=True, exist_ok=True)
         self.out.mkdir()
-        self._begun = time.monotonic()
-        self._state = {
-            "stage": self.stage,
-            "key": self.key,
-            "recipe": recipe,
-            "pid": os.getpid(),
-            "host": host(),
-            "forced": forced or bool(earlier.get("forced")),
-            "attempts": int(earlier.get("attempts", 0)) + 1,
-            "before": float(earlier.get("seconds", 0.0)),
-            "seconds": float(earlier.get("seconds", 0.0)),
-            "metric": str(earlier.get("metric", "")),
-            "curve": earlier.get("curve", []),
-            **{name: earlier[name] for name in ("done", "total", "note") if name in earlier},
-            "code": code,
-            "command": command,
-        }
+        self._begun, former = time.monotonic(), earlier or Progress()
+        own = {"stage": self.stage, "key": self.key, "recipe": recipe, "pid": os.getpid(), "host": host()}
+        counted = {"attempts": former.attempts + 1, "before": former.seconds, "forced": forced or former.forced}
+        self.state = former.model_copy(update={**own, **counted, "code": code, "command": command})
         self.write()
-        return bool(earlier)
+        return earlier
 
     def describe(self, ingredients: Mapping[str, Any], recipe: str) -> None:
         """Write what the key was computed from, and the recipe, as the artifact will have them beside it."""
@@ -97,35 +94,25 @@ class Workspace:
         write_whole(self.root / RECIPE, recipe)
 
     @property
-    def attempts(self) -> int:
-        """Attempts so far, with this one."""
-        return int(self._state["attempts"])
-
-    @property
     def seconds(self) -> float:
         """Time spent over all attempts [s]."""
-        return float(self._state["before"]) + time.monotonic() - self._begun
+        return self.state.before + time.monotonic() - self._begun
 
     def progress(self, done: float, total: float, note: str) -> None:
         """Record how far the stage is, at most once in a while."""
-        self._state.update(done=done, total=total, note=note)
+        self.state.done, self.state.total, self.state.note = done, total, note
         if time.monotonic() - self._written > WRITE_INTERVAL:
             self.write()
 
     def drawn(self, metric: str, curve: Sequence[tuple[float, float]]) -> None:
         """Keep the stage's small curve of steps and values for the next record: a resumed run goes on with it."""
-        self._state.update(metric=metric, curve=curve)
-
-    @property
-    def curve(self) -> tuple[str, list[tuple[float, float]]]:
-        """Name, steps and values of the small curve up to now, over all attempts."""
-        return str(self._state["metric"]), [(step, value) for step, value in self._state["curve"]]
+        self.state.metric, self.state.curve = metric, list(curve)
 
     def write(self) -> None:
         """Record the progress on disk."""
         self._written = time.monotonic()
-        self._state.update(seconds=self.seconds, updated=time.time())
-        write_whole(self.root / PROGRESS, json.dumps(self._state))
+        self.state.seconds, self.state.updated = self.seconds, time.time()
+        write_whole(self.root / PROGRESS, self.state.model_dump_json())
 
     @property
     def leftover(self) -> bool:
@@ -137,20 +124,19 @@ class Workspace:
         shutil.rmtree(self.root, ignore_errors=True)
 
 
-def _record(root: Path) -> dict[str, Any]:
-    """`Progress` of a work folder; empty where that is missing or not as it was written."""
+def read_progress(root: Path) -> Progress | None:
+    """The record of the last attempt in a work folder; None where that is missing or not as it was written."""
     try:
-        return Progress.model_validate_json((root / PROGRESS).read_bytes()).model_dump()
+        return Progress.model_validate_json((root / PROGRESS).read_bytes())
     except (OSError, ValueError):
-        return {}
+        return None
 
 
-def _finished(runs: Runs, root: Path) -> bool:
-    """True where the output of a work folder is in the store already."""
-    return not (root / "out").is_dir() and any(runs.store.glob(f"*/{root.name}"))
-
-
-def unfinished(runs: Runs) -> list[tuple[Path, dict[str, Any]]]:
-    """Work folders and their records, newest first."""
-    found = [(path, _record(path)) for path in runs.work.glob("*") if path.is_dir() and not _finished(runs, path)]
-    return sorted(found, key=lambda item: -float(item[1].get("updated", 0.0)))
+def unfinished(runs: Runs) -> list[tuple[Path, Progress]]:
+    """Work folders whose output is not in the store yet, and their records, newest first."""
+    found = [
+        (path, read_progress(path) or Progress())
+        for path in runs.work.glob("*")
+        if path.is_dir() and ((path / "out").is_dir() or not any(runs.store.glob(f"*/{path.name}")))
+    ]
+    return sorted(found, key=lambda item: -item[1].updated)

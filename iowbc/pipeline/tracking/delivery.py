@@ -1,12 +1,15 @@
-"""One journal on its way to MLflow: each event at least once, and to no other effect when it comes twice.
+"""Journals on their way to MLflow: each event at least once, and to no other effect when it comes twice.
 
-A line that is damaged is put aside in `runs/damaged/` and named; the others go on.
+A line that is damaged is put aside in `runs/damaged/` and named; the others go on. One process at a time sends the
+journals of a `runs/` folder: `python -m iowbc.pipeline.tracking.delivery RUNS`. It stays as long as a journal's process
+lives, ends the runs of processes that died as KILLED, and leaves what a server does not take for the next one.
 """
 
 import contextlib
 import itertools
 import os
 import shutil
+import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -29,6 +32,10 @@ MAXIMUM_TEXT = 5000
 """Longest value of a parameter or tag that MLflow's stores take [characters]."""
 ORIGIN_TAG = "iowbc.origin"
 """Tag with a run's journal and its name there, by which a sender finds what another one made before it died."""
+POLL = 0.5
+"""Seconds between two looks at the journals of living processes."""
+RETRIES, RETRY_WAIT = 3, 2.0
+"""Attempts at a server that does not answer, after the last living process has gone, and seconds between them."""
 SERVED = "mlflow-artifacts:/"
 """Artifact location of the embedded database for MLflow: wherever its server keeps files, so that `runs` may move."""
 REFUSALS = ("INVALID_PARAMETER_VALUE", "BAD_REQUEST", "RESOURCE_DOES_NOT_EXIST", "RESOURCE_ALREADY_EXISTS")
@@ -230,3 +237,28 @@ def experiment(client: "MlflowClient", name: str, runs: Runs) -> str:
 def embedded_uri(runs: Runs) -> str:
     """The database in `runs`, as MLflow names it."""
     return f"sqlite:///{runs.database.absolute()}"
+
+
+def main(root: Path) -> int:
+    """Send until nothing is left and no process writes any more; 0 where MLflow has everything."""
+    os.environ["MLFLOW_DISABLE_TELEMETRY"] = "true"
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "10")
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "1")
+    runs, deliveries = Runs(root), dict[Path, Delivery]()
+    with named_lock(runs.tracking / "sender.lock"):
+        failures = 0
+        while True:
+            paths = sorted(runs.tracking.glob("*.jsonl"))
+            deliveries = {path: deliveries.get(path) or Delivery(runs, path) for path in paths}
+            living, failed = False, False
+            for delivery in deliveries.values():
+                living |= delivery.lives()
+                failed |= not delivery.advance()
+            failures = failures + 1 if failed else 0
+            if not living and (failures == 0 or failures >= RETRIES):
+                return 1 if failed else 0
+            time.sleep(RETRY_WAIT if failed else POLL)
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

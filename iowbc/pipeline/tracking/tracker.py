@@ -45,6 +45,11 @@ class RunRecord:
         assert self._open is not None
         return self._open
 
+    @property
+    def origin(self) -> str:
+        """The run's name in other journals."""
+        return f"{self._journal.path.stem}/{PARENT}"
+
     def send(self) -> None:
         """Start a sender where none is at work."""
         if self._process is None or self._process.poll() is not None:
@@ -89,27 +94,6 @@ class RunRecord:
     def files(self, name: str, paths: Sequence[Path]) -> None:
         """Files and folders below `runs` of a run; a folder's further files follow when it is told again."""
         self._journal.write("files", id=name, paths=[os.path.relpath(path, self.runs.root) for path in paths])
-
-
-class SweepRecord(RunRecord):
-    """The run above those of a sweep's points, which record themselves. One that did not finish is continued."""
-
-    def __init__(
-        self, runs: Runs, name: str, experiment: str, settings: Mapping[str, Mapping[str, object]], patience: float
-    ) -> None:
-        """settings: of each point by its name. patience: see `RunRecord`."""
-        digest = data_digest({"sweep": name, "points": {point: dict(varied) for point, varied in settings.items()}})
-        axes: dict[str, dict[str, None]] = {}
-        for path, value in (item for varied in settings.values() for item in varied.items()):
-            axes.setdefault(path, {})[str(value)] = None
-        params = {"sweep": name, "points": str(len(settings)), **{path: ", ".join(axis) for path, axis in axes.items()}}
-        journal = unfinished_journal(runs, name, digest) or new_journal(runs, name, experiment, digest, params)
-        super().__init__(runs, journal, patience)
-
-    @property
-    def origin(self) -> str:
-        """The run's name in other journals."""
-        return f"{self._journal.path.stem}/{PARENT}"
 
 
 class Tracker(RunRecord):
@@ -205,6 +189,22 @@ def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
     return None
 
 
+def sweep_record(
+    runs: Runs, name: str, settings: Mapping[str, Mapping[str, object]], execution: Execution
+) -> RunRecord:
+    """The run above those of a sweep's points, which record themselves; one that did not finish is continued.
+
+    settings: of each point by its name.
+    """
+    digest = data_digest({"sweep": name, "points": {point: dict(varied) for point, varied in settings.items()}})
+    axes: dict[str, dict[str, None]] = {}
+    for path, value in (item for varied in settings.values() for item in varied.items()):
+        axes.setdefault(path, {})[str(value)] = None
+    params = {"sweep": name, "points": str(len(settings)), **{path: ", ".join(axis) for path, axis in axes.items()}}
+    journal = unfinished_journal(runs, name, digest) or new_journal(runs, name, execution.experiment, digest, params)
+    return RunRecord(runs, journal, execution.tracking_patience)
+
+
 def record_figures(
     runs: Runs, name: str, figures: Mapping[str, float], text: str = "", files: Sequence[Path] = ()
 ) -> None:
@@ -225,7 +225,7 @@ def start_sender(runs: Runs) -> subprocess.Popen[bytes]:
     runs.tracking.mkdir(parents=True, exist_ok=True)
     with _log(runs) as log:
         return subprocess.Popen(
-            [sys.executable, "-m", "iowbc.pipeline.tracking.sender", str(runs.root.absolute())],
+            [sys.executable, "-m", "iowbc.pipeline.tracking.delivery", str(runs.root.absolute())],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
