@@ -39,10 +39,22 @@ def robot(
     seconds: Seconds = float("inf"),
 ) -> None:
     """Drive a robot on its bus with an exported controller; never tried on hardware, see docs/deployment.md."""
-    options = locals()
     from iowbc.commands.robot import robot as drive
 
-    drive(console(), **options)
+    drive(
+        console(),
+        what,
+        network=network,
+        domain=domain,
+        scene=scene,
+        commands=commands,
+        object_pose=object_pose,
+        log=log,
+        waive=waive,
+        dry_run=dry_run,
+        lockstep=lockstep,
+        seconds=seconds,
+    )
 
 
 def robot_sim(
@@ -66,8 +78,20 @@ def robot_sim(
     port: Port = None,
 ) -> None:
     """Simulate a robot on the bus, which `iowbc robot` can drive."""
-    options = locals()
-    options["port"] = page_port(options.pop("web"), port)
     from iowbc.commands.robot import simulated_robot
 
-    simulated_robot(console(), **options)
+    simulated_robot(
+        console(),
+        what,
+        network=network,
+        domain=domain,
+        scene=scene,
+        mass=mass,
+        seed=seed,
+        support=support,
+        release=release,
+        object_pose=object_pose,
+        lockstep=lockstep,
+        seconds=seconds,
+        port=page_port(web, port),
+    )
