@@ -102,7 +102,7 @@ def test_palms_are_as_stiff_on_a_light_box_as_the_recipe_says(start, by_hands, h
         out[:] = 0.0
         out[:, 4] = 0.4
 
-    monkeypatch.setattr(simulation._partner, "wrench", turn)
+    monkeypatch.setattr(simulation.partner, "wrench", turn)
     run(simulation, 200)
     assert simulation.world_of(0)[0]._grip.angle[0] == pytest.approx(0.4 / 4.0, rel=0.1)
 

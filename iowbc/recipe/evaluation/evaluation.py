@@ -162,8 +162,8 @@ class Evaluation(Section):
     probe: Probe | None = Field(default=None, json_schema_extra=LATER)
     """A linear probe of what the policy's history knows of the object's mass; empty leaves it out."""
     disturbances: bool = False
-    """Keep the impulses on the object and the pushes on the base during trials, at their nominal strength. Trials of
-    `compliance` and those of planned pushes are without them."""
+    """Keep the impulses on the object and the pushes on the base during trials, drawn from the ranges of the
+    world (`eval.simulation`, or the training's). Trials of `compliance` and of planned pushes are without them."""
     engine: Literal["mujoco", "drake"] = Field(default="mujoco", json_schema_extra=LATER)
     """Physics engine of the trials. Drake, which is an extra, plays the same trials of a policy trained in MuJoCo."""
     drake: Drake = Field(default=Drake(), json_schema_extra=LATER)
