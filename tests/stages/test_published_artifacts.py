@@ -24,13 +24,14 @@ ROOT = Path(__file__).parents[2]
 
 PUBLISHED_TO = {
     "full": "export",
-    "full_seed_1": "export",
+    "full_seed_1": "eval",
     "teacher": "eval",
     "wbc": "eval",
     "wo_rg": "eval",
     "wo_distill": "eval",
     "blind": "export",
     "compliant": "export",
+    "compliant_quick": "export",
     "experts/quick": "distill",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
