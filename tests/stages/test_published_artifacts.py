@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 
 PUBLISHED_TO = {
     "full": "export",
-    "full_seed_1": "eval",
+    "full_seed_1": "export",
     "teacher": "eval",
     "wbc": "eval",
     "wo_rg": "eval",
