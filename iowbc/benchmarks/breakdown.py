@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.benchmarks.bare_loop import wander
+from iowbc.task.batch import Batch
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, Workers
@@ -90,7 +91,7 @@ def transfer_time(workers: Workers, rounds: int) -> float:
     for _ in range(rounds):
         begin = time.perf_counter()
         workers.buffers["action"][:] = 0.0
-        workers.ask([Message("levels", changes=False) for _ in workers.groups])
+        workers.ask([Message(Batch.levels, changes=False) for _ in workers.groups])
         workers.answers()
         for name in ("observation", "reward", "done"):
             workers.buffers[name].copy()

@@ -80,7 +80,7 @@ class TransportGame:
         self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
         self._buffers = self._workers.buffers
         self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
-        self._call(Message("take", (student,)))
+        self._call(Message.of(GameBatch.take, student))
 
     @property
     def batch(self) -> GameBatch:
@@ -104,10 +104,10 @@ class TransportGame:
         """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
 
         `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
-        self._call(Message("meet_agent", (agent_share,)))
+        self._call(Message.of(GameBatch.meet_agent, agent_share))
         groups = self._workers.groups
         own = [None if seeds is None else seeds[first:last] for first, last in groups]
-        self._workers.ask([Message("reset", (part,)) for part in own])
+        self._workers.ask([Message.of(GameBatch.reset, part) for part in own])
         self._workers.answers()
         return self._observed("now")
 
@@ -115,7 +115,7 @@ class TransportGame:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
         finite."""
         self.act(actions)
-        self._call(Message("step"))
+        self._call(Message.of(GameBatch.step))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:

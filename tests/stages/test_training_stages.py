@@ -33,6 +33,7 @@ from iowbc.stages import distill, export, teacher
 from iowbc.stages import eval as evaluate
 from iowbc.stages.environments import WRITTEN, RolloutActor
 from iowbc.stages.inputs import leaves_student
+from iowbc.task.batch import Batch
 from iowbc.task.gym.environment import Environment
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
@@ -81,7 +82,7 @@ def test_a_group_on_another_machine_reads_what_lies_there() -> None:
     world = Specification(small_recipe(), there / "g1", there / "rg")
     group = RolloutActor(Setup(world, 4, 0, divergences=there / "divergences"), 2, 4, robot=robot_folder("g1"))
     written = {name: group.state()[f"buffer/{name}"] for name in WRITTEN}
-    answer, files = group.ask((written, Message("reset")))
+    answer, files = group.ask((written, Message(Batch.reset)))
     assert (answer, files) == (None, {})
     assert len(group.state()["buffer/observation"]) == 2
 

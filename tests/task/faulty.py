@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 @dataclass(frozen=True)
 class StepBy:
-    """Let each step of the batch be a call of this function."""
+    """Let each step of the batches of a worker process be a call of this function."""
 
     function: Callable[[], Any]
     changes: ClassVar[bool] = False
 
     def carry_out(self, batch: Any) -> None:
-        batch.step = self.function
+        type(batch).step = lambda batch: self.function()

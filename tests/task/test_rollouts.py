@@ -18,6 +18,7 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.policies import Layers, Linear, Normal, RowPolicy
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
+from iowbc.task.batch import Batch
 from iowbc.task.vector.vector_env import VectorEnv
 from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import WorkerProcesses
@@ -94,7 +95,7 @@ def test_a_worker_that_makes_steps_does_not_count_as_hung(make: Make, monkeypatc
     env.roll(explorer(env, 3), 3)
     workers = env.workers
     assert isinstance(workers, WorkerProcesses)
-    workers.ask([Message("levels", changes=False)])
+    workers.ask([Message(Batch.levels, changes=False)])
     assert workers._steps() == 3 * 2
     workers.answers()
     monkeypatch.setattr(workers, "_steps", itertools.count().__next__)

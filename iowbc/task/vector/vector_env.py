@@ -95,7 +95,8 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def reset(self) -> NDArray[np.float32]:
         """Begins an episode everywhere; after `seed` with those seeds."""
         seeds = None if self._seeds[0] is None else np.array(self._seeds, np.uint64)
-        self._call_groups("reset", lambda first, last: None if seeds is None else seeds[first:last])
+        parts = [None if seeds is None else seeds[first:last] for first, last in self.workers.groups]
+        self._call([Message.of(Batch.reset, part) for part in parts])
         self._reset_seeds()
         self._reset_options()
         return self._buffers["observation"].copy()
@@ -109,7 +110,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             rows = np.flatnonzero(~np.isfinite(given).all(axis=1))
             raise ValueError(f"actions of environments {rows.tolist()} are not finite, the first is {given[rows[0]]}")
         self._buffers["action"][:] = given
-        self.workers.ask([Message("step") for _ in self.workers.groups])
+        self.workers.ask([Message.of(Batch.step) for _ in self.workers.groups])
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Results of the step: observations, rewards, dones, infos; ended environments have begun anew."""
@@ -124,7 +125,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
         """Make a rollout of some control steps, each group of environments where it is: one message to each worker
         and one back. What comes of it does not depend on the workers."""
-        messages = [Message("roll", (rollout_policy.part(*group), steps)) for group in self.workers.groups]
+        messages = [Message.of(Batch.roll, rollout_policy.part(*group), steps) for group in self.workers.groups]
         return side_by_side(self._call(messages))
 
     def _ending(self, index: int) -> dict[str, Any]:
@@ -148,7 +149,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
 
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (num_envs,) or (num_envs, k)."""
-        return join(self._read("drawn"))
+        return join(self._read(Batch.drawn))
 
     def curriculum(self) -> dict[str, Any]:
         """How far the curriculum is, for JSON: the levels of each axis in each scene, ascending."""
@@ -170,18 +171,18 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
             for place, axis in enumerate(AXES):
                 quantiles = (np.arange(len(rows)) + 0.5) / len(rows)
                 levels[rows, place] = np.quantile(known.get(name, every)[axis], quantiles)
-        self._call_groups("set_levels", lambda first, last: levels[first:last])
+        self._set_levels(levels)
 
     def state(self) -> dict[str, Array]:
         """Everything that the future depends on; the same however many workers there are."""
-        return join(self._read("snapshot")) | {"statistics": self._statistics.carried.copy()}
+        return join(self._read(Batch.snapshot)) | {"statistics": self._statistics.carried.copy()}
 
     def restore(self, state: Mapping[str, Array]) -> None:
         """Inverse of `state`: the environments then take bit for bit the same course."""
         own = dict(state)
         self._statistics.carried[:] = own.pop("statistics")
         parts = split(own, [self._scenes[first:last] for first, last in self.workers.groups])
-        self._call([Message("restore", (part,)) for part in parts])
+        self._call([Message.of(Batch.restore, part) for part in parts])
         self._reset_seeds()
 
     def close(self) -> None:
@@ -214,7 +215,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         axes = value if isinstance(value, Mapping) else dict.fromkeys(AXES, value)
         for axis, level in axes.items():
             levels[rows, AXES.index(axis)] = level
-        self._call_groups("set_levels", lambda first, last: levels[first:last])
+        self._set_levels(levels)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
@@ -231,16 +232,16 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         """Never: the environments are arrays."""
         return [False for _ in self._get_indices(indices)]
 
-    def _levels(self) -> Array:
-        return np.concatenate(self._read("levels"))
+    def _set_levels(self, levels: Array) -> None:
+        parts = [levels[first:last] for first, last in self.workers.groups]
+        self._call([Message.of(Batch.set_levels, part) for part in parts])
 
-    def _read(self, method: str) -> list[Any]:
+    def _levels(self) -> Array:
+        return np.concatenate(self._read(Batch.levels))
+
+    def _read(self, method: Callable[[Batch], Any]) -> list[Any]:
         """What a method of each group's environments answers, which leaves them as they are."""
         return self._call([Message(method, changes=False) for _ in self.workers.groups])
-
-    def _call_groups(self, method: str, argument: Callable[[int, int], Any]) -> None:
-        """Calls a method of each group's environments with an argument by the first and last (excluded) of them."""
-        self._call([Message(method, (argument(*group),)) for group in self.workers.groups])
 
     def _call(self, messages: Sequence[Message]) -> list[Any]:
         self.workers.ask(messages)

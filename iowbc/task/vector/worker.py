@@ -8,9 +8,10 @@ import pickle
 import signal
 import sys
 import traceback
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from typing import IO, Any
+from typing import IO, Any, Concatenate, ParamSpec, Self
 
 from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
@@ -20,18 +21,27 @@ ASKED = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from iowbc
 whether to die with the thread that started the worker; and the descriptors of pipe, shared memory and log."""
 
 
+Given = ParamSpec("Given")
+
+
 @dataclass(frozen=True)
 class Message:
     """A call of a method of a group's environments, wherever they are stepped."""
 
-    method: str
+    method: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
+    named: Mapping[str, Any] = field(default_factory=dict)
     changes: bool = True
     """Whether the environments' future depends on it."""
 
+    @classmethod
+    def of(cls, method: Callable[Concatenate[Any, Given], Any], *arguments: Given.args, **named: Given.kwargs) -> Self:
+        """A call that changes the environments, of a method of their class."""
+        return cls(method, arguments, named)
+
     def carry_out(self, batch: Any) -> Any:
         """The answer of the group's environments."""
-        return getattr(batch, self.method)(*self.arguments)
+        return self.method(batch, *self.arguments, **self.named)
 
 
 def main() -> None:
