@@ -32,6 +32,7 @@ PUBLISHED_TO = {
     "blind": "export",
     "compliant": "export",
     "compliant_quick": "export",
+    "drake": "eval",
     "experts/quick": "distill",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
