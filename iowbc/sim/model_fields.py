@@ -128,12 +128,19 @@ class ModelFields:
 
     def set(self, index: int, values: Mapping[str, Array]) -> None:
         """Inverse of `of`."""
+        values = self._weighed(values)
         for name, field in self._fields.items():
             field[index] = values[name]
         self._derive(np.arange(len(self.body_mass)))
 
     def restore(self, values: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`."""
+        values = self._weighed(values)
         for name, field in self._fields.items():
             field[...] = values[name]
         self._derive(np.arange(len(self.body_mass)))
+
+    def _weighed(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The values with the object's mass, which those of earlier versions lack: it was that of the body."""
+        thing = self._layout.object
+        return {"object_mass": 0.0 if thing is None else values["body_mass"][..., thing], **values}

@@ -1,7 +1,8 @@
 """Measures an exported controller on the bus: `python tests/onboard/measure.py EXPORT [--trials 5] [--seconds 60]`.
 
 Two processes, a simulated robot and the one that drives it, exchange messages alone: in lock step, so that nothing
-depends on the machine, or with `--realtime` by the clock. `--memory` samples the resources of both during one walk.
+depends on the machine, or with `--realtime` by the clock. `--memory` samples the resources of both in
+a walk.
 """
 
 import argparse
@@ -33,7 +34,7 @@ TASKS = {
 """Scene, options of the simulated robot, velocity [m/s, m/s, rad/s]."""
 INTERVAL = 60.0
 """Between two samples of the resources [s]."""
-WARM = 600.0
+WARM = 120.0
 """Time from which on the slope of memory is fitted [s]."""
 
 
@@ -153,7 +154,9 @@ def main() -> None:
     parser.add_argument("--domain", type=int, default=40)
     parser.add_argument("--task", action="append", choices=TASKS)
     parser.add_argument("--realtime", action="store_true")
-    parser.add_argument("--memory", action="store_true", help="sample resources during one walk in lock step")
+    parser.add_argument(
+        "--memory", action="store_true", help="sample resources while walking in lock step, again after each fall"
+    )
     given = parser.parse_args()
     folder = exported_folder(given.export)
     if given.memory:
