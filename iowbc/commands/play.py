@@ -46,7 +46,7 @@ SKILL = "skill"
 
 @dataclass(frozen=True)
 class Planned:
-    """What is known of a recipe's file that is played; nothing of another word."""
+    """Recipe and cached artifacts of a recipe file that is played; empty for a key, a name or a folder."""
 
     recipe: Recipe | None = None
     artifacts: Mapping[str, Artifact] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
 from iowbc.pipeline.console.display import Display, PlainDisplay
 from iowbc.pipeline.console.live_table import LiveTable
 from iowbc.pipeline.planner import Planner
-from iowbc.pipeline.runner import Runner
+from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.store import Store
@@ -128,9 +128,8 @@ def run_recipe(
         try:
             tracker = Tracker(request.runs, loaded, within) if loaded.recipe.execution.track else None
             display = _display(loaded, console, lambda: stop.text, manner)
-            runner = Runner(planner, display, tracker, stop, rest, workers=workers)
-            if cluster is not None:
-                runner.execute = cluster.run
+            execute = run_here if cluster is None else cluster.run
+            runner = Runner(planner, display, tracker, stop, rest, execute, workers)
             runner.run()
             status, ending = "FINISHED", RunEnding(DONE)
             if tracker is not None:

@@ -59,6 +59,11 @@ class StageReport:
         self.display.say(prefix + text.removeprefix(prefix))
 
 
+def run_here(stage: Stage, job: Job) -> None:
+    """Carries a stage out in this process."""
+    stage.run(job)
+
+
 @dataclass(eq=False)
 class Runner:
     """One run of a recipe."""
@@ -69,8 +74,8 @@ class Runner:
     interrupted: Callable[[], bool]
     command: Callable[[], str] = lambda: ""
     """What goes on with this run after the stages in `made`; kept with a stage while it is made."""
-    execute: Callable[[Stage, Job], None] = lambda stage, job: stage.run(job)
-    """Carries a stage out, with the same result wherever; in this process by default."""
+    execute: Callable[[Stage, Job], None] = run_here
+    """Carries a stage out, with the same result wherever."""
     workers: int = 0
     """Processes of a stage; 0: as asked for, or the recipe's, or as many as there are cores."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)

@@ -14,7 +14,7 @@ class Drives:
     def __init__(self, robot: Robot, physics: Physics, n: int) -> None:
         self._robot = robot
         self.effort = np.tile(robot.effort, (n, 1))
-        """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
+        """Torque limit of each motor or linkage in these episodes at low speed, (n, joints) [N·m]."""
         self._slope = 1.0 / ((1.0 - physics.torque_corner) * robot.velocity_limit)
         self._at_rest = self._slope * robot.velocity_limit
         """What a motor could give at rest as a multiple of its limit."""

@@ -1,4 +1,4 @@
-"""What hands do to an object beside their connection: palms resist its turning, arms press it between them."""
+"""Forces of the hands on a held object besides their connection: torsion of the palms, pressure of the arms."""
 
 from typing import Any
 

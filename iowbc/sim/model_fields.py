@@ -43,7 +43,7 @@ class ModelFields:
 
     @property
     def object_mass(self) -> Array:
-        """What the object weighs, (n,) [kg]; less than its inertia where it is light."""
+        """Mass that gravity acts on, (n,) [kg]; a light object moves with more (`body_mass`)."""
         mass: Array = self._fields["object_mass"]
         return mass
 

@@ -104,10 +104,10 @@ class Simulation:
             recipe.sensing, len(robot.joints), self.state.has_object, recipe.randomization.longest_latency, self.period
         )
         self.measured = self._sensing.measured
-        """What the sensors deliver, refreshed by `reset` and `step`."""
+        """Sensor readings, refreshed by `reset` and `step`."""
         self._drives = Drives(robot, recipe.physics, n)
         self.motor_effort = self._drives.effort
-        """What each motor or linkage can give in these episodes at low speed, (n, joints) [N·m]."""
+        """Torque limit of each motor or linkage in these episodes at low speed, (n, joints) [N·m]."""
         impulses, pushes = recipe.impulses, recipe.pushes
         self._impulses = Disturbance("impulse", impulses, impulses.magnitude, n, self.period, level=False)
         self._pushes = Disturbance("push", pushes, pushes.speed, n, self.period, level=True)

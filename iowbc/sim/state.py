@@ -1,4 +1,4 @@
-"""What a simulation tells of its environments: the truth."""
+"""True state of the simulated environments, without sensor errors."""
 
 from dataclasses import dataclass, fields
 from typing import Any, Self

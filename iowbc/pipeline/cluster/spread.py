@@ -14,7 +14,7 @@ from iowbc.pipeline.stage import Member
 
 Result = TypeVar("Result")
 TRIES = 5
-"""Times in a row that a call, a member or a stage is begun anew whose node or worker is lost, before it has failed."""
+"""Retries in a row of a call, an actor or a stage whose node or worker is lost; after that it fails."""
 POLL = 0.2
 """Seconds between two looks at what goes on."""
 

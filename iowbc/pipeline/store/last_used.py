@@ -78,8 +78,8 @@ def record_path(runs: Runs, recipe: str) -> Path:
 
 
 def require_whole(runs: Runs, artifacts: Iterable[Artifact]) -> None:
-    """Raises `UsageError` with the command that makes an artifact anew, where a file of it is not what was written: its
-    recipe as it was asked for, or, where that changed, as kept. One that is named repeatedly is read once."""
+    """Verifies the files of artifacts, each once. Raises `UsageError` for a damaged one, with the command that makes it
+    again from the recipe as it was requested, or from the stored recipe where that file has changed."""
     for artifact in {artifact.folder: artifact for artifact in artifacts}.values():
         try:
             artifact.verify()

@@ -48,7 +48,7 @@ class Progress(BaseModel):
     """Steps and values of the small curve, named `metric`, over all attempts."""
     code: dict[str, str] = Field(default_factory=dict)
     command: str = ""
-    """What goes on with it when it is stopped."""
+    """Command that resumes it."""
 
     @property
     def share(self) -> str:

@@ -23,10 +23,10 @@ class PublicController(Section):
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
     """SHA-256 of the file; of a folder that of its sorted lines `DIGEST  NAME`, as `sha256sum` prints them."""
     arms: Literal["measured", "default", "free", "own"] = "measured"
-    """What moves the arms, and how it observes them. With `measured` and `default` this project's inverse kinematics
-    holds the grasp, observed as it is or as the controller's default posture at rest: a walker with arms of its own may
-    take a grasp for a disturbance, and which of the two is better is tried on trials of the development split. With
-    `own` the controller moves the arms, with its own gains; with `free` it does so in trials without an object."""
+    """Control and observation of arms. `measured`, `default`: this project's inverse kinematics holds the grasp, and
+    the controller observes the arms as measured, or in its default posture at rest (a grasp may disturb a walker that
+    was trained to move its arms; choose on development trials). `own`: the controller moves the arms, with its own
+    gains. `free`: it does so in trials without an object."""
     heading_gain: float = Field(default=0.5, ge=0.0)
     """Commanded yaw rate against each radian of heading error [1/s]: such a controller follows rates and drifts, where
     learnt policies of this project observe the error. Velocity tasks of Isaac Lab train with 0.5."""
