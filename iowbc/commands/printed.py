@@ -15,7 +15,7 @@ from rich.table import Table
 
 from iowbc.pipeline.store.artifact import Artifact
 
-FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why")
+FOLDED = ("metrics", "finished stages", "used by", "recipe", "point", "why", "found")
 """Columns whose text may go on in the next line."""
 NARROW = 100
 """Terminals of fewer characters than this leave out what `show` tells."""

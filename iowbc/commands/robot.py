@@ -70,7 +70,9 @@ def robot(
         stack.callback(bus.close)
         tell(console, f"{controller.contract.recipe}: listening on {network} for {LISTENING:g} s")
         standing = Ranges(controller.contract).standing
-        _report(console, checks(controller, listen(bus, LISTENING), standing, LIMITS), waive or ())
+        found = checks(controller, listen(bus, LISTENING), standing, LIMITS)
+        own_pace = ("states",) if lockstep else ()
+        report_checks(console, found, (*(waive or ()), *own_pace))
         if dry_run:
             return
         about = {
@@ -109,7 +111,7 @@ def _stop_request() -> threading.Event:
     return stop
 
 
-def _report(console: Console, found: "list[Check]", waived: Collection[str]) -> None:
+def report_checks(console: Console, found: "list[Check]", waived: Collection[str]) -> None:
     """Print the checks. Raises UsageError for failed ones that are not waived."""
     for name in waived:
         require_known(name, "check", [check.name for check in found])

@@ -5,10 +5,13 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from rich.console import Console
 from still import Still
 
+from iowbc.commands.robot import report_checks
+from iowbc.errors import UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.checks import Listened, checks
+from iowbc.onboard.checks import Check, Listened, checks
 from iowbc.onboard.limits import LIMITS
 from iowbc.onboard.messages import Record
 
@@ -73,3 +76,15 @@ def test_a_joint_beyond_its_limit_is_refused(still: Still) -> None:
     still.posture = still.posture.copy()
     still.posture[3] = -0.4
     assert "joints" in failed(still, heard(still))
+
+
+def test_the_verdicts_are_seen_in_a_narrow_terminal_and_a_waived_failure_passes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    long = "targets at most 0.70 rad from the default posture (right_shoulder_pitch_joint), and more"
+    found = [Check("states", False, "218 a second"), Check("policy", True, long)]
+    with pytest.raises(UsageError, match="states: failed"):
+        report_checks(Console(width=60), found, ())
+    assert "states FAILED 218 a second" in " ".join(capsys.readouterr().out.split())
+    report_checks(Console(width=60), found, ("states",))
+    assert "states waived 218 a second" in " ".join(capsys.readouterr().out.split())
