@@ -141,10 +141,10 @@ class Controller:
         values repeat.
 
         A robot whose measurement or command cannot be true or is old (see `Limits`) stays where it was in its gait and
-        history, and holds its last good targets, as does one whose targets are not finite or further away than joints
-        move in the time; the others go on: see `Targets.held` and `Targets.reasons`. One that never had good ones holds
-        its joints where they were last measured, or the default posture. Reset a robot that was held for long. Raises
-        ValueError for a shape that does not fit or a missing quantity, and is then as before the call.
+        history, and holds its last good targets, as does one whose targets are not finite or jump (see `guard.JUMP`);
+        the others go on: see `Targets.held` and `Targets.reasons`. One that never had good ones holds its joints where
+        they were last measured, or the default posture. Reset a robot that was held for long. Raises ValueError for a
+        shape that does not fit or a missing quantity, and is then as before the call.
         """
         given, refusals = self._judged(measured, command, measured_at)
         state = self._state

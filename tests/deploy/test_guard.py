@@ -19,9 +19,11 @@ def started() -> TargetGuard:
     return guard
 
 
-def test_what_joints_can_follow_is_passed_on() -> None:
-    passed, why = started().passed(np.array([[0.2, -0.4]]), NOBODY, MEASURED)
-    assert passed.tolist() == [[0.2, -0.4]]
+@pytest.mark.parametrize("factor", [1.0, 1.4])
+def test_a_target_that_asks_for_a_torque_is_passed_on(factor: float) -> None:
+    wanted = [[0.2 * factor, -0.4 * factor]]
+    passed, why = started().passed(np.array(wanted), NOBODY, MEASURED)
+    assert passed.tolist() == wanted
     assert not any(why)
 
 
@@ -44,7 +46,7 @@ def test_a_jump_or_no_number_holds_all_joints_and_is_said_once(
 
 def test_a_target_that_stays_away_is_followed_when_joints_had_the_time() -> None:
     guard = started()
-    course = [bool(guard.passed(np.array([[0.5, 0.0]]), NOBODY, MEASURED)[1][0]) for _ in range(4)]
+    course = [bool(guard.passed(np.array([[1.0, 0.0]]), NOBODY, MEASURED)[1][0]) for _ in range(4)]
     assert course == [True, True, False, False]
 
 
