@@ -87,7 +87,7 @@ class DenseMlp(VectorPerceptron):
 
     def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
         weight = next(self.layers.parameters())
-        seen = torch.ones(weight.shape[1])
+        seen = weight.new_ones(weight.shape[1])
         seen[list(inputs)] = 0.0
         return seen, [(weight, seen)]
 

@@ -6,6 +6,7 @@ divergence is that of the two Gaussians, not a sampled estimate, whose heavy tai
 ends early on it; the standard deviation has a step size and bounds of its own.
 """
 
+import copy
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -44,22 +45,31 @@ class Learner:
     """
 
     def __init__(
-        self, teacher: Teacher, env: Any, seed: int, mirrors: Mirrors, cores: int, value_only: Sequence[int] = ()
+        self,
+        teacher: Teacher,
+        env: Any,
+        seed: int,
+        mirrors: Mirrors,
+        cores: int,
+        value_only: Sequence[int] = (),
+        device: str = "cpu",
     ) -> None:
         """`mirrors`: of observation and action; `cores`: on which the networks learn; `value_only`: places of an
-        observation that the policy does not see."""
+        observation that the policy does not see; `device`: where the networks are, in torch's words."""
         set_random_seed(seed)
         env.seed(seed)
-        self.settings, self.env, self.side_by_side = teacher, env, SideBySide(teacher.parts, cores)
+        self.settings, self.env, self.device = teacher, env, torch.device(device)
+        self._on_cpu = self.device.type == "cpu"
+        self.side_by_side = SideBySide(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)
         self.policy = ActorCritic(
             env.observation_space,
             env.action_space,
             lambda progress: teacher.learning_rate,
             **self._arguments,
-        )
+        ).to(self.device)
         (inputs,), (actions,) = env.observation_space.shape, env.action_space.shape
-        self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions)
+        self.samples = Samples(teacher.rollout, env.num_envs, inputs, actions, self.device)
         size, mirror = len(self.policy.normalizer.mean), None if teacher.symmetry == "none" else mirrors[0]
         self.normalization = Normalization(size, env.num_envs, teacher.gamma, mirror)
         self.mirrored = MirroredSamples(mirrors, teacher.mirror_gap) if teacher.symmetry == "augment" else None
@@ -121,8 +131,9 @@ class Learner:
         self.normalization.frozen = self.steps >= settings.statistics_until
         with self._timed("simulation"), torch.inference_mode():
             self.normalization.move(policy.normalizer)
-            noise = torch.randn(settings.rollout, env.num_envs, len(policy.log_std)) * torch.exp(policy.log_std)
-            rollout_policy = ExploringPolicy(acting_policy(policy), noise.numpy(), block_size(env.num_envs))
+            acting = policy if self._on_cpu else copy.deepcopy(policy).cpu()
+            noise = torch.randn(settings.rollout, env.num_envs, len(acting.log_std)) * torch.exp(acting.log_std)
+            rollout_policy = ExploringPolicy(acting_policy(acting), noise.numpy(), block_size(env.num_envs))
             found = env.roll(rollout_policy, settings.rollout)
         self.seconds["simulation"] -= found.acting
         self.seconds["inference"] += found.acting
@@ -136,21 +147,24 @@ class Learner:
         samples, settings, shape = self.samples, self.settings, found.reward.shape
         columns = samples.columns
         rows = found.observation[:-1].reshape(shape[0] * shape[1], -1)
-        prepared = torch.cat(self.side_by_side(self._prepare, torch.from_numpy(rows)))
+        prepared = torch.cat(self.side_by_side(self._prepare, self._tensor(rows)))
         columns["observation"].copy_(prepared.view(*shape, -1))
-        columns["action"].copy_(torch.from_numpy(found.action))
+        columns["action"].copy_(self._tensor(found.action))
         self.side_by_side(self._judge, samples.flat)
         columns["neighbours"].copy_(neighbours(columns["mean"], found.ended))
         steps = zip(found.reward, found.ended, strict=True)
         rewards = np.stack([self.normalization.reward(reward, ended) for reward, ended in steps])
         behind = np.concatenate([found.observation[-1], found.cut_observation])
         with torch.inference_mode():
-            values = self.policy.predict_values(torch.from_numpy(behind))[:, 0].numpy()
+            values = self.policy.predict_values(self._tensor(behind))[:, 0].cpu().numpy()
         cut_steps, environments = found.cut.T
         rewards[cut_steps, environments] += settings.gamma * values[shape[1] :]
         samples.finish(rewards, found.ended, values[: shape[1]], settings.gamma, settings.gae_lambda)
         self.explained = explained_variance(columns["value"], columns["target"])
         self.normalization.observe(self.policy.normalizer.newest(rows))
+
+    def _tensor(self, values: Array) -> Tensor:
+        return torch.from_numpy(values).to(self.device)
 
     def _prepare(self, rows: Tensor) -> Tensor:
         with torch.inference_mode():
@@ -191,7 +205,7 @@ class Learner:
         found: list[Tensor] = []
         for _ in range(settings.epochs):
             rows = samples if images is None else half_mirrored(samples, images)
-            shuffled = torch.index_select(rows, 0, torch.randperm(len(rows)))
+            shuffled = torch.index_select(rows, 0, torch.randperm(len(rows)).to(self.device))
             found += [self._gradient_step(batch, before) for batch in torch.split(shuffled, self._batch)]
         every = torch.stack(found).view(settings.epochs, -1, len(FIGURES))
         means = dict(zip(FIGURES, every.mean((0, 1)).tolist(), strict=True))

@@ -20,12 +20,14 @@ class Samples:
     rollout overwrites the one before.
     """
 
-    def __init__(self, steps: int, environments: int, observation: int, actions: int) -> None:
+    def __init__(
+        self, steps: int, environments: int, observation: int, actions: int, device: torch.device | None = None
+    ) -> None:
         acting = dict.fromkeys(("action", "mean", "neighbours"), actions)
         sizes = {"observation": observation, **acting, **dict.fromkeys(SINGLE, 1)}
         ends = np.cumsum(list(sizes.values())).tolist()
         self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
-        self.rows = torch.zeros(steps, environments, ends[-1])
+        self.rows = torch.zeros(steps, environments, ends[-1], device=device)
         self.columns = self.named(self.rows)
 
     def named(self, rows: Tensor) -> dict[str, Tensor]:
@@ -40,7 +42,7 @@ class Samples:
 
     def finish(self, rewards: Array, ended: Mask, last_value: Array, discount: float, decay: float) -> None:
         """Add advantages and targets; arguments as of `advantages`."""
-        values = self.columns["value"].numpy()
+        values = self.columns["value"].cpu().numpy()
         found = advantages(rewards, ended, values, last_value, discount, decay)
         self.columns["advantage"].copy_(torch.from_numpy(found))
         self.columns["target"].copy_(torch.from_numpy(found + values))
@@ -51,7 +53,7 @@ def neighbours(means: Tensor, ended: Mask) -> Tensor:
 
     means: (T, n, A); ended: (T, n), where an episode ended with the step.
     """
-    found, goes_on = means.clone(), torch.from_numpy(~ended)
+    found, goes_on = means.clone(), torch.from_numpy(~ended).to(means.device)
     inside = (goes_on[:-2] & goes_on[1:-1])[..., None]
     found[1:-1] = torch.where(inside, 0.5 * (means[:-2] + means[2:]), means[1:-1])
     return found

@@ -131,7 +131,7 @@ class SymmetricMlp(VectorPerceptron):
         return self.layers(*self.basis.split(self.looked_at(prepared)))
 
     def _without(self, inputs: Sequence[int]) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
-        hidden = torch.zeros(len(self.basis.matrix))
+        hidden = self.basis.matrix.new_zeros(len(self.basis.matrix))
         hidden[list(inputs)] = 1.0
         share = hidden @ self.basis.matrix.square()
         if bool(((share > 0.01) & (share < 0.99)).any()):

@@ -13,7 +13,7 @@ from iowbc.robot.mirror import MirrorMap
 
 def mirror_tensor(mirror: MirrorMap, x: Tensor) -> Tensor:
     """The mirror image of a float32 tensor along its last axis."""
-    return x[..., torch.from_numpy(mirror.permutation)] * torch.from_numpy(mirror.sign.astype(np.float32))
+    return x[..., torch.from_numpy(mirror.permutation)] * torch.from_numpy(mirror.sign.astype(np.float32)).to(x.device)
 
 
 class MirroredSamples:
@@ -46,4 +46,4 @@ class MirroredSamples:
 
 def half_mirrored(samples: Tensor, images: Tensor) -> Tensor:
     """A random half of the samples replaced by their images."""
-    return torch.where(torch.rand(len(samples), 1) < 0.5, images, samples)
+    return torch.where(torch.rand(len(samples), 1).to(samples.device) < 0.5, images, samples)

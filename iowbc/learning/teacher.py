@@ -38,16 +38,18 @@ class TeacherTraining:
         *,
         cores: int = 1,
         value_only: Sequence[int] = (),
+        device: str = "cpu",
         score: Score | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
         """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest;
-        `value_only`: places of an observation that the policy does not see; `score`: a fixed evaluation, by which the
-        best policy is kept; `say`: is told when the training goes back."""
+        `value_only`: places of an observation that the policy does not see; `device`: where the networks are, in
+        torch's words; `score`: a fixed evaluation, by which the best policy is kept; `say`: is told when the training
+        goes back."""
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None
         self.say = say
-        self.model = Learner(settings, environments, seed, mirrors, cores, value_only)
+        self.model = Learner(settings, environments, seed, mirrors, cores, value_only, device)
         self.average: PolicyAverage | None = None
         if settings.average_half_life is not None:
             updates = settings.average_half_life / (settings.environments * settings.rollout)

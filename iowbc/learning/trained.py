@@ -63,7 +63,7 @@ def take_over(policy: ActorCritic, network: Network) -> None:
     actor.load_state_dict(learnt)
     policy.hide()
     with torch.no_grad():
-        policy.log_stds[policy.std_place] = network.log_std
+        policy.log_stds[policy.std_place] = network.log_std.to(policy.log_stds.device)
 
 
 def _part(beginning: str, arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -22,6 +22,9 @@ class Execution(Section):
     """On Ray: actors of one core each, on whatever nodes, that make the rollouts of a training; at most as many as the
     cluster has cores. When empty a training stays on one node with its worker processes, which is better where many
     trainings run."""
+    device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:[0-9]+)?)$")
+    """Where the networks of PPO learn, in torch's words: `cpu`, or `cuda` with a torch that has it. A graphics card
+    rounds otherwise: a training is then repeated closely, not bit for bit."""
     copy_files: bool = False
     """Lets nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
     that are slow. Where they do not see it they copy in any case."""

@@ -60,6 +60,8 @@ def borrows(recipe: Recipe) -> Mapping[str, Borrowed]:
 
 def run(job: Job) -> None:
     """Train the teacher; leave its best network, normalisation, curves, and an SB3 zip for users' own code."""
+    import torch
+
     from iowbc.control.action import action_mirror
     from iowbc.learning.computing import prepare_process
     from iowbc.learning.history_environments import HistoryEnvironments
@@ -72,6 +74,9 @@ def run(job: Job) -> None:
 
     prepare_process()
     recipe, settings = job.recipe, job.recipe.teacher
+    if recipe.execution.device != "cpu" and not torch.cuda.is_available():
+        wanted = f"execution.device: {recipe.execution.device}"
+        raise StageFailed(f"{wanted}: this torch ({torch.__version__}) finds no graphics card; `cpu` needs none")
     seed = recipe.seed if settings.seed is None else settings.seed
     world = Specification(recipe, job.robot, job.inputs.get("rg-fit"))
     with ExitStack() as open_ones:
@@ -93,6 +98,7 @@ def run(job: Job) -> None:
             seed,
             cores=available_cores(),
             value_only=environments.layout.privileged_places(settings.value_only).tolist(),
+            device=recipe.execution.device,
             score=score,
             say=job.report.say,
         )

@@ -53,3 +53,16 @@ def test_threads_round_as_one_does_where_a_layer_is_used_twice() -> None:
     expected = torch.stack(alone(gradient, rows))
     for _ in range(50):
         torch.testing.assert_close(torch.stack(together(gradient, rows)), expected, rtol=0.0, atol=0.0)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics card")
+def test_a_graphics_card_learns_the_same() -> None:
+    def learnt(device: str) -> dict[str, Any]:
+        settings = Teacher(environments=8, rollout=16, minibatches=2, hidden=(16,), precision="float32")
+        training = TeacherTraining(settings, PointMasses(), MIRRORS, seed=3, device=device)
+        training.update()
+        return training.arrays()
+
+    one, two = learnt("cpu"), learnt("cuda")
+    for name, value in one.items():
+        np.testing.assert_allclose(two[name], value, atol=1e-4, err_msg=name)

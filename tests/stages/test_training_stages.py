@@ -189,6 +189,13 @@ def test_a_beginning_that_does_not_fit_is_refused(
         teacher.STAGE.run(job)
 
 
+@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without a graphics card")
+def test_a_graphics_card_that_is_not_there_is_named(tmp_path: Path) -> None:
+    recipe = small_recipe().model_copy(update={"execution": Execution(device="cuda")})
+    with pytest.raises(StageFailed, match=r"execution.device: cuda: this torch .* finds no graphics card"):
+        teacher.run(make_job(tmp_path, recipe, workers=0))
+
+
 def test_a_training_is_filmed_at_its_parts_and_learns_the_same(trained: Path, tmp_path: Path) -> None:
     check = small_recipe().teacher.check.model_copy(update={"films": 2})
     job = make_job(tmp_path, small_recipe(check=check), workers=0)
