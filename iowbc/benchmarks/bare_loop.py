@@ -1,11 +1,12 @@
 """The yardstick: a bare loop of `mj_step` over the models and states of a vector environment, and nothing else."""
 
 import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import Any, Self
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -70,38 +71,33 @@ def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
     return RecordedSteps(models, states, substeps)
 
 
-class BareLoops:
-    """The bare loop in several processes at once, each over its share of the environments; use as a context manager."""
+@contextmanager
+def bare_loops(setup: Setup, groups: list[tuple[int, int]], periods: int) -> Iterator[Callable[[], float]]:
+    """The bare loop in several processes at once, each over its share of the environments: a function that measures
+    the environment steps a second of all together, the slowest counting.
 
-    def __init__(self, setup: Setup, groups: list[tuple[int, int]], periods: int) -> None:
-        """Raises BrokenProcessPool where a process cannot record its steps."""
-        self._steps = setup.count * periods
-        context = get_context("spawn")
-        self._stack = ExitStack()
-        with single_threaded(), ExitStack() as stack:
-            self._loops = [
-                stack.enter_context(
-                    ProcessPoolExecutor(1, context, initializer=_prepare, initargs=(setup, first, last, periods))
-                )
-                for first, last in groups
-            ]
-            self.rate()
-            self._stack = stack.pop_all()
+    Raises BrokenProcessPool where a process cannot record its steps.
+    """
+    context = get_context("spawn")
+    with ExitStack() as stack:
+        loops = [
+            stack.enter_context(
+                ProcessPoolExecutor(1, context, initializer=_prepare, initargs=(setup, first, last, periods))
+            )
+            for first, last in groups
+        ]
 
-    def rate(self) -> float:
-        """Environment steps a second of all processes together, the slowest counting."""
-        running = [loop.submit(_run) for loop in self._loops]
-        return self._steps / max(one.result() for one in running)
+        def rate() -> float:
+            running = [loop.submit(_run) for loop in loops]
+            return setup.count * periods / max(one.result() for one in running)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._stack.close()
+        with single_threaded():
+            rate()
+        yield rate
 
 
 _recorded: RecordedSteps
-"""The steps of a process of `BareLoops`."""
+"""The steps of a process of `bare_loops`."""
 
 
 def _prepare(setup: Setup, first: int, last: int, periods: int) -> None:

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
-from iowbc.benchmarks.bare_loop import BareLoops, wander
+from iowbc.benchmarks.bare_loop import bare_loops, wander
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.processes import available_cores
@@ -72,8 +72,8 @@ def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Call
     """
     env = VectorEnv(setup.specification, num_envs=setup.count, workers=count, seed=setup.seed)
     try:
-        with BareLoops(setup, env.workers.groups, PERIODS) as bare:
-            pairs = np.array([(bare.rate(), _rate(env)) for _ in range(turns)])
+        with bare_loops(setup, env.workers.groups, PERIODS) as bare_rate:
+            pairs = np.array([(bare_rate(), _rate(env)) for _ in range(turns)])
         transfer = transfer_time(env.workers, 20 * turns)
     finally:
         env.close()

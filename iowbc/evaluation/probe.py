@@ -30,6 +30,8 @@ PENALTIES = tuple(10.0**power for power in range(6))
 """Of the ridge, on standardised features; the best in cross-validation over the trials that are fitted."""
 FOLDS = 4
 
+COLUMNS = ["source", "trial", "seconds", "settled", "mass", "size", "inferred"]
+"""Of `probe.parquet`; see `inferred_masses`."""
 LATENT, HISTORY, NEWEST, PRIVILEGED = "latent", "history H_t", "newest s_t", "s_priv"
 """Sources from which the mass is inferred."""
 
@@ -40,14 +42,9 @@ class ProbeReadings:
 
     features: dict[str, Features]
     """By what they are of, each of shape (readings, k)."""
-    trial: NDArray[np.int64]
-    """Number of the trial, (readings,)."""
-    mass: NDArray[np.float64]
-    """Of its object, (readings,) [kg]."""
-    seconds: NDArray[np.float64]
-    """Time since the trial began, with the object in the hands, (readings,) [s]."""
-    settled: NDArray[np.bool_]
-    """True once the history holds nothing but observations: it begins as copies of the first, (readings,)."""
+    moments: pd.DataFrame
+    """Number of the `trial`, `seconds` since it began with the object in the hands, `settled` (the history holds
+    nothing but observations: it begins as copies of the first), and `mass` of the object [kg]."""
 
 
 class Listener:
@@ -139,7 +136,10 @@ def gathered(
     """
     moment, trial = np.nonzero(going)
     features = {name: np.stack([seen[name] for seen in kept])[moment, trial] for name in kept[0]}
-    return ProbeReadings(features, trial, masses[trial], times[moment], times[moment] >= span - EXACT)
+    seconds = times[moment]
+    settled = seconds >= span - EXACT
+    moments = pd.DataFrame({"trial": trial, "seconds": seconds, "settled": settled, "mass": masses[trial]})
+    return ProbeReadings(features, moments)
 
 
 def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
@@ -149,20 +149,15 @@ def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
     `inferred` [kg]. Trials of even number are fitted, as soon as they have settled, those of odd number tested: no
     regression has seen another reading of the trial that it is tested on. Raises StageFailed where too few trials last.
     """
-    tested = readings.trial % 2 == 1
-    fitted = ~tested & readings.settled
-    lasted = len(np.unique(readings.trial[fitted]))
-    if lasted < FOLDS or not (tested & readings.settled).any():
+    moments = readings.moments
+    tested = moments["trial"] % 2 == 1
+    fitted = moments[~tested & moments["settled"]]
+    lasted = fitted["trial"].nunique()
+    if lasted < FOLDS or not (tested & moments["settled"]).any():
         raise StageFailed(
             f"probe: only {lasted} of the trials to be fitted last as long as a history, {FOLDS} must; train longer, "
             "or give lighter masses (eval.probe.masses) or a longer sequence (eval.probe.sequence)"
         )
-    common = {
-        "trial": readings.trial[tested],
-        "seconds": readings.seconds[tested],
-        "settled": readings.settled[tested],
-        "mass": readings.mass[tested],
-    }
     tables = []
     for source, given in readings.features.items():
         features = given.astype(np.float64)  # a history's columns are nearly alike: single precision is not enough
@@ -172,7 +167,7 @@ def inferred_masses(readings: ProbeReadings) -> pd.DataFrame:
             cv=GroupKFold(FOLDS),
             scoring="neg_mean_squared_error",
         )
-        search.fit(features[fitted], readings.mass[fitted], groups=readings.trial[fitted])
-        read = {"size": features.shape[1], "inferred": search.predict(features[tested])}
-        tables.append(pd.DataFrame({"source": source, **common, **read}))
+        search.fit(features[fitted.index], fitted["mass"].to_numpy(), groups=fitted["trial"].to_numpy())
+        found = {"size": features.shape[1], "inferred": search.predict(features[tested])}
+        tables.append(moments[tested].assign(**found, source=source)[COLUMNS])
     return pd.concat(tables, ignore_index=True)

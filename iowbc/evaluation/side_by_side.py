@@ -1,8 +1,7 @@
 """A film of several variants on the same trial, side by side."""
 
-import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -57,14 +56,13 @@ def film_side_by_side(
     """
     video = actors[0].world.recipe.eval.video
     with TemporaryDirectory() as place:
-        folders = [Path(place) / str(number) for number in range(len(actors))]
+        clips: list[list[Path]] = [[] for _ in actors]
         duration, before = sum(float(row["duration"]) for row in rows), 0.0
-        for actor, row, folder in zip(actors, rows, folders, strict=True):
-            folder.mkdir()
-            numbers = itertools.count()
+        for number, (actor, row, clip) in enumerate(zip(actors, rows, clips, strict=True)):
 
-            def keep(frame: Frame, folder: Path = folder, numbers: Iterator[int] = numbers) -> None:
-                Image.fromarray(frame).save(folder / f"{next(numbers):06}.png", compress_level=1)
+            def keep(frame: Frame, number: int = number, clip: list[Path] = clip) -> None:
+                clip.append(Path(place) / f"{number}_{len(clip):06}.png")
+                Image.fromarray(frame).save(clip[-1], compress_level=1)
 
             def further(seconds: float, before: float = before) -> None:
                 progress(before + seconds, duration)
@@ -72,7 +70,6 @@ def film_side_by_side(
             film_trial(actor.world, actor.policy, row, keep, video, progress=further)
             before += float(row["duration"])
             progress(before, duration)
-        clips = [sorted(folder.glob("*.png")) for folder in folders]
         with written_film(path, video.fps) as add:
             for number in range(max(map(len, clips))):
                 add(tiled([iio.imread(clip[min(number, len(clip) - 1)]) for clip in clips]))
@@ -82,9 +79,6 @@ def tiled(frames: Sequence[Frame]) -> Frame:
     """Frames of one size as one picture, in rows of equal length, black where there is none."""
     columns = math.ceil(math.sqrt(len(frames)))
     rows = math.ceil(len(frames) / columns)
-    height, width, colours = frames[0].shape
-    picture = np.zeros((rows * height, columns * width, colours), np.uint8)
-    for place, frame in enumerate(frames):
-        top, left = height * (place // columns), width * (place % columns)
-        picture[top : top + height, left : left + width] = frame
-    return picture
+    empty = [np.zeros_like(frames[0])] * (rows * columns - len(frames))
+    tiles = np.stack([*frames, *empty]).reshape(rows, columns, *frames[0].shape)
+    return np.concatenate(np.concatenate(tiles, axis=1), axis=1)

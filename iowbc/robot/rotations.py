@@ -29,6 +29,11 @@ def rotate_inverse(quaternion: Array, vector: Array) -> Array:
     return vector - quaternion[..., :1] * t + cross(axis, t)
 
 
+def wrapped(angle: Array) -> Array:
+    """The same angles in [-π, π) [rad], shape as given."""
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
 def normalized(quaternion: Array) -> Array:
     """The quaternion scaled to unit length; shape (..., 4)."""
     return quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)

@@ -4,8 +4,9 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.skill.skill import Skill
+from iowbc.robot.rotations import wrapped
 from iowbc.skill.pursuit import Wanted
-from iowbc.skill.situation import Situation, turned, wrapped
+from iowbc.skill.situation import Situation, turned
 
 ACTIONS = ("v_x", "v_y", "v_z", "height", "yaw_rate")
 """Actions of the human, each in [-1, 1], added to what a script intends: velocity of the handle in the frame of the

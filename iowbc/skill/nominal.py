@@ -5,8 +5,9 @@ from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
 from iowbc.control.skill_command import SkillCommand
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.commands import Commands
+from iowbc.robot.rotations import wrapped
 from iowbc.skill.pursuit import Wanted
-from iowbc.skill.situation import Situation, turned, wrapped
+from iowbc.skill.situation import Situation, turned
 
 
 class NominalCommand(SkillCommand):

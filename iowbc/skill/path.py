@@ -37,8 +37,6 @@ class Paths:
         """Points (paths, k, 2) [m]."""
         self.length = np.array([sum(stretch.length for stretch in path) for path in paths])
         """(paths,) [m]."""
-        self.walled = np.isfinite(self._half_width).any(axis=1)
-        """Paths with walls, (paths,)."""
 
     def place(self, path: Indices, position: Array, around: Array) -> Place:
         """Places of positions (n, 2) [m] near the way `around` (n,) [m] on paths (n,)."""

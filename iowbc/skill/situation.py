@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from iowbc.arrays import Array, Indices
-from iowbc.robot import rotations
+from iowbc.robot.rotations import rotate, wrapped
 from iowbc.sim.simulation import Simulation
 from iowbc.skill.path import Paths
 from iowbc.task.motion import Motion
@@ -77,7 +77,7 @@ def situation(
     """The games after a control step; `covered` (n,): way along the paths at an earlier time [m]."""
     state = simulation.state
     position = origin.turned(state.object_position - origin.position)
-    axes = [rotations.rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2]]
+    axes = [rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2]]
     forward, up = axes
     yaw = wrapped(np.arctan2(forward[:, 1], forward[:, 0]) - origin.heading)
     place = paths.place(path, position[:, :2], covered)
@@ -107,8 +107,3 @@ def turned(vectors: Array, angle: Array) -> Array:
     result[:, 0] = cosine * vectors[:, 0] - sine * vectors[:, 1]
     result[:, 1] = sine * vectors[:, 0] + cosine * vectors[:, 1]
     return result
-
-
-def wrapped(angle: Array) -> Array:
-    """Angles (n,) in [-π, π) [rad]."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi

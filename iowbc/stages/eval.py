@@ -1,7 +1,6 @@
 """Stage `eval`: mass sweeps, heavy cases and a probe of the trained policy, their tables, figures and films."""
 
 import math
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -153,30 +152,23 @@ def play_everywhere(
 ) -> "Iterator[tuple[str, bytes]]":
     """Play batches of trials on other machines; name and file of each. `folders`: what `play_batch` reads, by name."""
     names = list(batches)
-    for place, content in spread(play_batch, [(recipe, name, batches[name]) for name in names], folders):
+    for place, content in spread(play_batch, [(recipe, batches[name]) for name in names], folders):
         yield names[place], content
 
 
 def play_batch(
-    recipe: Recipe,
-    name: str,
-    trials: "Sequence[Trial]",
-    *,
-    robot: Path,
-    policy: Path | None = None,
-    generator: Path | None = None,
+    recipe: Recipe, trials: "Sequence[Trial]", *, robot: Path, policy: Path | None = None, generator: Path | None = None
 ) -> bytes:
-    """The file of one batch."""
+    """Play one batch; its file."""
     import torch
 
     from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.evaluation.trials.protocol import evaluated_world, played
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as in the stage
     world = evaluated_world(Specification(recipe, robot, generator))
-    with tempfile.TemporaryDirectory(prefix="iowbc-trials-") as folder:
-        return Protocol(world, evaluated_policy(world, policy), work=Path(folder), workers=0).play(name, trials)
+    return played(world, evaluated_policy(world, policy), trials, workers=0)
 
 
 def headline(summary: "pd.DataFrame") -> dict[str, float]:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from made_up_trials import DT, GAIT_STEPS, MEASURE, script, trace
 
-from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average, wrapped
+from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average
 from iowbc.evaluation.trials.metrics import Met, jerk, second_difference, trial_metrics
 from iowbc.evaluation.trials.trace import Trace
+from iowbc.robot.rotations import wrapped
 from iowbc.task.commands.script import CommandScript
 
 

@@ -38,9 +38,8 @@ def readings() -> ProbeReadings:
     shown = mass + random.normal(scale=0.5, size=len(mass))
     features = {"sensor": np.column_stack([0.3 * shown - 2.0, names]), "names": names}
     seconds = np.tile(np.arange(MOMENTS) * 0.5, TRIALS)
-    return ProbeReadings(
-        {name: values.astype(np.float32) for name, values in features.items()}, trial, mass, seconds, seconds > 0
-    )
+    moments = pd.DataFrame({"trial": trial, "seconds": seconds, "settled": seconds > 0, "mass": mass})
+    return ProbeReadings({name: values.astype(np.float32) for name, values in features.items()}, moments)
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +60,7 @@ def test_what_names_the_trial_alone_infers_nothing(inferred: pd.DataFrame) -> No
 
 def test_trials_that_end_at_once_are_no_probe() -> None:
     found = readings()
-    short = replace(found, settled=np.zeros_like(found.settled))
+    short = replace(found, moments=found.moments.assign(settled=False))
     with pytest.raises(StageFailed, match=r"only 0 of the trials.*eval.probe.masses"):
         inferred_masses(short)
 
@@ -76,10 +75,10 @@ def test_readings_end_with_their_trial_and_settle_with_a_full_history() -> None:
     kept = [{"x": np.full((2, 1), moment, np.float32)} for moment in range(3)]
     going = np.array([[True, True], [True, True], [True, False]])
     found = gathered(kept, going, np.array([0.0, 0.5, 1.0]), np.array([2.0, 4.0]), span=0.5)
-    assert found.trial.tolist() == [0, 1, 0, 1, 0]
-    assert found.mass.tolist() == [2.0, 4.0, 2.0, 4.0, 2.0]
+    assert found.moments["trial"].tolist() == [0, 1, 0, 1, 0]
+    assert found.moments["mass"].tolist() == [2.0, 4.0, 2.0, 4.0, 2.0]
     assert found.features["x"][:, 0].tolist() == [0, 0, 1, 1, 2]
-    assert found.settled.tolist() == [False, False, True, True, True]
+    assert found.moments["settled"].tolist() == [False, False, True, True, True]
 
 
 def rows(size: int, seed: int = 0) -> NDArray[np.float32]:

@@ -28,10 +28,10 @@ RECIPE = evaluated_world(Specification(load_recipe(FULL).recipe, robot_folder("g
 MEASURE = measure_of(RECIPE, load_robot(robot_folder("g1")))
 SUITES = {
     "sweeps": [trial for sweep in planned_sweeps(RECIPE) for trial in sweep.named()],
-    "cases": case_trials(RECIPE),
-    "pushes": push_trials(RECIPE),
-    "compliance": compliance_trials(RECIPE),
-    "map": map_trials(RECIPE),
+    "cases": list(case_trials(RECIPE)),
+    "pushes": list(push_trials(RECIPE)),
+    "compliance": list(compliance_trials(RECIPE)),
+    "map": list(map_trials(RECIPE)),
 }
 
 

@@ -105,7 +105,7 @@ def test_a_second_suite_is_without_disturbances_and_in_the_same_worlds() -> None
 
 
 def test_the_compliance_suite_has_every_behaviour_a_blocked_crate_and_pulls() -> None:
-    trials = compliance_trials(asked(trials=2, disturbances=True, compliance={"partner_shares": [0.5]}))
+    trials = list(compliance_trials(asked(trials=2, disturbances=True, compliance={"partner_shares": [0.5]})))
     assert {"impulse_scale": 0.0, "push_scale": 0.0}.items() <= trials[0].episode.fixed.items(), "never disturbed"
     held = {t.case: t.episode.fixed["partner_behaviour"] for t in trials if "partner_behaviour" in t.episode.fixed}
     assert held == {name: float(place) for place, name in enumerate(BEHAVIOURS)}
@@ -155,7 +155,7 @@ def test_what_a_sweep_holds_fixed_reaches_the_episode() -> None:
 
 def test_cases_keep_their_names_masses_and_conditions() -> None:
     heavy = [{"name": "tyre", "scene": "tyre", "mass": 18.0}, {"name": "crate", "scene": "push", "mass": 65.0}]
-    trials = case_trials(asked(heavy=heavy, trials=2, stagnation={}))
+    trials = list(case_trials(asked(heavy=heavy, trials=2, stagnation={})))
     assert [(t.kind, t.case, t.mass, t.number) for t in trials] == [
         ("heavy", "tyre", 18.0, 0),
         ("heavy", "tyre", 18.0, 1),
@@ -179,15 +179,11 @@ def test_the_robustness_suite_has_a_minute_and_a_box_held_by_friction() -> None:
 
 
 def test_pushes_grow_in_every_direction_with_the_same_seeds() -> None:
-    trials = push_trials(
-        asked(
-            trials=2,
-            robustness={
-                "pushes": {"impulses": [10, 30], "directions": ["left"], "trials": None},
-                "walking_pushes": {"impulses": [20], "directions": ["backward right"], "trials": 1},
-            },
-        )
-    )
+    asked_for = {
+        "pushes": {"impulses": [10, 30], "directions": ["left"], "trials": None},
+        "walking_pushes": {"impulses": [20], "directions": ["backward right"], "trials": 1},
+    }
+    trials = list(push_trials(asked(trials=2, robustness=asked_for)))
     walking = trials.pop()
     assert (walking.case, walking.impulse) == ("backward right, walking", 20.0)
     assert walking.episode.push is not None
@@ -236,7 +232,8 @@ def test_trials_are_batched_with_those_that_last_as_long() -> None:
             "eval": {"trials": 3, "robustness": {"cases": [{"name": "a"}, {"name": "60 s", "repetitions": 3}]}},
         }
     )
-    trials = [trial for one in planned_sweeps(recipe) for trial in one.trials((0.05, 4.0))] + case_trials(recipe)
+    trials = [trial for one in planned_sweeps(recipe) for trial in one.trials((0.05, 4.0))]
+    trials += case_trials(recipe)
     batches = list(batched_by_duration(trials, 8))
     assert [len(batch) for batch in batches] == [8, 7, 3]
     assert all(len({trial.episode.duration for trial in batch}) == 1 for batch in batches)

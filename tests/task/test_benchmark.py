@@ -10,7 +10,7 @@ import pytest
 from changes import with_changes
 
 from iowbc.benchmarks import simulation
-from iowbc.benchmarks.bare_loop import STATE, BareLoops, record
+from iowbc.benchmarks.bare_loop import STATE, bare_loops, record
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown
 from iowbc.benchmarks.standing_generator import write_standing_generator
 from iowbc.control.command import COMMAND, HEIGHT, PITCH
@@ -59,10 +59,9 @@ def test_the_stand_in_for_a_fitted_generator_keeps_the_default_posture(
 
 
 def test_a_process_that_fails_ends_the_benchmark_instead_of_blocking_it(setup: Setup, tmp_path: Path) -> None:
-    with pytest.raises(BrokenProcessPool):
-        BareLoops(
-            replace(setup, specification=replace(setup.specification, rg=tmp_path / "nothing")), [(0, 3)], periods=2
-        )
+    broken = replace(setup, specification=replace(setup.specification, rg=tmp_path / "nothing"))
+    with pytest.raises(BrokenProcessPool), bare_loops(broken, [(0, 3)], periods=2):
+        pass
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.report.aggregate import suites_of, variants_of
@@ -90,8 +89,7 @@ def _table(
         for variant, own in found.items()
     ]
     numbers = [
-        {"variant": variant, "of": case, "value": np.nan if own[case].value is None else own[case].value}
-        | {"open": own[case].open_ended}
+        (variant, case, own[case].value, own[case].open_ended)
         for variant, own in found.items()
         for case in columns
         if case in own

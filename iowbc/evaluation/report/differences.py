@@ -45,35 +45,30 @@ def difference_table(trials: pd.DataFrame) -> Table | None:
     reference, *others = variants_of(trials)
     rows, numbers = [], []
 
-    def add(suite: str, variant: str, first: pd.DataFrame, second: pd.DataFrame, last: str, **figures: object) -> None:
-        """A row of error differences between two sets of columns of the same trials."""
-        found = {name: mean_difference(first[name] - second[name], first[WORLD]) for name in ERRORS}
+    def add(suite: str, variant: str, errors: pd.DataFrame, last: str, **figures: object) -> None:
+        """A row of differences of the errors, each beside its world."""
+        found = {name: mean_difference(errors[name], errors[WORLD]) for name in ERRORS}
         cells = [measured(mean, half, "+.3f", note=f" (p {p:.2g})") for mean, half, p in found.values()]
-        rows.append((suite, variant, str(len(first)), *cells, last))
-        numbers.append({"suite": suite, "variant": variant, "reference": reference, **figures, "both": len(first)})
+        rows.append((suite, variant, str(len(errors)), *cells, last))
+        numbers.append({"suite": suite, "variant": variant, "reference": reference, **figures, "both": len(errors)})
         for name, values in found.items():
             parts = ("", "_half", "_p") if variant != STANDS_STILL else ("",)
             numbers[-1] |= {f"{name}{part}": value for part, value in zip(parts, values, strict=False)}
 
     for suite, within in trials.groupby("suite", sort=False):
-        compared = {variant: paired(within, variant, reference) for variant in others}
+        compared = {variant: pairs for variant in others if len(pairs := paired(within, variant, reference))}
         for variant, pairs in compared.items():
-            if pairs.empty:
-                continue
             both = pairs[pairs["survived_variant"] & pairs["survived_reference"]]
-            own, other = (
-                both.rename(columns={f"{name}_{side}": name for name in ERRORS}) for side in ("variant", "reference")
-            )
-            p, success = (
-                success_p(pairs),
-                float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean()),
-            )
-            add(suite, variant, own, other, f"{100 * success:+.0f} % (p {p:.2g})", pairs=len(pairs))
+            errors = {name: both[f"{name}_variant"] - both[f"{name}_reference"] for name in ERRORS}
+            success = float(pairs["succeeded_variant"].mean() - pairs["succeeded_reference"].mean())
+            p = success_p(pairs)
+            last = f"{100 * success:+.0f} % (p {p:.2g})"
+            add(suite, variant, both[[WORLD]].assign(**errors), last, pairs=len(pairs))
             numbers[-1] |= {"success": success, "success_p": p}
-        if any(len(pairs) for pairs in compared.values()):
+        if compared:
             survivors = within[(within["variant"] == reference) & within["survived"]]
-            still = survivors[[WORLD]].assign(**{name: survivors[f"still_{name}"] for name in ERRORS})
-            add(suite, STANDS_STILL, still, survivors, ABSENT)
+            errors = {name: survivors[f"still_{name}"] - survivors[name] for name in ERRORS}
+            add(suite, STANDS_STILL, survivors[[WORLD]].assign(**errors), ABSENT)
     if not rows:
         return None
     caption = (

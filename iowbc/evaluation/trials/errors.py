@@ -8,6 +8,7 @@ from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.recipe.task.commands import Commands
+from iowbc.robot.rotations import wrapped
 
 ERRORS = ("E_alpha", "E_h", "E_v", "E_psi")
 """The paper's four errors in the order of its columns: torso pitch [rad], height [m], velocity [m/s], heading [rad]."""
@@ -78,11 +79,6 @@ def moving_average(values: Array, window: int) -> Array:
     first, last = np.maximum(steps - before, 0), np.minimum(steps + after + 1, len(values))
     counts = (last - first).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray((summed[last] - summed[first]) / counts)
-
-
-def wrapped(angle: Array) -> Array:
-    """The same angle in [-pi, pi) [rad]."""
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def error_norm(errors: Array) -> Array:

@@ -1,9 +1,8 @@
 """The trials of an evaluation: sweeps, cases, seeds, and the quantities that are held fixed in each."""
 
-import functools
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iowbc.evaluation.trials.scripts import drawn_script
@@ -119,55 +118,39 @@ class Condition:
         return Episode(scene, seed, self.script.duration, held, self.script, self.push, self.pull)
 
 
-@dataclass(frozen=True)
-class TrialCell:
-    """One cell of the tables: trials that differ in their seeds alone."""
+def _cell(
+    recipe: Recipe,
+    place: tuple[str, str, str],
+    scene: str,
+    mass: float,
+    fixed: Mapping[str, float],
+    sequence: Sequence[Segment] = (),
+    *,
+    repetitions: int = 1,
+    trials: int | None = None,
+    push: PlannedPush | None = None,
+    pull: PlannedPull | None = None,
+    impulse: float = 0.0,
+) -> Iterator[Trial]:
+    """One cell of the tables: trials that differ in their seeds alone.
 
-    kind: str
-    suite: str
-    case: str
-    scene: str
-    mass: float
-    """[kg]."""
-    fixed: Mapping[str, float]
-    """Randomised quantities that are held, by name."""
-    sequence: Sequence[Segment] = ()
-    """Commands of its own; see `script_for`."""
-    repetitions: int = 1
-    trials: int | None = None
-    """Number of trials, by default `eval.trials`."""
-    push: PlannedPush | None = None
-    pull: PlannedPull | None = None
-    impulse: float = 0.0
-    """Of the push [N·s]."""
-
-    def planned(self, recipe: Recipe) -> Iterator[Trial]:
-        """Its trials."""
-        for number in range(self.trials or recipe.eval.trials):
-            seed = trial_seed(recipe.eval, number)
-            script = script_for(recipe, self.scene, seed, self.sequence, self.repetitions)
-            episode = Condition(self.scene, script, self.fixed, self.push, self.pull).episode(self.mass, seed)
-            yield Trial(self.kind, self.suite, self.case, self.mass, number, episode, self.impulse)
+    place: kind, suite and case; mass: of the object [kg]; fixed, push, pull: see `Condition`; sequence: commands of its
+    own, see `script_for`; trials: their number, by default `eval.trials`; impulse: of the push [N·s].
+    """
+    for number in range(trials or recipe.eval.trials):
+        seed = trial_seed(recipe.eval, number)
+        script = script_for(recipe, scene, seed, sequence, repetitions)
+        episode = Condition(scene, script, fixed, push, pull).episode(mass, seed)
+        yield Trial(*place, mass, number, episode, impulse)
 
 
-def _planned(cells: Callable[[Recipe], Iterator[TrialCell]]) -> Callable[[Recipe], list[Trial]]:
-    """A function that lists the trials of cells."""
-
-    @functools.wraps(cells)
-    def trials(recipe: Recipe) -> list[Trial]:
-        return [trial for cell in cells(recipe) for trial in cell.planned(recipe)]
-
-    return trials
-
-
-def held_fixed(part: MassSweep | Case, partner_share: float | None, *, disturbed: bool) -> dict[str, float]:
-    """The randomised quantities that a sweep or a case holds, by name."""
-    held = {} if disturbed else dict(UNDISTURBED)
-    if part.rolling_resistance is not None:
-        held["object_ground_friction"] = part.rolling_resistance
-    if partner_share is not None:
-        held["partner_share"] = partner_share
-    return held | part.fixed
+def held_fixed(
+    partner_share: float | None, rolling_resistance: float | None = None, *, disturbed: bool
+) -> dict[str, float]:
+    """The randomised quantities that trials hold, by name; None draws one."""
+    held = {"object_ground_friction": rolling_resistance, "partner_share": partner_share}
+    calm = {} if disturbed else UNDISTURBED
+    return calm | {name: value for name, value in held.items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -208,10 +191,10 @@ class PlannedSweep:
 
     def trials(self, masses: Iterable[float], case: str | None = None) -> list[Trial]:
         """The trials at some masses [kg]; `case`: another one than that of the suite's name."""
-        fixed = held_fixed(self.sweep, self.partner_share, disturbed=self.disturbed)
-        place, scene, sequence = (self.kind, self.suite, case or self.suite), self.sweep.scene, self.sweep.sequence
-        cells = [TrialCell(*place, scene, mass, fixed, sequence) for mass in masses]
-        return [trial for cell in cells for trial in cell.planned(self.recipe)]
+        place, own = (self.kind, self.suite, case or self.suite), self.sweep
+        fixed = held_fixed(self.partner_share, own.rolling_resistance, disturbed=self.disturbed) | own.fixed
+        cells = (_cell(self.recipe, place, own.scene, mass, fixed, own.sequence) for mass in masses)
+        return list(itertools.chain.from_iterable(cells))
 
     def heavier(self, last: float) -> float | None:
         """The next mass past the end of the sweep [kg], or None where the recipe stops."""
@@ -236,22 +219,23 @@ def planned_sweeps(recipe: Recipe) -> list[PlannedSweep]:
     return planned
 
 
-def _case_cell(kind: str, case: Case, disturbed: bool, trials: int | None = None) -> TrialCell:
-    fixed = held_fixed(case, case.partner_share, disturbed=disturbed)
-    return TrialCell(kind, kind, case.name, case.scene, case.mass, fixed, case.sequence, case.repetitions, trials)
+def _case(recipe: Recipe, kind: str, case: Case, disturbed: bool, trials: int | None = None) -> Iterator[Trial]:
+    fixed = held_fixed(case.partner_share, case.rolling_resistance, disturbed=disturbed) | case.fixed
+    cell = (recipe, (kind, kind, case.name), case.scene, case.mass, fixed, case.sequence)
+    return _cell(*cell, repetitions=case.repetitions, trials=trials)
 
 
-@_planned
-def case_trials(recipe: Recipe) -> Iterator[TrialCell]:
+def case_trials(recipe: Recipe) -> Iterator[Trial]:
     """The trials of all single cases: heavy, stagnation, robustness."""
     asked = recipe.eval
     suites = {"stagnation": asked.stagnation, "robustness": asked.robustness}
     cases = {"heavy": asked.heavy, **{kind: suite.cases for kind, suite in suites.items() if suite is not None}}
-    yield from (_case_cell(kind, case, asked.disturbances) for kind, own in cases.items() for case in own)
+    for kind, own in cases.items():
+        for case in own:
+            yield from _case(recipe, kind, case, asked.disturbances)
 
 
-@_planned
-def push_trials(recipe: Recipe) -> Iterator[TrialCell]:
+def push_trials(recipe: Recipe) -> Iterator[Trial]:
     """The trials in which the base is pushed, standing and walking, at every size in every direction."""
     robustness, fixed = recipe.eval.robustness, UNDISTURBED | {"partner_share": 0.0}
     ladders = {} if robustness is None else {"": robustness.pushes, ", walking": robustness.walking_pushes}
@@ -260,14 +244,14 @@ def push_trials(recipe: Recipe) -> Iterator[TrialCell]:
             continue
         for direction in ladder.directions:
             forward, left = DIRECTIONS[direction]
-            place = ("pushes", "pushes", f"{direction}{words}", ladder.scene, ladder.mass)
+            place = ("pushes", "pushes", f"{direction}{words}")
             for impulse in ladder.impulses:
                 push = PlannedPush(ladder.time, ladder.duration, (impulse * forward, impulse * left))
-                yield TrialCell(*place, fixed, ladder.sequence, trials=ladder.trials, push=push, impulse=impulse)
+                cell = (recipe, place, ladder.scene, ladder.mass, fixed, ladder.sequence)
+                yield from _cell(*cell, trials=ladder.trials, push=push, impulse=impulse)
 
 
-@_planned
-def compliance_trials(recipe: Recipe) -> Iterator[TrialCell]:
+def compliance_trials(recipe: Recipe) -> Iterator[Trial]:
     """The trials with partners of every behaviour and before a blocked crate, then those with sinusoidal pulls."""
     asked = recipe.eval.compliance
     if asked is None:
@@ -275,29 +259,29 @@ def compliance_trials(recipe: Recipe) -> Iterator[TrialCell]:
     for share, mass, behaviour in itertools.product(asked.partner_shares, asked.masses, asked.behaviours):
         fixed = UNDISTURBED | {"partner_behaviour": float(BEHAVIOURS.index(behaviour)), "partner_share": share}
         suite = "compliance" if len(asked.partner_shares) == 1 else f"compliance with partner {share:g}"
-        place = ("compliance", suite, behaviour, asked.scene, mass)
-        yield TrialCell(*place, fixed, asked.sequence, trials=asked.trials)
+        place = ("compliance", suite, behaviour)
+        yield from _cell(recipe, place, asked.scene, mass, fixed, asked.sequence, trials=asked.trials)
     if asked.blocked is not None:
-        yield _case_cell("compliance", asked.blocked, False, asked.trials)
+        yield from _case(recipe, "compliance", asked.blocked, False, asked.trials)
     pulls = asked.impedance
     if pulls is None:
         return
+    fixed = UNDISTURBED | {"partner_share": 0.0}
     for axis, frequency in itertools.product(pulls.directions, pulls.frequencies):
         duration = max(pulls.cycles, math.ceil(pulls.shortest * frequency)) / frequency
         force = (pulls.amplitude * AXES[axis][0], pulls.amplitude * AXES[axis][1])
-        place = ("impedance", "impedance", f"{axis} {frequency:g} Hz", pulls.scene, pulls.mass)
+        place = ("impedance", "impedance", f"{axis} {frequency:g} Hz")
         sequence = (Segment(duration=pulls.begin + duration, ramp=0.0), *pulls.walk)
         pull = PlannedPull(pulls.begin, duration, frequency, force)
-        yield TrialCell(*place, UNDISTURBED | {"partner_share": 0.0}, sequence, trials=asked.trials, pull=pull)
+        yield from _cell(recipe, place, pulls.scene, pulls.mass, fixed, sequence, trials=asked.trials, pull=pull)
 
 
-@_planned
-def map_trials(recipe: Recipe) -> Iterator[TrialCell]:
+def map_trials(recipe: Recipe) -> Iterator[Trial]:
     """The pushes at every rolling resistance and mass."""
-    asked, calm = recipe.eval.map, {} if recipe.eval.disturbances else UNDISTURBED
+    asked = recipe.eval.map
     if asked is None:
         return
     for resistance, mass in itertools.product(asked.rolling_resistances, asked.masses):
-        fixed = calm | {"object_ground_friction": resistance, "partner_share": asked.partner_share}
-        place = ("map", "map", f"μ {resistance:g}", asked.scene, mass)
-        yield TrialCell(*place, fixed, asked.sequence, trials=asked.trials)
+        fixed = held_fixed(asked.partner_share, resistance, disturbed=recipe.eval.disturbances)
+        place = ("map", "map", f"μ {resistance:g}")
+        yield from _cell(recipe, place, asked.scene, mass, fixed, asked.sequence, trials=asked.trials)

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.trials.plan import (
-    PlannedSweep,
     Trial,
     case_trials,
     compliance_trials,
@@ -87,12 +86,11 @@ class Protocol:
         elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None,
     ) -> None:
         """`progress` is told trials done, trials known of, and what is played. `elsewhere` plays batches on other
-        machines and yields the file of each, as `play` returns it."""
+        machines and yields the name of each and what `played` returns."""
         self.world, self.policy = world, policy
         self.work, self.workers = work, workers
         self.interrupted, self.progress = interrupted, progress
         self.elsewhere = elsewhere
-        self.measure = measure_of(world.recipe, load_robot(world.robot))
         self.done, self.total = 0, 0
 
     def run(self) -> pd.DataFrame:
@@ -103,16 +101,14 @@ class Protocol:
         for planned in (case_trials, push_trials, compliance_trials, map_trials):
             named += planned(recipe)
         tables = [self._round(0, named)]
-        heaviest = {sweep.suite: sweep.masses[-1] for sweep in sweeps}
-        going: Sequence[PlannedSweep] = sweeps
-        while going := [sweep for sweep in going if _succeeds(tables[-1], sweep.suite, heaviest[sweep.suite])]:
-            further = {sweep.suite: sweep.heavier(heaviest[sweep.suite]) for sweep in going}
-            going = [sweep for sweep in going if further[sweep.suite] is not None]
-            if not going:
-                break
-            heaviest |= {suite: mass for suite, mass in further.items() if mass is not None}
-            trials = [trial for sweep in going for trial in sweep.trials([heaviest[sweep.suite]])]
-            tables.append(self._round(len(tables), trials))
+        going = [(sweep, sweep.masses[-1]) for sweep in sweeps]
+        while going := [
+            (sweep, heavier)
+            for sweep, last in going
+            if _succeeds(tables[-1], sweep.suite, last) and (heavier := sweep.heavier(last)) is not None
+        ]:
+            further = [trial for sweep, mass in going for trial in sweep.trials([mass])]
+            tables.append(self._round(len(tables), further))
         return _in_order(pd.concat(tables, ignore_index=True), list(dict.fromkeys(trial.suite for trial in named)))
 
     def _round(self, number: int, trials: Sequence[Trial]) -> pd.DataFrame:
@@ -128,52 +124,48 @@ class Protocol:
     def _play_elsewhere(self, elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]], batches: Batches) -> None:
         """Have the batches played that are missing."""
         missing = {name: batch for name, batch in batches.items() if newest_checked(self._file(name), name)[0] is None}
-        played = sum(len(batch) for name, batch in batches.items() if name not in missing)
+        ready = sum(len(batch) for name, batch in batches.items() if name not in missing)
         for name, content in elsewhere(missing):
-            self._file(name).write_bytes(content)
-            played += len(missing[name])
-            self.progress(
-                self.done + played, self.total, ", ".join(dict.fromkeys(trial.suite for trial in missing[name]))
-            )
-
-    def play(self, name: str, trials: Sequence[Trial]) -> bytes:
-        """Play one batch; its file."""
-        self._batch(name, trials)
-        return self._file(name).read_bytes()
+            write_checked(self._file(name), name, content)
+            ready += len(missing[name])
+            self.progress(self.done + ready, self.total, _suites(missing[name]))
 
     def _file(self, name: str) -> Path:
         """Where a finished batch is kept."""
         return self.work / f"{name}.batch"
 
     def _batch(self, name: str, trials: Sequence[Trial]) -> pd.DataFrame:
-        path = self._file(name)
-        suites = ", ".join(dict.fromkeys(trial.suite for trial in trials))
+        path, suites = self._file(name), _suites(trials)
         content, _ = newest_checked(path, name)
         if content is None:
             longest = max(trial.episode.duration for trial in trials)
-            size, places = self.world.recipe.eval.batch, np.arange(len(trials))
 
             def progress(seconds: float) -> None:
                 reached = self.done + len(trials) * min(seconds / longest, 1.0)
                 self.progress(reached, self.total, f"{suites}, {seconds:.0f} s")
 
-            outcomes = play_episodes(
-                self.world,
-                [trial.episode for trial in trials],
-                PolicyInBatch(self.policy, size, places),
-                workers=self.workers,
-                interrupted=self.interrupted,
-                progress=progress,
-            )
-            rows = [
-                trial_row(self.world.recipe, self.measure, trial, outcome)
-                for trial, outcome in zip(trials, outcomes, strict=True)
-            ]
-            content = pd.DataFrame(rows).assign(batch_size=size, batch_row=places).to_parquet(index=False)
+            content = played(self.world, self.policy, trials, self.workers, self.interrupted, progress)
             write_checked(path, name, content)
         self.done += len(trials)
         self.progress(self.done, self.total, suites)
         return pd.read_parquet(BytesIO(content))
+
+
+def played(
+    world: Specification,
+    policy: Acting,
+    trials: Sequence[Trial],
+    workers: int,
+    interrupted: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> bytes:
+    """Play one batch; its rows of the long table as a Parquet file. See `play_episodes`."""
+    recipe, size, places = world.recipe, world.recipe.eval.batch, np.arange(len(trials))
+    in_batch, episodes = PolicyInBatch(policy, size, places), [trial.episode for trial in trials]
+    outcomes = play_episodes(world, episodes, in_batch, workers=workers, interrupted=interrupted, progress=progress)
+    measure = measure_of(recipe, load_robot(world.robot))
+    rows = [trial_row(recipe, measure, trial, outcome) for trial, outcome in zip(trials, outcomes, strict=True)]
+    return pd.DataFrame(rows).assign(batch_size=size, batch_row=places).to_parquet(index=False)
 
 
 def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Trial]]:
@@ -183,6 +175,10 @@ def batched_by_duration(trials: Sequence[Trial], size: int) -> Iterator[list[Tri
         alike = [trial for trial, own in zip(trials, durations, strict=True) if own == duration]
         for first, last in shares(len(alike), math.ceil(len(alike) / size)):
             yield alike[first:last]
+
+
+def _suites(trials: Sequence[Trial]) -> str:
+    return ", ".join(dict.fromkeys(trial.suite for trial in trials))
 
 
 def _succeeds(table: pd.DataFrame, suite: str, mass: float) -> bool:
