@@ -92,36 +92,30 @@ def run_points(
     return endings
 
 
-class PointThread:
+class PointThread(threading.Thread):
     """A run in a thread of this process, which sees the stop request itself: for stages that are carried out
     elsewhere."""
 
     def __init__(self, task: PointRun, abort: Callable[[], None]) -> None:
         """`abort`: lets all that run end at once."""
-        self._task, self._abort = task, abort
+        super().__init__(name=task.name)
+        self.task, self.abort = task, abort
         self._ending: RunEnding | None = None
-        self._thread = threading.Thread(target=self._run, name=task.name)
-        self._thread.start()
+        self.start()
 
-    def _run(self) -> None:
-        with self._task.log.open("a", encoding="utf-8") as log:
+    def run(self) -> None:
+        with self.task.log.open("a", encoding="utf-8") as log:
             try:
-                self._ending = self._task.carried_out(log)
+                self._ending = self.task.carried_out(log)
             except BaseException as error:
                 log.write(traceback.format_exc())
                 self._ending = RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
 
     def ending(self) -> RunEnding | None:
-        return None if self._thread.is_alive() else self._ending
+        return None if self.is_alive() else self._ending
 
     def stop(self) -> None:
         """Nothing: the run asks for itself."""
-
-    def abort(self) -> None:
-        self._abort()
-
-    def join(self) -> None:
-        self._thread.join()
 
 
 class PointProcess:

@@ -5,6 +5,7 @@ Ray begins an actor on a node with a free core and reserves none for it afterwar
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,18 +29,16 @@ def raised(error: Exception) -> BaseException | None:
 
 
 class ActorHost:
-    """Ray's actor on a node: one member, made from these arguments at its first request."""
+    """Ray's actor on a node: one member, made at its first request."""
 
-    def __init__(
-        self, make: Callable[..., Member], arguments: tuple[Any, ...], folders: Mapping[str, SharedFolder]
-    ) -> None:
-        self._make, self._arguments, self._folders = make, arguments, folders
+    def __init__(self, make: Callable[[], Member]) -> None:
+        self._make = make
         self._member: Member | None = None
 
     def ask(self, state: Any, message: Any, changes: bool) -> tuple[Any, Any]:
         """The answer, and the state after it where it changes any. `state`: of a member that is not made yet."""
         if self._member is None:
-            self._member = _called(self._make, self._arguments, self._folders)
+            self._member = self._make()
             if state is not None:
                 self._member.restore(state)
         answer = self._member.ask(message)
@@ -50,7 +49,7 @@ class ActorHost:
 class Place:
     """A member's actor, and its last request, state and answer."""
 
-    arguments: tuple[Any, ...]
+    make: Callable[[], Member]
     actor: Any = None
     made: bool = False
     """True once this actor has answered: it holds its state itself."""
@@ -76,12 +75,11 @@ class NodeActorPool:
         say: Callable[[str], None],
     ) -> None:
         """See `NodeSpread.actor_pool`. say: prints a line about members that are lost."""
-        self._called, self._make, self._folders = called, make, folders
-        self._interrupted, self._say = interrupted, say
+        self._called, self._interrupted, self._say = called, interrupted, say
         self._host = ray.remote(ActorHost)
         self._asked: dict[Any, Place] = {}
         """Members that have not answered yet, by Ray's references to their answers."""
-        self._places = [Place(arguments) for arguments in calls]
+        self._places = [Place(partial(_called, make, arguments, folders)) for arguments in calls]
         for place in self._places:
             self._start(place)
 
@@ -117,7 +115,7 @@ class NodeActorPool:
 
     def _start(self, place: Place) -> None:
         options = {"scheduling_strategy": "SPREAD", "max_restarts": 0}
-        place.actor = self._host.options(**options).remote(self._make, place.arguments, self._folders)
+        place.actor = self._host.options(**options).remote(place.make)
         place.made = False
 
     def _send(self, place: Place) -> None:
@@ -192,4 +190,5 @@ class NodeSpread:
 
 
 def _called(function: Callable[..., Result], arguments: tuple[Any, ...], folders: Mapping[str, SharedFolder]) -> Result:
+    """What a function gives on this node, with the folders in their places here."""
     return function(*arguments, **{name: placed(folder) for name, folder in folders.items()})

@@ -82,8 +82,8 @@ class Board:
 
     def _drawn(self) -> Group:
         table = Table(box=None, padding=(0, 1, 0, 0))
-        for name in ("run", "state", "spent", "says"):
-            table.add_column(name, no_wrap=True, overflow="ellipsis")
+        for name, width in {"run": 12, "state": 7, "spent": 9, "says": None}.items():
+            table.add_column(name, min_width=width, no_wrap=True, overflow="ellipsis")
         running = [view for view in self.views.values() if view.state == "runs"]
         for view in (*self._over[-LAST_SHOWN:], *running):
             text = view.note or (last_line(self.logs[view.name]) if view.state == "runs" else "")
