@@ -13,9 +13,13 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from iowbc.pipeline.cluster.cluster import ALONE, STARTS, Cluster, connected
+from iowbc.pipeline.cluster.connection import ALONE, STARTS, connected
 from iowbc.processes import die_with_parent
+
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.cluster import Cluster
 
 NODE = {
     "object_store_memory": 1 << 30,  # bytes on each node; what is more goes to disk
@@ -58,7 +62,7 @@ def local_nodes(cores: Sequence[int]) -> Iterator[str]:
 
 
 @contextlib.contextmanager
-def connected_nodes(cores: Sequence[int]) -> Iterator[Cluster]:
+def connected_nodes(cores: Sequence[int]) -> "Iterator[Cluster]":
     """A connection to such a cluster, whose nodes keep to their own disks."""
     with local_nodes(cores) as address, connected(address, copy=True) as cluster:
         yield cluster

@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
@@ -23,9 +23,7 @@ from iowbc.evaluation.trials.protocol import Batches
 from iowbc.learning.as_numpy import teacher_policy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import load_teacher, save_network
-from iowbc.pipeline.cluster.cluster import Cluster
-from iowbc.pipeline.cluster.folders import files_of
-from iowbc.pipeline.cluster.spread import NodeSpread
+from iowbc.pipeline.store.digests import folder_files
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
@@ -40,6 +38,10 @@ from iowbc.stages.rg_dataset import CHUNK
 from iowbc.task.layout import full_layout
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
+
+if TYPE_CHECKING:
+    from iowbc.pipeline.cluster.cluster import Cluster
+    from iowbc.pipeline.cluster.spread import NodeSpread
 
 NODES = (1, 2)
 """Nodes of one core each, in turn."""
@@ -69,7 +71,7 @@ class Workload:
     @property
     def reads(self) -> int:
         """Bytes that a node fetches once."""
-        return sum(len(content) for folder in self.folders.values() for content in files_of(folder).values())
+        return sum(path.stat().st_size for folder in self.folders.values() for path in folder_files(folder))
 
     def batches(self, nodes: int) -> Batches:
         """The same ones for each node."""
@@ -160,7 +162,7 @@ def _world(recipe: Recipe) -> Iterator[Workload]:
         yield Workload(recipe, folders, sweep.trials(sweep.sweep.masses[-1:]))
 
 
-def _paces(cluster: Cluster, world: Workload, nodes: int) -> tuple[dict[str, Throughput], dict[str, float]]:
+def _paces(cluster: "Cluster", world: Workload, nodes: int) -> tuple[dict[str, Throughput], dict[str, float]]:
     """How fast a cluster is, and the bytes of what passes between its nodes."""
     spread = cluster.spread(world.folders.values())
 
@@ -183,7 +185,7 @@ def _paces(cluster: Cluster, world: Workload, nodes: int) -> tuple[dict[str, Thr
     return paces, sizes | {"answer_bytes": max(len(content) for _, content in answers)}
 
 
-def _rolled(spread: NodeSpread, world: Workload, nodes: int) -> tuple[Throughput, dict[str, float]]:
+def _rolled(spread: "NodeSpread", world: Workload, nodes: int) -> tuple[Throughput, dict[str, float]]:
     """How fast a training's rollouts are made, one actor on each node; and the bytes of an update, of one actor."""
     recipe, count = world.recipe, ENVIRONMENTS * nodes
     specification = Specification(recipe, world.folders["robot"], world.folders["generator"])
@@ -222,7 +224,7 @@ def _processor_time() -> float:
     return total
 
 
-def _label(spread: NodeSpread, world: Workload, shards: int) -> None:
+def _label(spread: "NodeSpread", world: Workload, shards: int) -> None:
     """Label some shards."""
     rg = world.recipe.rg
     with tempfile.TemporaryDirectory(prefix="iowbc-bench-") as folder:

@@ -1,7 +1,6 @@
 """`iowbc status`, `iowbc ls` and `iowbc show`: work in progress, stored artifacts, and one of them in detail."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +74,7 @@ def _data(store: Store) -> dict[str, Any]:
         {
             **record.model_dump(include={"stage", "recipe", "done", "total", "seconds", "attempts", "updated", "note"}),
             "key": folder.name,
-            "holder": asdict(who) if (who := holder(store.runs, folder.name)) else None,
+            "holder": who.model_dump() if (who := holder(store.runs, folder.name)) else None,
         }
         for folder, record in unfinished(store.runs)
     ]

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import IO
 
 from rich.console import Console
 
@@ -38,8 +39,13 @@ class PointRun:
     name: str
     log: Path
     """File of its output."""
-    run: Callable[[Console], RunEnding]
-    """Runs it and prints to a console."""
+    run: Callable[..., RunEnding]
+    """Runs it with a `console`, and one for `errors`."""
+
+    def carried_out(self, output: IO[str]) -> RunEnding:
+        """Run it and print all to a file."""
+        console = Console(file=output, width=LOG_WIDTH)
+        return self.run(console=console, errors=console)
 
 
 def run_points(
@@ -86,36 +92,30 @@ def run_points(
     return endings
 
 
-class PointThread:
+class PointThread(threading.Thread):
     """A run in a thread of this process, which sees the stop request itself: for stages that are carried out
     elsewhere."""
 
     def __init__(self, task: PointRun, abort: Callable[[], None]) -> None:
         """`abort`: lets all that run end at once."""
-        self._task, self._abort = task, abort
+        super().__init__(name=task.name)
+        self.task, self.abort = task, abort
         self._ending: RunEnding | None = None
-        self._thread = threading.Thread(target=self._run, name=task.name)
-        self._thread.start()
+        self.start()
 
-    def _run(self) -> None:
-        with self._task.log.open("a", encoding="utf-8") as log:
+    def run(self) -> None:
+        with self.task.log.open("a", encoding="utf-8") as log:
             try:
-                self._ending = self._task.run(Console(file=log, width=LOG_WIDTH))
+                self._ending = self.task.carried_out(log)
             except BaseException as error:
                 log.write(traceback.format_exc())
                 self._ending = RunEnding(STAGE_FAILED, f"{type(error).__name__}: {error}")
 
     def ending(self) -> RunEnding | None:
-        return None if self._thread.is_alive() else self._ending
+        return None if self.is_alive() else self._ending
 
     def stop(self) -> None:
         """Nothing: the run asks for itself."""
-
-    def abort(self) -> None:
-        self._abort()
-
-    def join(self) -> None:
-        self._thread.join()
 
 
 class PointProcess:
@@ -162,6 +162,6 @@ def _run(task: PointRun, parent: int, saying: Connection) -> None:
     for descriptor in (1, 2):
         os.dup2(log, descriptor)
     os.close(log)
-    ending = task.run(Console(file=sys.stdout, width=LOG_WIDTH))
+    ending = task.carried_out(sys.stdout)
     saying.send(ending)
     sys.exit(ending.code)

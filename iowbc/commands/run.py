@@ -93,7 +93,7 @@ def engine(options: Options, execution: Execution) -> "AbstractContextManager[Cl
     """The cluster that was asked for, to the end of a block; None where stages run here. Raises `UsageError`."""
     if (options.engine or execution.engine) == "local":
         return nullcontext()
-    from iowbc.pipeline.cluster.cluster import connected
+    from iowbc.pipeline.cluster.connection import connected
 
     return connected(options.address or execution.address, copy=execution.copy_files)
 
@@ -112,8 +112,8 @@ def run_recipe(
     """Run one recipe.
 
     within: the run of a sweep to which this one belongs in MLflow. cluster: where stages run, here if empty. errors:
-    where it is said how a run that did not finish goes on; standard error if empty. workers: processes of a stage, as
-    asked for if 0.
+    where it is said how a run that did not finish goes on; standard error if empty. workers: processes of a stage where
+    neither options nor recipe say how many; as many as there are cores if 0.
     """
     loaded = planner.loaded
     tracker: Tracker | None = None

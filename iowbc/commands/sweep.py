@@ -1,7 +1,9 @@
 """`iowbc sweep`: a recipe with every combination of some values, several runs at a time, and what came of them."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,9 +115,8 @@ def sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
     record_sweep(found, folder)
-    before = planned(planners)
-    if not quiet:
-        console.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
+    before, said = planned(planners), Console(quiet=True) if quiet else console
+    said.print(f"{found.name}: {in_all(before)}", highlight=False, soft_wrap=True)
     endings: Endings = dict.fromkeys(before, RunEnding(INTERRUPTED))
     record: RunRecord | None = None
     try:
@@ -123,28 +124,30 @@ def sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
             engine(asked.recipe.options, execution) as cluster,
             StopRequest(shown=console.is_terminal and not quiet) as stop,
         ):
-            if cluster is not None and not quiet:
-                console.print(cluster.text, highlight=False)
+            if cluster is not None:
+                said.print(cluster.text, highlight=False)
             jobs, workers = _shared_out(planners, asked, cluster)
             if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
-                settings = {point.name: point.settings for point in found.points}
-                record = sweep_record(runs, found.name, settings, execution)
+                record = sweep_record(runs, found, execution)
                 record.send()
             origin = None if record is None else record.origin
-            tasks = [
-                _task(point, planner, asked.recipe, stop, folder, origin, cluster, workers)
-                for point, planner in zip(found.points, planners, strict=True)
-            ]
+            tasks = []
+            for planner in planners:
+                loaded = planner.loaded
+                request = replace(asked.recipe, word=str(loaded.file), overrides=loaded.overrides)
+                run = partial(run_recipe, planner, request, stop=stop, within=origin, cluster=cluster, workers=workers)
+                tasks.append(PointRun(loaded.recipe.name, folder / LOGS / f"{loaded.recipe.name}.log", run))
             logs = {task.name: task.log for task in tasks}
             start = PointProcess if cluster is None else lambda task: PointThread(task, cluster.abort)
-            with Board(console, logs, execution.line_interval, quiet, lambda: stop.text) as board:
+            board = Board(console, logs, execution.line_interval, quiet, lambda: stop.text)
+            with board.live or nullcontext():
                 endings = run_points(tasks, jobs, stop, board, start)
     except KeyboardInterrupt:
         pass  # the endings say so
     code = _code(endings)
     try:
         if code != INTERRUPTED:
-            _conclude(found, endings, runs, folder, console, record, quiet)
+            _conclude(found, endings, runs, folder, said, record)
     finally:
         if record is not None:
             status = {DONE: "FINISHED", STAGE_FAILED: "FAILED"}.get(code, "KILLED")
@@ -162,48 +165,15 @@ def _shared_out(planners: Sequence[Planner], asked: SweepRequest, cluster: "Clus
     return jobs, max(1, min(most, cores // jobs))
 
 
-def _task(
-    point: Point,
-    planner: Planner,
-    asked: Request,
-    stop: StopRequest,
-    folder: Path,
-    origin: str | None,
-    cluster: "Cluster | None",
-    workers: int,
-) -> PointRun:
-    wanted = planner.options.workers or planner.loaded.recipe.execution.workers
-    request = replace(asked, word=point.word, overrides=point.loaded.overrides)
-
-    def run(console: Console) -> RunEnding:
-        return run_recipe(
-            planner,
-            request,
-            console,
-            stop,
-            within=origin,
-            cluster=cluster,
-            errors=console if cluster is not None else None,
-            workers=wanted or workers,
-        )
-
-    return PointRun(point.name, folder / LOGS / f"{point.name}.log", run)
-
-
 def _code(endings: Endings) -> int:
     states = {ending.state for ending in endings.values()}
     return INTERRUPTED if states & {"stopped", "waits"} else STAGE_FAILED if "failed" in states else DONE
 
 
 def _conclude(
-    found: Sweep,
-    endings: Endings,
-    runs: Runs,
-    folder: Path,
-    console: Console,
-    record: RunRecord | None,
-    quiet: bool,
+    found: Sweep, endings: Endings, runs: Runs, folder: Path, console: Console, record: RunRecord | None
 ) -> None:
+    """Write the results of the points that have finished, print them, and record them."""
     from iowbc.commands.sweep_results import FIGURE, TABLE, outcomes, table, write_results
 
     states = {name: ending.state for name, ending in endings.items()}
@@ -216,8 +186,6 @@ def _conclude(
     if record is not None:
         figures = {f"{line.label}/{name}": value for line in made.lines for name, value in line.means.items()}
         record.describe(markdown(results), figures, [folder / FIGURE, folder / TABLE])
-    if quiet:
-        return
     console.print(drawn(results, console.width))
     for path in paths:
         tell(console, shown_path(path))

@@ -68,18 +68,17 @@ def _metric(run: Run, name: str) -> float:
 def _chosen(runs: Sequence[Run]) -> tuple[str, ...]:
     """The telling metrics in which points differ, of the last stages first; of one that is the same for all, those of
     the last stage."""
-    by_stage = {
-        stage: [
+    known = list(
+        dict.fromkeys(
             f"{stage} {name}"
+            for stage in reversed(PIPELINE)
             for run in runs
             if stage in run.artifacts
             for name, _ in headline(stage, run.artifacts[stage].metrics)
-        ]
-        for stage in reversed(PIPELINE)
-    }
-    known = list(dict.fromkeys(name for names in by_stage.values() for name in names))
+        )
+    )
     differing = [name for name in known if len({_metric(run, name) for run in runs}) > 1]
-    last = list(dict.fromkeys(next((names for names in by_stage.values() if names), [])))
+    last = [name for name in known if name.partition(" ")[0] == known[0].partition(" ")[0]]
     chosen = (differing or last)[:OUTCOMES_SHOWN]
     return tuple(sorted(chosen, key=known.index, reverse=True))
 
@@ -88,7 +87,6 @@ def write_results(
     sweep: Sweep, made: Outcomes, found: Mapping[str, Run], states: Mapping[str, str], folder: Path
 ) -> list[Path]:
     """Write table, figure and points; returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / name for name in (TABLE, FIGURE, POINTS)]
     paths[0].write_text(markdown(table(sweep, made)), encoding="utf-8")
     title = f"{sweep.name}: means over seeds (thick), 95 % intervals (bars), single runs (thin)"
@@ -116,10 +114,8 @@ def table(sweep: Sweep, made: Outcomes) -> Table:
 
 
 def _write_points(sweep: Sweep, found: Mapping[str, Run], states: Mapping[str, str], path: Path) -> None:
-    rows = []
-    for point in sweep.points:
-        row: dict[str, object] = {"point": point.name, "state": states.get(point.name, "waits"), **point.settings}
+    rows = [{"point": point.name, "state": states.get(point.name, "waits"), **point.settings} for point in sweep.points]
+    for row, point in zip(rows, sweep.points, strict=True):
         for stage, artifact in found[point.name].artifacts.items() if point.name in found else ():
             row |= {f"{stage}/{name}": value for name, value in artifact.metrics.items()}
-        rows.append(row)
     pd.DataFrame(rows).to_csv(path, index=False)

@@ -11,7 +11,7 @@ from rich.console import Console
 from iowbc.commands.needs import HOST, require_free, require_training
 from iowbc.commands.printed import tell
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, set_up
+from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, setup_lock
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
 from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
@@ -28,7 +28,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     require_free(port)
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     uri = embedded_uri(runs)
-    with set_up(runs):
+    with setup_lock(runs):
         mlflow = client(uri)
         mlflow.search_experiments(max_results=1)
         shown = experiment(mlflow, Execution.model_fields["experiment"].default, runs)

@@ -1,11 +1,10 @@
-"""This machine: name, boot, installed versions, and its identity as far as results depend on it."""
+"""This machine: installed versions, and its identity as far as results depend on it."""
 
 import functools
 import importlib.metadata
 import platform
-import socket
 from dataclasses import dataclass
-from pathlib import Path
+from socket import gethostname
 
 from iowbc.pipeline.store.digests import PACKAGE, content_digest, file_digest
 
@@ -13,20 +12,6 @@ RECORDED_PACKAGES = ("crocoddyl", "mujoco", "numpy", "onnxruntime", "pin", "stab
 """Versions of these are kept with every artifact."""
 SHOWN = 12
 """Characters of a digest that are shown."""
-
-
-def host() -> str:
-    """The machine's name."""
-    return socket.gethostname()
-
-
-@functools.cache
-def boot() -> str:
-    """An identifier that changes when the machine starts anew."""
-    try:
-        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
-    except OSError:
-        return ""
 
 
 @functools.cache
@@ -65,7 +50,7 @@ class Identity:
 
 
 def identity() -> Identity:
-    return Identity(host(), versions(), _code())
+    return Identity(gethostname(), versions(), _code())
 
 
 @functools.cache

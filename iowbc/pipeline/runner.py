@@ -6,13 +6,14 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from socket import gethostname
 
 from iowbc.errors import Damaged, Interrupted, IowbcError, PipelineFailed
 from iowbc.full_disk import nothing_fits, what_is_full
 from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.display import Display, StageView
 from iowbc.pipeline.console.wording import short
-from iowbc.pipeline.machine import host, versions
+from iowbc.pipeline.machine import versions
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Job, Stage
 from iowbc.pipeline.stage_plan import StagePlan
@@ -77,7 +78,7 @@ class Runner:
     execute: Callable[[Stage, Job], None] = run_here
     """Carries a stage out, with the same result wherever."""
     workers: int = 0
-    """Processes of a stage; 0: as asked for, or the recipe's, or as many as there are cores."""
+    """Processes of a stage where neither options nor recipe say how many; 0: as many as there are cores."""
     artifacts: dict[str, Artifact] = field(default_factory=dict)
     made: list[str] = field(default_factory=list)
     """Stages that were not cached."""
@@ -85,7 +86,7 @@ class Runner:
     def __post_init__(self) -> None:
         self.loaded, self.store, self.options = self.planner.loaded, self.planner.store, self.planner.options
         asked = self.options.workers or self.loaded.recipe.execution.workers
-        self.workers = self.workers or asked or available_cores()
+        self.workers = asked or self.workers or available_cores()
         self.views = {stage.name: StageView(stage.name) for stage in self.planner.stages}
 
     def run(self) -> dict[str, Artifact]:
@@ -209,7 +210,7 @@ class Runner:
                 "seconds": workspace.seconds + (step.predecessor.manifest.seconds if step.predecessor else 0.0),
                 "attempts": workspace.state.attempts,
                 "workers": self.workers,
-                "host": host(),
+                "host": gethostname(),
                 "code": dict(step.code),
                 "versions": versions(),
             }

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from socket import gethostname
 from statistics import median
 from typing import Any, Literal
 
-from iowbc.pipeline.machine import host
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.stage import Stage
 from iowbc.pipeline.store.artifact import Artifact
@@ -86,8 +86,8 @@ def estimated(
     """A step with its time: the median of its last runs here that differ in seed and counts alone, else a guess at the
     rate of `closest`, the stored artifact that differs least."""
     made = closest.manifest
-    rate_of = made.recipe if made.host == host() else f"{made.recipe} on another machine"
-    own = sorted((one for one in stored if one.manifest.host == host()), key=lambda one: -one.manifest.made)
+    rate_of = made.recipe if made.host == gethostname() else f"{made.recipe} on another machine"
+    own = sorted((one for one in stored if one.manifest.host == gethostname()), key=lambda one: -one.manifest.made)
     reckoned = (_reckoned(step.stage, one, ingredients) for one in own)
     times = [seconds for seconds, alike in reckoned if alike][:LAST_RUNS]
     if not times:

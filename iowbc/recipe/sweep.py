@@ -47,10 +47,9 @@ class Drawn(Interval):
 
     def value(self, part: float) -> int | float:
         """The number for a part of the way from low to high, 0 to 1."""
-        if self.scale == "log":
-            found = math.exp(math.log(self.low) + part * (math.log(self.high) - math.log(self.low)))
-        else:
-            found = self.low + part * (self.high - self.low)
+        low, high = (self.low, self.high) if self.scale == "linear" else (math.log(self.low), math.log(self.high))
+        found = low + part * (high - low)
+        found = found if self.scale == "linear" else math.exp(found)
         return round(found) if self.whole else float(f"{found:.{DIGITS}g}")
 
 
@@ -101,8 +100,6 @@ class Point:
     """One run of a sweep: an ordinary recipe under a name of its own."""
 
     loaded: LoadedRecipe
-    word: str
-    """The recipe's file."""
     settings: Mapping[str, JsonValue]
     """Values that the sweep varies, by dotted path."""
 
@@ -117,9 +114,12 @@ class Sweep:
     """Recipes that differ in what a sweep varies."""
 
     name: str
-    axes: tuple[str, ...]
-    """Dotted paths that are varied."""
     points: tuple[Point, ...]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Dotted paths that are varied, the same for all points."""
+        return tuple(self.points[0].settings)
 
 
 def load_sweep(
@@ -149,12 +149,10 @@ def load_sweep(
             fixed.append(setting)
     drawn = described.draws.points() if described.draws is not None else [{}]
     drawn = [{path: value for path, value in point.items() if path not in grid} for point in drawn]
-    axes = tuple(dict.fromkeys((*grid, *drawn[0])))
+    axes = (*grid, *drawn[0])
     if axes or not load_study(word):
         _require_axes(axes, file)
-    count = len(drawn)
-    for values in grid.values():
-        count *= len(values)
+    count = len(drawn) * math.prod(map(len, grid.values()))
     if count > most:
         text = f"{count:,} points, more than {most:,}; vary less, or allow them: `iowbc sweep --points {count}`"
         raise RecipeError([Problem(str(file or "--set"), text)])
@@ -162,33 +160,29 @@ def load_sweep(
     points = []
     for draw in drawn:
         for combination in itertools.product(*grid.values()):
-            varied = {**draw, **dict(zip(grid, combination, strict=True))}
-            points += _points(word, fixed, {path: varied[path] for path in axes})
-    several = any(RECIPE_AXIS in point.settings for point in points)
+            points += _points(word, fixed, dict(zip(grid, combination, strict=True)) | draw)
     name = described.name or _slug([file.stem] if file is not None else [Path(word).stem, *map(_leaf, axes)])
-    return Sweep(name[:LONGEST_NAME], ((RECIPE_AXIS,) if several else ()) + axes, tuple(points))
+    return Sweep(name[:LONGEST_NAME], tuple(points))
 
 
 def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) -> list[Point]:
     """The point of a recipe, or those of the variants that a study names."""
     overrides = (*fixed, *(f"{path}={written(value)}" for path, value in settings.items()))
-    variants = load_study(word, overrides)
-    if not variants:
-        return [_named(load_recipe(word, overrides), word, settings)]
-    return [_named(variant, str(variant.file), {RECIPE_AXIS: variant.recipe.name, **settings}) for variant in variants]
+    if variants := load_study(word, overrides):
+        return [Point(_named(one, settings), {RECIPE_AXIS: one.recipe.name, **settings}) for one in variants]
+    return [Point(_named(load_recipe(word, overrides), settings), settings)]
 
 
-def _named(loaded: LoadedRecipe, word: str, settings: Mapping[str, JsonValue]) -> Point:
-    """The point under a name that tells its settings, the same in every sweep that has it."""
-    own = {path: value for path, value in settings.items() if path != RECIPE_AXIS}
-    digest = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
-    readable = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in own.items())])
-    if not own:
-        return Point(loaded, word, settings)
-    name = readable if own.keys() <= {"seed"} else f"{readable[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{digest}"
+def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue]) -> LoadedRecipe:
+    """The recipe under a name that tells its settings, the same in every sweep that has it."""
+    if not settings:
+        return loaded
+    name = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in settings.items())])
+    if not settings.keys() <= {"seed"}:
+        digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+        name = f"{name[: LONGEST_NAME - DIGEST_LENGTH - 1]}-{digest}"
     recipe = loaded.recipe.model_copy(update={"name": name})
-    overrides = (*loaded.overrides, f"name={name}")
-    return Point(replace(loaded, recipe=recipe, overrides=overrides), word, settings)
+    return replace(loaded, recipe=recipe, overrides=(*loaded.overrides, f"name={name}"))
 
 
 def _leaf(path: str) -> str:

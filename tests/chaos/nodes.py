@@ -29,7 +29,7 @@ from typing import Any
 import psutil
 from tally import ENDED, Tally, Turn, Undisturbed
 
-from iowbc.pipeline.cluster.cluster import ALONE, STARTS
+from iowbc.pipeline.cluster.connection import ALONE, STARTS
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import ray
+
 from iowbc.errors import Damaged, StageFailed
 from iowbc.files import replacing
 from iowbc.pipeline.machine import Identity, identity
 from iowbc.pipeline.store.digests import folder_digest, folder_files
+from iowbc.pipeline.store.locks import named_lock
 
 Files = Mapping[str, bytes]
 """Content by relative name."""
@@ -50,28 +53,21 @@ def placed(folder: SharedFolder) -> Path:
     The copy stays for later stages, under the folder's own name, which is the key of an artifact. Raises `StageFailed`
     where this machine would give other results than the driver, `Damaged` where what arrives differs.
     """
-    import ray
-
     if different := folder.driver.mismatch(identity()):
         raise StageFailed(f"a node is not as the driver: {different}; install the same on both")
     there = Path(folder.path)
     if not folder.copy and there.is_dir() and folder_digest(there) == folder.digest:
         return there
     own = _cache() / folder.digest / there.name
-    if own.is_dir():
-        if folder_digest(own) == folder.digest:
+    with named_lock(own.with_name("lock")):  # another task of this machine may fetch the same
+        if own.is_dir() and folder_digest(own) == folder.digest:
             return own
         shutil.rmtree(own, ignore_errors=True)
-    fresh = Path(tempfile.mkdtemp(dir=_cache()))
-    write_files(fresh, ray.get(folder.content[0]))
-    if folder_digest(fresh) != folder.digest:
-        shutil.rmtree(fresh)
-        raise Damaged(f"{folder.path} differs from its digest after its way through Ray's object store")
-    own.parent.mkdir(exist_ok=True)
-    try:
-        os.rename(fresh, own)
-    except OSError:  # another task of this machine was faster
-        shutil.rmtree(fresh)
+        with replacing(own) as fresh:
+            fresh.mkdir()
+            write_files(fresh, ray.get(folder.content[0]))
+            if folder_digest(fresh) != folder.digest:
+                raise Damaged(f"{folder.path} differs from its digest after its way through Ray's object store")
     return own
 
 

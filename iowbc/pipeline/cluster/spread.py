@@ -5,8 +5,11 @@ Ray begins an actor on a node with a free core and reserves none for it afterwar
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
+
+import ray
 
 from iowbc.errors import Interrupted, IowbcError, StageFailed, WorkerFailed
 from iowbc.pipeline.cluster.folders import SharedFolder, placed
@@ -19,21 +22,23 @@ POLL = 0.2
 """Seconds between two looks at what goes on."""
 
 
-class ActorHost:
-    """Ray's actor on a node: one member, made from these arguments at its first request."""
+def raised(error: Exception) -> BaseException | None:
+    """What the code on a node raised, by Ray's error; None where the node or worker is lost."""
+    cause: BaseException | None = error.cause if isinstance(error, ray.exceptions.RayTaskError) else None
+    return None if isinstance(cause, ray.exceptions.RayError) else cause
 
-    def __init__(
-        self, make: Callable[..., Member], arguments: tuple[Any, ...], folders: Mapping[str, SharedFolder]
-    ) -> None:
-        self._make, self._arguments, self._folders = make, arguments, folders
+
+class ActorHost:
+    """Ray's actor on a node: one member, made at its first request."""
+
+    def __init__(self, make: Callable[[], Member]) -> None:
+        self._make = make
         self._member: Member | None = None
 
     def ask(self, state: Any, message: Any, changes: bool) -> tuple[Any, Any]:
         """The answer, and the state after it where it changes any. `state`: of a member that is not made yet."""
         if self._member is None:
-            self._member = self._make(
-                *self._arguments, **{name: placed(folder) for name, folder in self._folders.items()}
-            )
+            self._member = self._make()
             if state is not None:
                 self._member.restore(state)
         answer = self._member.ask(message)
@@ -42,12 +47,14 @@ class ActorHost:
 
 @dataclass(eq=False)
 class Place:
-    """A member's actor, and its last state and answer."""
+    """A member's actor, and its last request, state and answer."""
 
-    arguments: tuple[Any, ...]
+    make: Callable[[], Member]
     actor: Any = None
     made: bool = False
     """True once this actor has answered: it holds its state itself."""
+    request: tuple[Any, bool] = (None, True)
+    """The message, and whether it changes the state."""
     state: Any = None
     """After the last request that changed it."""
     answer: Any = None
@@ -68,16 +75,11 @@ class NodeActorPool:
         say: Callable[[str], None],
     ) -> None:
         """See `NodeSpread.actor_pool`. say: prints a line about members that are lost."""
-        import ray
-
-        self._called, self._make, self._folders = called, make, folders
-        self._interrupted, self._say = interrupted, say
+        self._called, self._interrupted, self._say = called, interrupted, say
         self._host = ray.remote(ActorHost)
-        self._messages: Sequence[Any] = ()
-        self._changes = False
         self._asked: dict[Any, Place] = {}
         """Members that have not answered yet, by Ray's references to their answers."""
-        self._places = [Place(arguments) for arguments in calls]
+        self._places = [Place(partial(_called, make, arguments, folders)) for arguments in calls]
         for place in self._places:
             self._start(place)
 
@@ -88,9 +90,9 @@ class NodeActorPool:
 
     def ask(self, messages: Sequence[Any], *, changes: bool = True) -> None:
         """Send each member its message. `changes`: whether that changes states."""
-        self._messages, self._changes = messages, changes
-        for place in self._places:
-            self._request(place)
+        for place, message in zip(self._places, messages, strict=True):
+            place.request = message, changes
+            self._send(place)
 
     def answers(self) -> list[Any]:
         """The members' answers, in order.
@@ -98,8 +100,6 @@ class NodeActorPool:
         Raises WorkerFailed with what a member raised, StageFailed where one is lost again and again, and `Interrupted`
         where members have not begun yet when the job is asked to stop.
         """
-        import ray
-
         while self._asked:
             over, late = ray.wait(list(self._asked), num_returns=len(self._asked), timeout=POLL)
             for reference in over:
@@ -109,48 +109,40 @@ class NodeActorPool:
         return [place.answer for place in self._places]
 
     def close(self) -> None:
-        import ray
-
         for place in self._places:
             ray.kill(place.actor)
         self._places = []
 
     def _start(self, place: Place) -> None:
         options = {"scheduling_strategy": "SPREAD", "max_restarts": 0}
-        place.actor = self._host.options(**options).remote(self._make, place.arguments, self._folders)
+        place.actor = self._host.options(**options).remote(place.make)
         place.made = False
 
-    def _request(self, place: Place) -> None:
-        message, state = self._messages[self._places.index(place)], None if place.made else place.state
-        self._asked[place.actor.ask.remote(state, message, self._changes)] = place
+    def _send(self, place: Place) -> None:
+        state = None if place.made else place.state
+        self._asked[place.actor.ask.remote(state, *place.request)] = place
 
     def _hear(self, reference: Any) -> None:
-        import ray
-
         place = self._asked.pop(reference)
         try:
             place.answer, state = ray.get(reference)
         except ray.exceptions.RayError as error:
-            cause = getattr(error, "cause", None)
-            if isinstance(error, ray.exceptions.RayTaskError) and not isinstance(cause, ray.exceptions.RayError):
+            if (cause := raised(error)) is not None:
                 who = f"{self._called} {self._places.index(place) + 1} of {len(self._places)}, on {error.ip}"
                 raise WorkerFailed(f"{who}:\n{cause if isinstance(cause, IowbcError) else error}") from None
             self._remake(place, str(error).strip().splitlines()[0])
             return
         place.made, place.losses = True, 0
-        if self._changes:
-            place.state = state
+        place.state = state if place.request[1] else place.state
 
     def _remake(self, place: Place, why: str) -> None:
-        import ray
-
         place.losses += 1
         if place.losses > TRIES:
             raise StageFailed(f"lost a {self._called} {place.losses} times in a row, the last time: {why}")
         self._say(f"a {self._called} was lost; another one takes its place")
         ray.kill(place.actor)
         self._start(place)
-        self._request(place)
+        self._send(place)
 
 
 class NodeSpread:
@@ -165,8 +157,6 @@ class NodeSpread:
     @property
     def width(self) -> int:
         """Calls that can run at the same time."""
-        import ray
-
         return max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def __call__(
@@ -177,8 +167,6 @@ class NodeSpread:
 
         Raises `Interrupted` once the job is asked to stop.
         """
-        import ray
-
         own = {name: self._folders[path] for name, path in folders.items()}
         piece = ray.remote(num_cpus=1, max_retries=TRIES, scheduling_strategy="SPREAD")(_called)
         waiting = {piece.remote(function, arguments, own): place for place, arguments in enumerate(calls)}
@@ -202,4 +190,5 @@ class NodeSpread:
 
 
 def _called(function: Callable[..., Result], arguments: tuple[Any, ...], folders: Mapping[str, SharedFolder]) -> Result:
+    """What a function gives on this node, with the folders in their places here."""
     return function(*arguments, **{name: placed(folder) for name, folder in folders.items()})

@@ -1,18 +1,19 @@
 """A stage as a task on a node: its execution there, and its reports to the driver while it runs."""
 
+import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from socket import gethostname
 from typing import Any
+
+import ray
 
 from iowbc.files import previous
 from iowbc.pipeline.cluster.folders import Files, SharedFolder, files_of, placed, write_files
 from iowbc.pipeline.cluster.spread import NodeSpread
-from iowbc.pipeline.machine import host
 from iowbc.pipeline.stage import Job
-from iowbc.recipe.recipe import Recipe
 
 Event = tuple[Any, ...]
 """`("metrics", values, step)`, `("progress", done, total, note)`, `("say", text)`, `("files", files)` of scratch,
@@ -21,9 +22,6 @@ REPORT_INTERVAL = 0.5
 """Seconds between two reports to the driver; the answer says whether to stop."""
 FILES_INTERVAL = 10.0
 """Seconds between two looks for new checkpoints, which go to the driver where the node does not see its folder."""
-TOKEN = "driver"
-"""File in a stage's scratch by which a node sees that it shares the driver's folder."""
-SCRATCH, OUT = "scratch", "out"
 
 
 class Mailbox:
@@ -47,65 +45,58 @@ class Mailbox:
         self._stopping.add(task)
 
 
-@dataclass(frozen=True)
-class Order:
-    """One execution of a stage on a node."""
+def execute(
+    run: Callable[[Job], None],
+    make: Callable[..., Job],
+    *,
+    robot: SharedFolder,
+    inputs: Mapping[str, SharedFolder],
+    predecessor: SharedFolder | None,
+    out: Path,
+    work: Path,
+    scratch: tuple[Any, ...],
+    task: str,
+    mailbox: Any,
+) -> Files:
+    """Run a stage; returns its output, which is empty where the driver sees it. Raises what the stage raises.
 
-    task: str
-    """Identifier at the mailbox."""
-    run: Callable[[Job], None]
-    recipe: Recipe
-    key: str
-    robot: SharedFolder
-    inputs: Mapping[str, SharedFolder]
-    predecessor: SharedFolder | None
-    out: str
-    """Output folder on the driver."""
-    work: str
-    """Scratch folder on the driver."""
-    token: str
-    workers: int
-
-
-def execute(order: Order, scratch: tuple[Any, ...], mailbox: Any) -> Files | None:
-    """Run a stage; returns its output, or None where the driver sees it. Raises what the stage raises.
-
-    `scratch`: Ray's reference to the files that earlier attempts left; `mailbox`: Ray's handle.
+    make: gives the job with all that does not depend on the node. out, work: folders on the driver. scratch: Ray's
+    reference to the files that earlier attempts left. task: identifier at the mailbox. mailbox: Ray's handle.
     """
-    import ray
-
-    shared = not order.robot.copy and _read(Path(order.work, TOKEN)) == order.token
+    shared = not robot.copy and os.path.exists(marker(work, task))
     with tempfile.TemporaryDirectory(prefix="iowbc-stage-") as folder:
-        out, work = (Path(order.out), Path(order.work)) if shared else (Path(folder, OUT), Path(folder, SCRATCH))
-        out.mkdir(exist_ok=True)
         if not shared:
+            out, work = Path(folder, "out"), Path(folder, "scratch")
             work.mkdir()
             write_files(work, ray.get(scratch[0]))
-        report = NodeReport(mailbox, order.task, work, sends=not shared)
-        report.say(f"runs on {host()}")
+        out.mkdir(exist_ok=True)
+        report = NodeReport(mailbox, task, work, sends=not shared)
+        report.say(f"runs on {gethostname()}")
         report.flush()
         try:
-            robot, inputs = placed(order.robot), {name: placed(read) for name, read in order.inputs.items()}
-            known = {robot: order.robot, **{inputs[name]: read for name, read in order.inputs.items()}}
-            job = Job(
-                recipe=order.recipe,
-                key=order.key,
-                robot=robot,
-                inputs=inputs,
+            here, read = placed(robot), {name: placed(each) for name, each in inputs.items()}
+            folders = {here: robot} | {read[name]: each for name, each in inputs.items()}
+            job = make(
+                robot=here,
+                inputs=read,
+                predecessor=None if predecessor is None else placed(predecessor),
                 out=out,
                 work=work,
-                workers=order.workers,
                 report=report,
                 interrupted=report.stopping,
-                predecessor=None if order.predecessor is None else placed(order.predecessor),
-                spread=NodeSpread(known, report.stopping, report.say),
+                spread=NodeSpread(folders, report.stopping, report.say),
             )
-            order.run(job)
+            run(job)
         except BaseException:
             report.end(files=True)
             raise
         report.end()
-        return None if shared else files_of(out)
+        return {} if shared else files_of(out)
+
+
+def marker(work: Path, task: str) -> Path:
+    """File in a stage's scratch by which a node sees that it shares the driver's folder."""
+    return work / f".{task}"
 
 
 class NodeReport:
@@ -148,8 +139,6 @@ class NodeReport:
 
     def flush(self, *, files: bool = False) -> None:
         """Send all that was gathered, and, where asked for, new files of the scratch."""
-        import ray
-
         if files:
             self._gather()
         self._reported = time.monotonic()
@@ -160,8 +149,6 @@ class NodeReport:
 
     def end(self, *, files: bool = False) -> None:
         """Send the rest, and return once all has arrived, which it does in order."""
-        import ray
-
         self.flush(files=files)
         ray.get(self._answer)
 
@@ -191,10 +178,3 @@ class NodeReport:
                 found[name] = path.read_bytes()
         if found:
             self._events.append(("files", found))
-
-
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError:
-        return ""

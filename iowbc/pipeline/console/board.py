@@ -36,22 +36,13 @@ class Board:
     """Text about a requested stop; empty before."""
     _over: list[StageView] = field(default_factory=list)
     """In the order in which they have ended."""
-    _live: Live | None = None
     _shown: float = field(default_factory=time.monotonic)
 
     def __post_init__(self) -> None:
         self.views = {name: StageView(name) for name in self.logs}
-
-    def __enter__(self) -> "Board":
-        if self.console.is_terminal and not self.quiet:
-            self._live = Live(console=self.console, get_renderable=self._drawn, auto_refresh=False)
-            self._live.start()
-        return self
-
-    def __exit__(self, *reason: object) -> None:
-        if self._live is not None:
-            self._live.refresh()
-            self._live.stop()
+        live = self.console.is_terminal and not self.quiet
+        self.live = Live(console=self.console, get_renderable=self._drawn, auto_refresh=False) if live else None
+        """The table, to be entered while the runs go on."""
 
     def began(self, name: str) -> None:
         """A run begins."""
@@ -70,17 +61,17 @@ class Board:
     def refresh(self) -> None:
         """Show how far the runs are, once in a while."""
         now = time.monotonic()
-        if self._live is not None and now - self._shown > REDRAW:
+        if self.live is not None and now - self._shown > REDRAW:
             self._shown = now
-            self._live.refresh()
-        elif self._live is None and now - self._shown > self.interval:
+            self.live.refresh()
+        elif self.live is None and now - self._shown > self.interval:
             self._shown = now
             for view in self.views.values():
                 if view.state == "runs":
                     self._say(f"{view.name}: {last_line(self.logs[view.name])}")
 
     def _say(self, text: str, *, lost: bool = False) -> None:
-        if self._live is None and (lost or not self.quiet):
+        if self.live is None and (lost or not self.quiet):
             self.console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def _counts(self) -> str:
@@ -91,8 +82,8 @@ class Board:
 
     def _drawn(self) -> Group:
         table = Table(box=None, padding=(0, 1, 0, 0))
-        for name in ("run", "state", "spent", "says"):
-            table.add_column(name, no_wrap=True, overflow="ellipsis")
+        for name, width in {"run": 12, "state": 7, "spent": 9, "says": None}.items():
+            table.add_column(name, min_width=width, no_wrap=True, overflow="ellipsis")
         running = [view for view in self.views.values() if view.state == "runs"]
         for view in (*self._over[-LAST_SHOWN:], *running):
             text = view.note or (last_line(self.logs[view.name]) if view.state == "runs" else "")

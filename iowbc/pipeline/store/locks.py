@@ -1,28 +1,29 @@
 """One process a key: a lock that the system releases when its holder dies."""
 
 import fcntl
-import json
 import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
+from socket import gethostname
 
-from iowbc.pipeline.machine import host
-from iowbc.pipeline.store.runs import Runs, read_json
+from pydantic import BaseModel, ConfigDict, Field
+
+from iowbc.pipeline.store.runs import Runs
 
 POLL = 0.2
 """Seconds between two attempts to take a lock that another process holds."""
 
 
-@dataclass(frozen=True)
-class Holder:
-    """Holder of a lock."""
+class Holder(BaseModel):
+    """Holder of a lock; of one whose file is being written, or was overwritten, nothing is known."""
 
-    pid: int
-    host: str
-    since: float
+    model_config = ConfigDict(frozen=True)
+
+    pid: int = 0
+    host: str = "?"
+    since: float = Field(default_factory=time.time)
     """When the lock was taken [s since 1970]."""
 
     def __str__(self) -> str:
@@ -72,7 +73,7 @@ def key_lock(
                 time.sleep(POLL)
         file.seek(0)
         file.truncate()
-        json.dump({"pid": os.getpid(), "host": host(), "since": time.time()}, file)
+        file.write(Holder(pid=os.getpid(), host=gethostname()).model_dump_json())
         file.flush()
         yield True
 
@@ -87,8 +88,7 @@ def named_lock(path: Path) -> Iterator[None]:
 
 
 def _read(path: Path) -> Holder:
-    """The holder that a lock file names; one that is being written, or was overwritten, names nobody."""
-    data = read_json(path)
-    pid, name, since = (data.get(key) for key in ("pid", "host", "since"))
-    known = isinstance(pid, int) and isinstance(since, (int, float))
-    return Holder(pid, str(name), since) if known else Holder(0, "?", time.time())  # type: ignore[arg-type]
+    try:
+        return Holder.model_validate_json(path.read_bytes())
+    except (OSError, ValueError):
+        return Holder()

@@ -1,6 +1,7 @@
 """Folders of everything that runs leave behind."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -45,17 +46,17 @@ class Runs:
 
 def read_json(path: Path) -> dict[str, Any]:
     """The object in a JSON file; empty where it is missing, no regular file, not JSON, or holds something else."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) else {}
+    return _read(path, json.loads)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in a YAML file as `read_json` has it; empty also where it is nested too deep for YAML's parser."""
+    return _read(path, lambda text: plain(read_document(text, path.name)))
+
+
+def _read(path: Path, parsed: Callable[[str], Any]) -> dict[str, Any]:
     try:
-        found = plain(read_document(path.read_text(encoding="utf-8"), path.name)) if path.is_file() else {}
-    except (OSError, ValueError, RecipeError):
+        found = parsed(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    except (OSError, ValueError, RecursionError, RecipeError):
         return {}
     return found if isinstance(found, dict) else {}

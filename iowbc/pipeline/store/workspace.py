@@ -6,12 +6,12 @@ import shutil
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from socket import gethostname
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from iowbc.files import write_whole
-from iowbc.pipeline.machine import host
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE
 from iowbc.pipeline.store.runs import Runs
 
@@ -82,7 +82,7 @@ class Workspace:
         self.scratch.mkdir(parents=True, exist_ok=True)
         self.out.mkdir()
         self._begun, former = time.monotonic(), earlier or Progress()
-        own = {"stage": self.stage, "key": self.key, "recipe": recipe, "pid": os.getpid(), "host": host()}
+        own = {"stage": self.stage, "key": self.key, "recipe": recipe, "pid": os.getpid(), "host": gethostname()}
         counted = {"attempts": former.attempts + 1, "before": former.seconds, "forced": forced or former.forced}
         self.state = former.model_copy(update={**own, **counted, "code": code, "command": command})
         self.write()

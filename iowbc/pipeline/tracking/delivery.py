@@ -5,19 +5,19 @@ journals of a `runs/` folder: `python -m iowbc.pipeline.tracking.delivery RUNS`.
 lives, ends the runs of processes that died as KILLED, and leaves what a server does not take for the next one.
 """
 
-import contextlib
 import itertools
 import os
 import shutil
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from iowbc.pipeline.store.locks import named_lock
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.tracking.journal import close_orphaned, header, lines, mark_sent, sent, sent_path, statuses
+from iowbc.pipeline.tracking.journal import PARENT, close_orphaned, header, lines, mark_sent, sent, sent_path, statuses
 from iowbc.recipe.execution import Execution
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 DAMAGED_LINE = "journal-"
 """Beginning of the name of a file with a line that was put aside."""
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
-MAXIMUM_METRICS, MAXIMUM_PARAMETERS = 1000, 100
-"""Metrics and parameters that MLflow takes in one call."""
 MAXIMUM_TEXT = 5000
 """Longest value of a parameter or tag that MLflow's stores take [characters]."""
 ORIGIN_TAG = "iowbc.origin"
@@ -47,7 +45,9 @@ class Delivery:
 
     def __init__(self, runs: Runs, path: Path) -> None:
         self.runs, self.path = runs, path
-        self.offset, self.ids = sent(path)
+        self.offset = sent(path)
+        self._ids: dict[str, str] = {}
+        """MLflow's identifiers of the journal's runs, as far as this sender has asked for them."""
         self._checked = -1
         """Size of the journal when its process was found dead and its runs were ended."""
         self._finished = False
@@ -93,7 +93,7 @@ class Delivery:
             made = client(uri or own)
             self._embedded = uri in ("", own)
             name = first.get("experiment") or Execution.model_fields["experiment"].default
-            with set_up(self.runs):
+            with setup_lock(self.runs):
                 self._experiment = experiment(made, str(name), self.runs)
             self._client = made
 
@@ -111,7 +111,7 @@ class Delivery:
             elif found[0]["event"] != "journal":
                 self._deliver(found)
             self.offset = ends[-1]
-            mark_sent(self.path, self.offset, self.ids)
+            mark_sent(self.path, self.offset)
 
     def _put_aside(self, end: int) -> None:
         """Keep a damaged line where `status` and `gc --damaged` find it."""
@@ -145,21 +145,21 @@ class Delivery:
     def _run_of(self, event: Mapping[str, Any]) -> str:
         """MLflow's identifier of an event's run, which is made where MLflow has none yet, with what is known of it."""
         name = event["id"]
-        if name not in self.ids:
-            unknown = {"parent": next(iter(self.ids), None), "name": name, "tags": {}, "params": {}}
+        if name not in self._ids:
+            unknown = {"parent": None if name == PARENT else PARENT, "name": name, "tags": {}, "params": {}}
             begun = event if event["event"] == "run" else {**unknown, "time": event["time"]}
-            run = self._found_or_made(f"{self.path.stem}/{name}", begun["name"], begun["time"])
+            run = self._found_or_made(name, begun["name"], begun["time"])
             parent, tags = begun["parent"], dict(begun["tags"])
-            if parent in self.ids:
-                tags["mlflow.parentRunId"] = self.ids[parent]
-            elif parent is not None and "/" in parent:  # in another journal, which may not have been sent yet
-                tags["mlflow.parentRunId"] = self._found_or_made(parent, parent.partition("/")[0], begun["time"])
+            if parent is not None:
+                above = self._ids.get(parent) or self._found_or_made(parent, parent.partition("/")[0], begun["time"])
+                tags["mlflow.parentRunId"] = above
             self._describe(run, tags, begun["params"])
-            self.ids[name] = run
-        return self.ids[name]
+            self._ids[name] = run
+        return self._ids[name]
 
-    def _found_or_made(self, origin: str, name: str, moment: int) -> str:
-        """The run that MLflow has of a place in a journal, else a new one."""
+    def _found_or_made(self, identifier: str, name: str, moment: int) -> str:
+        """The run that MLflow has of an identifier in this journal, or of `JOURNAL/IDENTIFIER`, else a new one."""
+        origin = identifier if "/" in identifier else f"{self.path.stem}/{identifier}"
         condition = f"tags.`{ORIGIN_TAG}` = '{origin}'"
         found = self.client.search_runs([self._experiment], condition, max_results=1)
         if found:
@@ -173,9 +173,8 @@ class Delivery:
 
         if tags:
             self.client.log_batch(run, tags=[RunTag(name, text[:MAXIMUM_TEXT]) for name, text in tags.items()])
-        found = [Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()]
-        for start in range(0, len(found), MAXIMUM_PARAMETERS):
-            self.client.log_batch(run, params=found[start : start + MAXIMUM_PARAMETERS])
+        if params:
+            self.client.log_batch(run, params=[Param(name, text[:MAXIMUM_TEXT]) for name, text in params.items()])
 
     def _metrics(self, run: str, found: Sequence[Mapping[str, Any]]) -> None:
         from mlflow.entities import Metric
@@ -185,23 +184,19 @@ class Delivery:
             for event in found
             for name, value in event["values"].items()
         ]
-        for start in range(0, len(metrics), MAXIMUM_METRICS):
-            self.client.log_batch(run, metrics=metrics[start : start + MAXIMUM_METRICS])
+        self.client.log_batch(run, metrics=metrics)
 
     def _files(self, run: str, names: Sequence[str]) -> None:
         """Files and folders below `runs`; those of the embedded database go where MLflow's server looks for them."""
         folder = self.runs.tracked_files / run / "artifacts"
         for path in (self.runs.root / name for name in names):
-            if self._embedded:
-                folder.mkdir(parents=True, exist_ok=True)
-            if path.is_dir() and self._embedded:
-                shutil.copytree(path, folder / path.name, dirs_exist_ok=True)
-            elif path.is_dir():
-                self.client.log_artifacts(run, str(path), path.name)
-            elif path.is_file() and self._embedded:
-                shutil.copyfile(path, folder / path.name)
-            elif path.is_file():
+            if path.exists() and not self._embedded:
                 self.client.log_artifact(run, str(path))
+            elif path.is_dir():
+                shutil.copytree(path, folder / path.name, dirs_exist_ok=True)
+            elif path.is_file():
+                folder.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(path, folder / path.name)
 
 
 def tracking_uri() -> str:
@@ -209,11 +204,9 @@ def tracking_uri() -> str:
     return os.environ.get(URI_VARIABLE, "")
 
 
-@contextlib.contextmanager
-def set_up(runs: Runs) -> Iterator[None]:
-    """Wait until no other process sets up the database or an experiment: MLflow's own set-up is not safe for two."""
-    with named_lock(runs.tracking / "setup.lock"):
-        yield
+def setup_lock(runs: Runs) -> AbstractContextManager[None]:
+    """Held while a process sets up the database or an experiment: MLflow's own set-up is not safe for two."""
+    return named_lock(runs.tracking / "setup.lock")
 
 
 def client(uri: str) -> "MlflowClient":

@@ -13,13 +13,15 @@ import os
 import re
 import time
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Self
 
 from iowbc.errors import Damaged
 from iowbc.files import read_checked, write_checked
 
+PARENT = "recipe"
+"""Identifier of the parent run within a journal; a nested run has its stage's name."""
 EVENTS = ("journal", "run", "reopen", "tags", "metrics", "files", "end")
 CHECKSUM = re.compile(rb'(.*), "check": "([0-9a-f]{8})"}\n', re.DOTALL)
 """A line: all but the closing brace of its event, and the CRC-32 of the event."""
@@ -135,24 +137,23 @@ def sent_path(path: Path) -> Path:
     return path.with_suffix(".sent")
 
 
-def sent(path: Path) -> tuple[int, dict[str, str]]:
-    """Number of bytes of a journal that MLflow has, and MLflow's identifier of each run; none where not known."""
+def sent(path: Path) -> int:
+    """Number of bytes of a journal that MLflow has."""
     try:
-        state = json.loads(read_checked(sent_path(path), path.stem) or b"{}")
+        offset = int(json.loads(read_checked(sent_path(path), path.stem) or b"{}").get("offset", 0))
     except (Damaged, OSError):
-        state = {}
-    offset = state.get("offset", 0)
-    return (offset, state.get("ids", {})) if offset <= _size(path) else (0, {})
+        return 0
+    return offset if offset <= _size(path) else 0
 
 
-def mark_sent(path: Path, offset: int, ids: Mapping[str, str]) -> None:
+def mark_sent(path: Path, offset: int) -> None:
     """Record that MLflow has a journal up to an offset."""
-    write_checked(sent_path(path), path.stem, json.dumps({"offset": offset, "ids": dict(ids)}).encode())
+    write_checked(sent_path(path), path.stem, json.dumps({"offset": offset}).encode())
 
 
 def unsent(path: Path) -> bool:
     """True while MLflow lacks something of a journal; a sender may remove it at any moment, once it has all."""
-    return sent(path)[0] < _size(path)
+    return sent(path) < _size(path)
 
 
 def _size(path: Path) -> int:

@@ -8,21 +8,20 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from socket import gethostname
 from typing import Any, BinaryIO
 
-from iowbc.pipeline.machine import boot, host
 from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import INGREDIENTS, RECIPE, Artifact
 from iowbc.pipeline.store.digests import data_digest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import tracking_uri
-from iowbc.pipeline.tracking.journal import Journal, header, statuses, unsent
+from iowbc.pipeline.tracking.journal import PARENT, Journal, header, statuses, unsent
 from iowbc.processes import SINGLE_THREADED
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.reading.loading import LoadedRecipe
+from iowbc.recipe.sweep import Sweep
 
-PARENT = "recipe"
-"""Identifier of the parent run within a journal; a nested run has its stage's name."""
 SHOWN_FOLDERS = ("figures", "tables", "videos")
 """Folders of an artifact that go to MLflow."""
 CHECKING_TIME = 1.0
@@ -189,19 +188,14 @@ def unfinished_journal(runs: Runs, name: str, digest: str) -> Journal | None:
     return None
 
 
-def sweep_record(
-    runs: Runs, name: str, settings: Mapping[str, Mapping[str, object]], execution: Execution
-) -> RunRecord:
-    """The run above those of a sweep's points, which record themselves; one that did not finish is continued.
-
-    settings: of each point by its name.
-    """
-    digest = data_digest({"sweep": name, "points": {point: dict(varied) for point, varied in settings.items()}})
-    axes: dict[str, dict[str, None]] = {}
-    for path, value in (item for varied in settings.values() for item in varied.items()):
-        axes.setdefault(path, {})[str(value)] = None
-    params = {"sweep": name, "points": str(len(settings)), **{path: ", ".join(axis) for path, axis in axes.items()}}
-    journal = unfinished_journal(runs, name, digest) or new_journal(runs, name, execution.experiment, digest, params)
+def sweep_record(runs: Runs, sweep: Sweep, execution: Execution) -> RunRecord:
+    """The run above those of a sweep's points, which record themselves; one that did not finish is continued."""
+    digest = data_digest({"sweep": sweep.name, "points": {one.name: dict(one.settings) for one in sweep.points}})
+    axes = {path: dict.fromkeys(str(one.settings[path]) for one in sweep.points) for path in sweep.axes}
+    params = {"sweep": sweep.name, "points": str(len(sweep.points))}
+    params |= {path: ", ".join(values) for path, values in axes.items()}
+    journal = unfinished_journal(runs, sweep.name, digest)
+    journal = journal or new_journal(runs, sweep.name, execution.experiment, digest, params)
     return RunRecord(runs, journal, execution.tracking_patience)
 
 
@@ -249,4 +243,4 @@ def backlog(runs: Runs) -> list[Path]:
 
 def process_tags() -> dict[str, str]:
     """Tags by which a run names its process."""
-    return {"iowbc.pid": str(os.getpid()), "iowbc.host": host(), "iowbc.boot": boot()}
+    return {"iowbc.pid": str(os.getpid()), "iowbc.host": gethostname()}
