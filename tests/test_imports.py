@@ -49,7 +49,7 @@ MAY_IMPORT = {
     "commands": WORLD
     | {"task", "reference", "learning", "deploy", "pipeline", "evaluation", "benchmarks", "export", "report"}
     | {"live", "web", "stages", "results", "onboard", "twin", "adapters", "skill"},
-    "cli": DESCRIPTIONS | {"commands", "stages", "evaluation", "pipeline", "benchmarks", "deploy"},
+    "cli": {"commands", "errors", "processes"},
 }
 """Which rooms a room may import, itself aside; `__init__` and `__main__` belong to whoever uses the package."""
 ROBOT_FREE = {"torch", "mujoco", "pinocchio", "crocoddyl", "pandas", "scipy", "sklearn", "mlflow", "matplotlib"}

@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,6 +15,7 @@ import typer
 import yaml
 from pages import DOCS, commands, write
 from stage_jobs import make_job
+from typer.core import TyperGroup
 
 from iowbc.cli import app
 from iowbc.learning.curves import TABLE
@@ -60,13 +60,13 @@ def test_there_are_six_and_the_site_lists_them() -> None:
 def test_every_command_that_a_page_names_is_understood(page: str) -> None:
     program = typer.main.get_command(app)
     for words in commands(page):
-        command, context = program, click.Context(program, info_name="iowbc")
-        while isinstance(command, click.Group):
-            name, found, words = command.resolve_command(context, list(words))
-            assert found is not None, name
-            command = found
-            context = click.Context(command, info_name=name, parent=context)
-        command.make_parser(context).parse_args(list(words))
+        command, context = program, typer.Context(program, info_name="iowbc")
+        rest = command.make_parser(context).parse_args(list(words))[1]
+        while rest and isinstance(command, TyperGroup):
+            name, found, rest = command.resolve_command(context, rest)
+            command = found.make_context(name, [], parent=context, resilient_parsing=True).command
+            context = typer.Context(command, info_name=name, parent=context)
+            rest = command.make_parser(context).parse_args(rest)[1]
 
 
 def trained(recipe_file: Path, folder: Path) -> list[str]:

@@ -3,10 +3,11 @@
 import json
 import os
 import tempfile
-from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
 
 from iowbc.commands.needs import require_training
 from iowbc.errors import UsageError
@@ -44,22 +45,27 @@ MEANING = (
 
 
 def carry(
-    policy: str,
-    adapter: str,
-    *,
-    arms: str,
-    posture: bool,
-    workers: int | None,
-    out: Path,
-    engine: str | None = None,
-    suites: Mapping[str, Path] | None = None,
+    policy: Annotated[
+        str, typer.Argument(help="Controller: a file, a folder, or PACKAGE:PATH of an installed package.")
+    ],
+    adapter: Annotated[str, typer.Option(help="Its adapter: a Python file, `holosoma` or `deploy`.", metavar="FILE")],
+    arms: Annotated[
+        Literal["measured", "default", "free", "own"],
+        typer.Option(
+            help="Arms held by this project and observed as measured or in the controller's default posture; or moved "
+            "by the controller in all trials (own) or in those without an object (free)."
+        ),
+    ] = "measured",
+    posture: Annotated[bool, typer.Option("--posture", help="Also send it commanded height and torso pitch.")] = False,
+    engine: Annotated[
+        Literal["mujoco", "both"] | None,
+        typer.Option(help="MuJoCo alone, or some cells in Drake, too (default: both where Drake is installed)."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
+    out: Annotated[Path, typer.Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
 ) -> None:
     """Play the suites and write the page. Raises UsageError, RecipeError, and StageFailed where the controller cannot
-    be used.
-
-    `adapter`: the name of a shipped one or a Python file; `posture`: whether it gets commanded height and pitch;
-    `engine`: "mujoco", "both", or by default both where Drake is installed; `suites`: other files than `SUITES`.
-    """
+    be used."""
     require_training("bench carry")
     from iowbc.adapters.source import SHIPPED, policy_digest, policy_path
 
@@ -80,7 +86,7 @@ def carry(
     }
     overrides = [f"eval.public.{name}={json.dumps(value)}" for name, value in values.items()]
     overrides.append(f"task.references.upright={json.dumps(not posture)}")
-    files = suites or {name: recipe_file("public").parent / "public" / file for name, file in SUITES.items()}
+    files = {name: recipe_file("public").parent / "public" / file for name, file in SUITES.items()}
     skipped = "left out by --engine mujoco" if engine == "mujoco" else None if drake else NO_DRAKE
     recipes = {name: load_recipe(files[name], overrides).recipe for name in SUITES if name == "mujoco" or not skipped}
     played = {name: _play(recipe, workers or os.cpu_count() or 1) for name, recipe in recipes.items()}

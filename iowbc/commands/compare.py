@@ -4,19 +4,22 @@ import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from rich.console import Console
 
+from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
 from iowbc.commands.needs import require_training
-from iowbc.commands.printed import filming, print_json, shown_path, tell
+from iowbc.commands.printed import filming, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import require_whole
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 from iowbc.report.runs import Group, Run, grouped, metrics_table
@@ -34,12 +37,18 @@ NOT_TRAINED = "not evaluated yet"
 
 
 def compare(
-    store: Store,
-    console: Console,
-    words: Sequence[str],
-    output: Path | None = None,
-    film: bool = False,
-    as_json: bool = False,
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran
+        ),
+    ],
+    output: Annotated[Path | None, typer.Option(help="Output folder (default: runs/compare).")] = None,
+    film: Annotated[
+        bool, typer.Option("--film", help="Also record a film of one trial, all recipes side by side.")
+    ] = False,
+    as_json: options.AsJson = False,
+    runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Write `metrics.md`, learning curves, and the report over all trials, under `output`; print the tables.
 
@@ -47,6 +56,7 @@ def compare(
     a folder of `runs/compare/`. film: also play one trial that all share again, and show the runs side by side. Raises
     `UsageError`.
     """
+    store, console = Store(Runs(runs)), stdout_console()
     found = [named(store, word) for word in points_of(store, words)]
     members = [name for word in words for name in members_of(word)]
     if len(found) < 2 and not members:
@@ -83,8 +93,26 @@ def compare(
         tell(console, shown_path(path) + (f"/ ({count} file{'s' if count != 1 else ''})" if path.is_dir() else ""))
 
 
-def report(store: Store, console: Console, words: Sequence[str], output: Path) -> None:
+def report(
+    words: Annotated[
+        list[str],
+        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
+    ],
+    output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(help="Replay and plot this log of `iowbc robot RECIPE` instead (default output: MCAP.png)."),
+    ] = None,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
     """Write one HTML file about what the words name, which opens anywhere without a network. Raises `UsageError`."""
+    store, console = Store(Runs(runs)), stdout_console()
+    if log is not None:
+        from iowbc.commands.robot_log import report_log
+
+        report_log(console, words[0], log, output or log.with_suffix(".png"))
+        return
+    output = output or store.runs.reports / f"{'-'.join(Path(word).stem for word in words)}.html"
     found = [named(store, word) for word in points_of(store, words)]
     single = [run.label for run in found if not run.recipe]
     if single:

@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from rich.console import Console
 
+from iowbc.commands import options
 from iowbc.commands.lookup import named
-from iowbc.commands.printed import hanging, print_json, tell
+from iowbc.commands.printed import hanging, print_json, stdout_console, tell
 from iowbc.errors import UsageError, shown
 from iowbc.pipeline.code import changed_code
 from iowbc.pipeline.console.wording import KEY_LENGTH, figure
 from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.store.artifact import Artifact
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
 from iowbc.recipe.reading.loading import load_recipe
@@ -26,8 +27,14 @@ ABSENT = "(absent)"
 """In place of a value that one of the two has not."""
 
 
-def diff(store: Store, console: Console, first: str, second: str, as_json: bool = False) -> None:
+def diff(
+    first: options.Named,
+    second: options.Named,
+    as_json: options.AsJson = False,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
     """Print the differences. Each of the two is whatever `show` takes, or a recipe file that has not run."""
+    store, console = Store(Runs(runs)), stdout_console()
     lines = list(difference_lines(_either(store, first), _either(store, second)))
     if as_json:
         print_json(console, {"first": first, "second": second, "differences": lines})

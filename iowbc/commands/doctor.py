@@ -10,12 +10,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+import typer
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.commands import options
+from iowbc.commands.printed import stdout_console
 from iowbc.pipeline.console.wording import duration
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.writability import obstacle
@@ -74,19 +76,20 @@ class Finding:
     text: str
 
 
-def examine(runs: Runs, console: Console) -> int:
-    """Print all findings; returns 1 where something essential fails, else 0."""
+def doctor(runs: options.RunsFolder = options.RUNS) -> None:
+    """Print all findings; exits with 1 where something essential fails, else 0."""
+    console = stdout_console()
     table = Table(box=None, padding=(0, 1), show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
-    found = list(findings(runs))
+    found = list(findings(Runs(runs)))
     for one in found:
         table.add_row(one.name, Text(one.verdict, style=STYLES[one.verdict]), Text(one.text))
     console.print(table)
     fit = all(one.verdict != "bad" for one in found)
     console.print("fit to run recipes" if fit else "not fit to run recipes: see the lines marked bad", highlight=False)
-    return 0 if fit else 1
+    raise typer.Exit(0 if fit else 1)
 
 
 def findings(runs: Runs) -> Iterator[Finding]:

@@ -3,22 +3,35 @@
 import os
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
-from rich.console import Console
+import typer
 
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import named
 from iowbc.commands.needs import require_training
-from iowbc.commands.printed import shown_path, tell
+from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.writability import require_writable
 
 
-def export_page(store: Store, console: Console, word: str, folder: Path) -> None:
+def export(
+    word: Annotated[
+        str,
+        typer.Argument(
+            help="Recipe, RECIPE/export, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
+        ),
+    ],
+    folder: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
     """Write the page of what a word names into a folder, and say how to look at it. Raises `UsageError`."""
     require_training("export")
+    store = Store(Runs(runs))
     exported = exported_folder(store, word)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():
         raise UsageError(f"--web {folder}: holds other files; give an empty folder, or one that this command has made")
@@ -27,7 +40,7 @@ def export_page(store: Store, console: Console, word: str, folder: Path) -> None
 
     from iowbc.web.page import write_page
 
-    say = partial(tell, console)
+    say = partial(tell, stdout_console())
     write_page(exported, folder, store.runs.npm, say)
     whole = sum(path.stat().st_size for path in folder.iterdir())
     say(f"{shown_path(folder)} ({size(whole)}): copy it to any web server; to look at it here:")

@@ -2,20 +2,22 @@
 
 import shutil
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Annotated
 
-from rich.console import Console
+import typer
 
+from iowbc.commands import options
 from iowbc.commands.lookup import known_recipes, last_used
-from iowbc.commands.printed import shown_path, tell
+from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.errors import UsageError, nearest
 from iowbc.files import OLD
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
 from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.publishing import PUBLISHING
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
 from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
@@ -29,35 +31,36 @@ PRECIOUS = 3600.0
 """A stage that took longer [s] is removed by its recipe's name alone."""
 
 
-@dataclass(frozen=True)
-class Scope:
-    """Scope of a removal."""
+def gc(
+    unused: Annotated[bool, typer.Option("--unused", help="Remove artifacts that no recipe uses.")] = False,
+    recipes: Annotated[
+        list[str] | None,
+        typer.Option("--recipe", help="Remove this recipe's record and the artifacts that only it uses."),
+    ] = None,
+    work: Annotated[bool, typer.Option("--work", help="Remove checkpoints of unfinished stages.")] = False,
+    damaged: Annotated[bool, typer.Option("--damaged", help="Remove artifacts set aside as damaged.")] = False,
+    older_than: Annotated[float, typer.Option(help="Minimum age of removed items.", min=0.0, metavar="DAYS")] = 0.0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the removals without removing anything.")] = False,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Remove what the options name, or list it. Raises `UsageError` where they name nothing.
 
-    unused: bool = False
-    """Artifacts that no recipe ever used, and remains of processes that died; with `older_than` also those that none
-    used lately."""
-    recipes: tuple[str, ...] = ()
-    """These recipes' records, and artifacts that they used and no other recipe did."""
-    work: bool = False
-    """Scratch and checkpoints of stages that did not finish, and journals of their runs that MLflow has."""
-    damaged: bool = False
-    """Artifacts that were set aside as damaged."""
-    older_than: float = 0.0
-    """Of all these only what is older [days], and of artifacts in use before what has not been used for as long."""
-
-
-def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None:
-    """Remove what the scope names, or list it. Raises `UsageError` without a scope."""
-    if not (scope.unused or scope.recipes or scope.work or scope.damaged):
+    unused: artifacts that no recipe ever used, and remains of processes that died; with `older_than` also those that
+    none used lately. recipes: their records, and artifacts that they used and no other recipe did. work: scratch and
+    checkpoints of stages that did not finish, and journals of their runs that MLflow has. older_than: of all these only
+    what is older [days], and of artifacts in use before what has not been used for as long.
+    """
+    if not (unused or recipes or work or damaged):
         raise UsageError(
             "gc removes only what it is told to: --unused (artifacts that no recipe ever used), --recipe NAME, "
             "--work (unfinished stages), --damaged; --older-than DAYS narrows it, --dry-run only lists"
         )
+    store, console = Store(Runs(runs)), stdout_console()
     if store.runs.root.exists() and not dry_run:
         require_writable_runs(store.runs)
     total = 0
-    for path in dict.fromkeys(_doomed(store, scope)):
-        if time.time() - path.stat().st_mtime < scope.older_than * DAY:
+    for path in dict.fromkeys(_doomed(store, unused, recipes or (), work, damaged, older_than)):
+        if time.time() - path.stat().st_mtime < older_than * DAY:
             continue
         count = sum(file.stat().st_size for file in (path, *path.rglob("*")) if file.is_file())
         total += count
@@ -70,19 +73,21 @@ def collect(store: Store, console: Console, scope: Scope, dry_run: bool) -> None
     console.print(f"{size(total)} in all", highlight=False)
 
 
-def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
-    runs, recipes = store.runs, known_recipes(store)
-    for recipe in scope.recipes:
-        if recipe not in recipes:
-            listing = ", ".join(recipes) or "none"
-            text = f"no such recipe has run; those that have: {listing}{nearest(recipe, recipes)}"
+def _doomed(
+    store: Store, unused: bool, recipes: Sequence[str], work: bool, damaged: bool, older_than: float
+) -> Iterator[Path]:
+    runs, known = store.runs, known_recipes(store)
+    for recipe in recipes:
+        if recipe not in known:
+            listing = ", ".join(known) or "none"
+            text = f"no such recipe has run; those that have: {listing}{nearest(recipe, known)}"
             raise UsageError(f"--recipe {recipe}: {text}")
     own = [artifact for artifact in store.artifacts() if not artifact.published]
     free = [artifact for artifact in own if not holder(runs, artifact.manifest.key)]
-    if scope.unused:
-        last = {artifact.manifest.key for name in recipes for artifact in last_used(store, name).values()}
-        limit = time.time() - scope.older_than * DAY if scope.older_than else 0.0
-        spared = last | {key for name in recipes for key, used in ever_used(runs, name).items() if used >= limit}
+    if unused:
+        last = {artifact.manifest.key for name in known for artifact in last_used(store, name).values()}
+        limit = time.time() - older_than * DAY if older_than else 0.0
+        spared = last | {key for name in known for key, used in ever_used(runs, name).items() if used >= limit}
         for artifact in free:
             if artifact.manifest.key not in spared and artifact.manifest.seconds < PRECIOUS:
                 yield artifact.folder
@@ -91,19 +96,19 @@ def _doomed(store: Store, scope: Scope) -> Iterator[Path]:
             restorable = path.suffix == OLD and not path.with_name(key).exists()
             if not restorable and not holder(runs, key) and not holder(runs, PUBLISHING):
                 yield path
-    others = {key for name in recipes if name not in scope.recipes for key in ever_used(runs, name)}
-    for recipe in scope.recipes:
+    others = {key for name in known if name not in recipes for key in ever_used(runs, name)}
+    for recipe in recipes:
         keys = ever_used(runs, recipe).keys() - others
         yield from (artifact.folder for artifact in free if artifact.manifest.key in keys)
         yield record_path(runs, recipe)
-    if scope.work:
+    if work:
         yield from (folder for folder, _ in unfinished(runs) if not holder(runs, folder.name))
         for path in runs.tracking.glob("*.jsonl"):
             with Journal(path) as journal:
                 if journal.acquire() and not unsent(path):
                     yield path
                     yield sent_path(path)
-    if scope.damaged:
+    if damaged:
         yield from runs.damaged.glob("*")
 
 

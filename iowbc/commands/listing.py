@@ -2,16 +2,18 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from rich.columns import Columns
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
-from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json, shown_path, tell
+from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.errors import require_known, shown
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import KEY_LENGTH, ago, duration, figure, size
@@ -19,6 +21,7 @@ from iowbc.pipeline.nested import flattened
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import ever_used, named_folder, recall
 from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Progress, unfinished
 from iowbc.pipeline.tracking.delivery import DAMAGED_LINE
@@ -26,8 +29,9 @@ from iowbc.pipeline.tracking.tracker import backlog
 from iowbc.recipe.recipe import PIPELINE, Recipe
 
 
-def print_status(store: Store, console: Console, as_json: bool = False) -> None:
+def status(as_json: options.AsJson = False, runs: options.RunsFolder = options.RUNS) -> None:
     """Print running and unfinished stages, the finished stages of each recipe, and the backlog of MLflow."""
+    store, console = Store(Runs(runs)), stdout_console()
     if as_json:
         print_json(console, _data(store))
         return
@@ -86,8 +90,15 @@ METRICS_SHOWN = 2
 """Metrics of an artifact in its row; `show` has all."""
 
 
-def list_artifacts(store: Store, console: Console, stage: str | None, as_json: bool = False) -> None:
+def ls(
+    stage: Annotated[
+        str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
+    ] = None,
+    as_json: options.AsJson = False,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
     """A row for each artifact, oldest first. Raises `UsageError` for an unknown stage."""
+    store, console = Store(Runs(runs)), stdout_console()
     if stage is not None:
         require_known(stage, "stage", PIPELINE)
     users: dict[str, list[str]] = {}
@@ -120,8 +131,9 @@ def list_artifacts(store: Store, console: Console, stage: str | None, as_json: b
         console.print(f"nothing is stored in {store.runs.store} yet; `iowbc run RECIPE` makes it", highlight=False)
 
 
-def show(store: Store, console: Console, word: str, as_json: bool = False) -> None:
+def show(word: options.Named, as_json: options.AsJson = False, runs: options.RunsFolder = options.RUNS) -> None:
     """All of one artifact, or the stages and metrics of a recipe."""
+    store, console = Store(Runs(runs)), stdout_console()
     found = named(store, word)
     if as_json:
         artifacts = [

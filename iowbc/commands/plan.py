@@ -3,19 +3,22 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands.printed import hanging, plain_table, print_json, tell
+from iowbc.commands import options
+from iowbc.commands.printed import hanging, plain_table, print_json, stdout_console, tell
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.pipeline.console.wording import KEY_LENGTH, duration, short
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage import Stage
-from iowbc.pipeline.stage_plan import StagePlan
+from iowbc.pipeline.stage_plan import Options, StagePlan
 from iowbc.pipeline.store.digests import data_digest
+from iowbc.pipeline.store.runs import Runs
 
 REASONS_SHOWN = 8
 """Reasons of a stage that are printed; the rest is counted."""
@@ -36,7 +39,29 @@ Planned = Mapping[str, Sequence[PlannedStage]]
 """The stages of each recipe, by its name."""
 
 
-def plan(request: Request, console: Console, as_json: bool = False) -> None:
+def plan(
+    recipe: options.RecipeFile,
+    overrides: options.Overrides = None,
+    until: options.Until = None,
+    force: options.Force = None,
+    on_code_change: options.OnCodeChange = "report",
+    as_sweep: Annotated[bool, typer.Option("--sweep", help="Plan a sweep: `--set` accepts several values.")] = False,
+    file: options.SweepFile = None,
+    as_json: options.AsJson = False,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Print what would run of a recipe or a study, or of a sweep."""
+    from iowbc.commands.sweep import SweepRequest, plan_sweep
+
+    asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
+    request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
+    if as_sweep or file is not None:
+        plan_sweep(SweepRequest(request, file, None), console, as_json)
+    else:
+        print_plan(request, console, as_json)
+
+
+def print_plan(request: Request, console: Console, as_json: bool = False) -> None:
     """Print what would run, and why; of a study a table of what would run of each recipe."""
     each = [one for planner in planners(request) for one in in_order(planner)]
     longest: dict[tuple[Path, tuple[str, ...]], Planner] = {}

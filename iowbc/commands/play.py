@@ -5,10 +5,12 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import typer
 from rich.console import Console
 
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import (
     in_training,
     input_of,
@@ -19,16 +21,17 @@ from iowbc.commands.lookup import (
     world_of,
 )
 from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
-from iowbc.commands.printed import filming, tell
+from iowbc.commands.printed import filming, stdout_console, tell
 from iowbc.commands.process import close_on_termination
 from iowbc.commands.request import prepared
 from iowbc.commands.results import evaluated_actor
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import Interrupted, UsageError, require_known
-from iowbc.evaluation.play_request import PlayRequest as PlayRequest
+from iowbc.evaluation.play_request import PlayRequest
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.last_used import recall, require_whole
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.reading.finding import SUFFIXES
@@ -53,23 +56,52 @@ class Planned:
     """By stage: the stored ones that it plans to use."""
 
 
-def play_word(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest) -> int:
-    """Play an episode of what a word names. Returns the exit code."""
+def play(
+    word: Annotated[
+        str,
+        typer.Argument(
+            help="Recipe, RECIPE/STAGE, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
+        ),
+    ],
+    stage: Annotated[
+        str | None, typer.Option(help="Stage whose policy is played (default: the last one available).")
+    ] = None,
+    scene: options.SceneName = "lift",
+    mass: Annotated[float, typer.Option(help="Object mass [kg]; 0 removes the object.", min=0.0)] = 4.0,
+    partner_share: Annotated[
+        float, typer.Option(help="Share of the weight that the partner bears.", min=0.0, max=1.0)
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
+    disturbances: Annotated[bool, typer.Option("--disturbances", help="Enable random disturbances.")] = False,
+    video: Annotated[
+        Path | None, typer.Option(help="Record a film instead of opening a window.", metavar="MP4")
+    ] = None,
+    web: options.Web = False,
+    port: options.Port = None,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Play an episode of what a word names, in the viewer, in the browser or as a film. Raises `UsageError`."""
+    page, store, console = options.page_port(web, port), Store(Runs(runs)), stdout_console()
+    request = PlayRequest(
+        scene=scene, mass=mass, partner_share=partner_share, seed=seed, disturbances=disturbances, video=video
+    )
+    if page is not None:
+        play_on_web(store, console, word, stage, request, page)
+        return
     require_training("play")
     close_on_termination()
     source = named_source(store, console, word, stage, request.scene)
 
-    from iowbc.evaluation.play import play
+    from iowbc.evaluation.play import play as play_episode
 
     try:
         with filming(console, request.video) as progress:
-            shown = play(source, request, progress=progress)
+            shown = play_episode(source, request, progress=progress)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
-        return 0
+        return
     made = f"; {request.video} has {shown.frames} pictures" if request.video else ""
     tell(console, f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}")
-    return 0
 
 
 def play_on_web(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, port: int) -> None:

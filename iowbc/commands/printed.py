@@ -1,6 +1,7 @@
 """Output of commands: plain lines, tables, paths, the progress of a film, and JSON for other programs."""
 
 import os
+import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterator
@@ -21,6 +22,15 @@ NARROW = 100
 """Terminals of fewer characters than this leave out what `show` tells."""
 INTERVAL = 10.0
 """Seconds between two lines about a film, where the output is not a terminal."""
+PIPE_WIDTH = 160
+"""Characters in a line of a table where the output is not a terminal."""
+
+
+def stdout_console() -> Console:
+    """The console of standard output."""
+    columns = os.environ.get("COLUMNS", "")
+    width = int(columns) if columns.isdecimal() and int(columns) > 0 else PIPE_WIDTH
+    return Console(width=None if sys.stdout.isatty() else width)
 
 
 def plain_table(*columns: str) -> Table:

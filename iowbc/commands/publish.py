@@ -1,23 +1,41 @@
 """`iowbc publish`: put a recipe's finished artifacts into the repository, so that a fresh clone starts from them."""
 
-from collections.abc import Sequence
+from typing import Annotated
 
-from rich.console import Console
+import typer
 
-from iowbc.commands.printed import shown_path, tell
+from iowbc.commands import options
+from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
-from iowbc.pipeline.store.publishing import publish, published_size
+from iowbc.pipeline.stage_plan import Options
+from iowbc.pipeline.store.publishing import publish as copied
+from iowbc.pipeline.store.publishing import published_size
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.writability import require_writable_runs
 
 
-def publish_recipe(request: Request, console: Console, without: Sequence[str] = ()) -> None:
+def publish(
+    recipe: options.RecipeFile,
+    overrides: options.Overrides = None,
+    until: options.Until = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="File to leave out (repeatable); state.safetensors is needed only to extend a training.",
+            metavar="FILE",
+        ),
+    ] = None,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
     """Copy what the recipe's stages have to `runs/published/`, but for the files named in `without`, and verify it.
 
     Raises `UsageError` where a stage has not run, and where no artifact has a file of such a name. Code that changed
     since an artifact was made is no obstacle, and is said.
     """
+    request, console = Request(recipe, overrides or (), Runs(runs), Options(until)), stdout_console()
+    without = without or []
     found = planners(request)
     steps = [step for planner in found for step in planner.plan()]
     missing = [step.stage.name for step in steps if not step.cached]
@@ -34,7 +52,7 @@ def publish_recipe(request: Request, console: Console, without: Sequence[str] = 
             raise UsageError(f"--without {name}: no artifact has such a file; files: {', '.join(sorted(names))}")
     for key, artifact in artifacts.items():
         to_leave_out = set(without) & set(artifact.manifest.files) - set(artifact.manifest.omitted)
-        copy = artifact if artifact.published and not to_leave_out else publish(request.runs, artifact, without)
+        copy = artifact if artifact.published and not to_leave_out else copied(request.runs, artifact, without)
         left_out = ", ".join(copy.manifest.omitted)
         lacks = [f"without {left_out}"] if left_out else []
         what = f"{artifact.manifest.stage}: {shown_path(copy.folder)} ({size(copy.size)})"

@@ -6,12 +6,14 @@ from collections.abc import Collection
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import typer
 from rich.console import Console
 
+from iowbc.commands import completion, options
 from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
-from iowbc.commands.printed import plain_table, tell
+from iowbc.commands.printed import plain_table, stdout_console, tell
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError, require_known
@@ -26,6 +28,17 @@ LISTENING = 3.0
 """For how long the bus is listened to before the checks [s]; the battery's state comes once or twice a second."""
 POLLING = 5
 """Periods of the bus between two looks for a request of the page."""
+What = Annotated[
+    str,
+    typer.Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=completion.ran),
+]
+Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
+Domain = Annotated[int, typer.Option(help="DDS domain; the G1's is 0.", min=0, max=230)]
+Scene = Annotated[str, typer.Option(help="Scene, which sets grasp and expected load.", metavar="SCENE")]
+InStep = Annotated[
+    bool, typer.Option("--lockstep", help="Synchronise with the other process step by step, on a busy machine.")
+]
+Seconds = Annotated[float, typer.Option(help="End after this time [s].", min=0.0)]
 
 
 def require_bus(command: str) -> None:
@@ -35,19 +48,21 @@ def require_bus(command: str) -> None:
 
 
 def robot(
-    console: Console,
-    what: str,
-    *,
-    network: str,
-    domain: int,
-    scene: str,
-    commands: str,
-    object_pose: str | None,
-    log: Path | None,
-    waive: Collection[str] | None,
-    dry_run: bool,
-    lockstep: bool,
-    seconds: float,
+    what: What,
+    network: Network = "lo",
+    domain: Domain = 0,
+    scene: Scene = "free",
+    commands: Annotated[
+        str, typer.Option(help="Source of commands: remote, keyboard or udp:PORT.", metavar="SOURCE")
+    ] = "keyboard",
+    object_pose: Annotated[
+        str | None, typer.Option(help="Source of the object's pose: udp:PORT (default: with the commands).")
+    ] = None,
+    log: Annotated[Path | None, typer.Option(help="Log every message to this new file.", metavar="MCAP")] = None,
+    waive: Annotated[list[str] | None, typer.Option(help="Ignore a failure of this check (repeatable).")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check the robot and send nothing.")] = False,
+    lockstep: InStep = False,
+    seconds: Seconds = float("inf"),
 ) -> None:
     """Check the robot and drive it. Raises UsageError where a check fails."""
     require_bus("robot")
@@ -60,6 +75,7 @@ def robot(
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
     from iowbc.onboard.replay import export_digest
 
+    console = stdout_console()
     controller = Controller.load(exported_folder(what))
     require_known(scene, "scene", [name for name, _ in controller.contract.references.grasps])
     source = operator(commands, controller.contract)
@@ -126,31 +142,33 @@ def report_checks(console: Console, found: "list[Check]", waived: Collection[str
         )
 
 
-def simulated_robot(
-    console: Console,
-    what: str,
-    *,
-    network: str,
-    domain: int,
-    scene: str,
-    mass: float | None,
-    seed: int,
-    support: Literal["band", "fixture", "none"] | None,
-    release: float,
-    object_pose: str | None,
-    lockstep: bool,
-    seconds: float,
-    port: int | None,
+def robot_sim(
+    what: What,
+    network: Network = "lo",
+    domain: Domain = 0,
+    scene: Scene = "free",
+    mass: Annotated[float | None, typer.Option(help="Object mass [kg] (default: random).", min=0.0)] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 0,
+    support: Annotated[
+        Literal["band", "fixture", "none"] | None,
+        typer.Option(help="Initial support of the robot (default: band; with an object: fixture)."),
+    ] = None,
+    release: Annotated[float, typer.Option(help="Time at full gains before the support releases [s].", min=0.0)] = 3.0,
+    object_pose: Annotated[
+        str | None, typer.Option(help="Send the object's pose to udp:PORT of this machine, as motion capture would.")
+    ] = None,
+    lockstep: InStep = False,
+    seconds: Seconds = float("inf"),
+    web: options.Web = False,
+    port: options.Port = None,
 ) -> None:
-    """Simulate a robot on the bus until it is stopped; `port` of a page that shows it, None for no page.
-
-    `object_pose`: `udp:PORT` to which the object's pose is sent, None to send none.
-    """
+    """Simulate a robot on the bus until it is stopped."""
+    page = options.page_port(web, port)
     require_bus("robot-sim")
     require_training("robot-sim")
-    if port is not None:
+    if page is not None:
         require_viewer()
-        require_free(port)
+        require_free(page)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.operators import Ranges, pose_port
@@ -159,6 +177,7 @@ def simulated_robot(
     from iowbc.twin.support import Support
     from iowbc.twin.tracking import ObjectTracking
 
+    console = stdout_console()
     tracking = None if object_pose is None else ObjectTracking(pose_port(object_pose))
     folder = exported_folder(what)
     world, controller = exported_world(folder), Controller.load(folder)
@@ -175,11 +194,11 @@ def simulated_robot(
     twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
     stop, told = _stop_request(), False
     view = None
-    if port is not None:
+    if page is not None:
         from iowbc.live.remote_view import RemoteView
 
-        view = RemoteView(twin.simulation, port)
-        tell(console, f"http://{HOST}:{port}")
+        view = RemoteView(twin.simulation, page)
+        tell(console, f"http://{HOST}:{page}")
     bus = DdsBus(network, domain)
     tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
 

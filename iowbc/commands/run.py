@@ -3,14 +3,17 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import typer
 from rich.console import Console
 
+from iowbc.commands import options
 from iowbc.commands.compare import compare, film_together
 from iowbc.commands.needs import require_training
-from iowbc.commands.printed import shown_path, tell
-from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
+from iowbc.commands.plan import print_plan
+from iowbc.commands.printed import shown_path, stdout_console, tell
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, outlasting_readers
 from iowbc.commands.request import Request, in_order, planners
 from iowbc.commands.results import main_tables, print_results
 from iowbc.errors import Interrupted, NoRenderer, PipelineFailed, UsageError
@@ -20,6 +23,7 @@ from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
+from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures
 from iowbc.pipeline.writability import require_writable_runs
@@ -33,7 +37,32 @@ Manner = Literal["usual", "quiet", "verbose"]
 """Amount of a run's output."""
 
 
-def run(request: Request, console: Console, manner: Manner = "usual") -> int:
+def run(
+    recipe: options.RecipeFile,
+    overrides: options.Overrides = None,
+    until: options.Until = None,
+    force: options.Force = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
+    engine: options.Engine = None,
+    address: options.Address = None,
+    dry_run: options.DryRun = False,
+    on_code_change: options.OnCodeChange = "report",
+    quiet: options.Quiet = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print one line per progress step.")] = False,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Run a recipe or a study, or print its plan; exits with the code of the run."""
+    asked = Options(until, frozenset(force or ()), workers, engine, address, on_code_change)
+    request = Request(recipe, overrides or (), Runs(runs), asked)
+    if dry_run:
+        print_plan(request, stdout_console())
+        return
+    manner: Manner = "quiet" if quiet else "verbose" if verbose else "usual"
+    with outlasting_readers():
+        raise typer.Exit(run_request(request, stdout_console(), manner))
+
+
+def run_request(request: Request, console: Console, manner: Manner) -> int:
     """Run a recipe to its end, a failure or an interruption; returns the exit code. Raises `RecipeError`.
 
     The variants of a study run in order, up to the first that does not end; then they are compared.
@@ -43,7 +72,7 @@ def run(request: Request, console: Console, manner: Manner = "usual") -> int:
     require_writable_runs(request.runs)
     try:
         with (
-            engine(request.options, ready[0].loaded.recipe.execution) as cluster,
+            requested_cluster(request.options, ready[0].loaded.recipe.execution) as cluster,
             StopRequest(shown=console.is_terminal and manner == "usual") as stop,
         ):
             if cluster is not None and manner != "quiet":
@@ -65,12 +94,12 @@ def run(request: Request, console: Console, manner: Manner = "usual") -> int:
 
 def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: Console) -> None:
     """Compare the variants of a study, film them side by side, and tell MLflow where that is new."""
-    store, name = Store(request.runs), Path(request.word).stem
+    name = Path(request.word).stem
     words, output = [one.recipe.name for one in loaded], request.runs.compared / name
     before = _report_of(output)
-    compare(store, console, words, output)
+    compare(words, output, runs=request.runs.root)
     try:
-        film = film_together(store, console, words, output)
+        film = film_together(Store(request.runs), console, words, output)
     except (NoRenderer, UsageError) as reason:
         film = None
         tell(console, f"no film: {reason}")
@@ -89,13 +118,13 @@ def _report_of(folder: Path) -> str:
     return "\n".join([main_tables([folder]), *(path.read_text(encoding="utf-8") for path in others)])
 
 
-def engine(options: Options, execution: Execution) -> "AbstractContextManager[Cluster | None]":
+def requested_cluster(asked: Options, execution: Execution) -> "AbstractContextManager[Cluster | None]":
     """The cluster that was asked for, to the end of a block; None where stages run here. Raises `UsageError`."""
-    if (options.engine or execution.engine) == "local":
+    if (asked.engine or execution.engine) == "local":
         return nullcontext()
     from iowbc.pipeline.cluster.connection import connected
 
-    return connected(options.address or execution.address, copy=execution.copy_files)
+    return connected(asked.address or execution.address, copy=execution.copy_files)
 
 
 def run_recipe(

@@ -5,21 +5,24 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from rich.console import Console
 
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import named, record_sweep
 from iowbc.commands.needs import require_training
 from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
-from iowbc.commands.printed import print_json, shown_path, tell
-from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding
+from iowbc.commands.printed import print_json, shown_path, stdout_console, tell
+from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, outlasting_readers
 from iowbc.commands.request import Request, in_order, prepared
-from iowbc.commands.run import engine, run_recipe
+from iowbc.commands.run import requested_cluster, run_recipe
 from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.console.board import Board
 from iowbc.pipeline.planner import Planner
+from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -58,6 +61,45 @@ class SweepRequest:
         further += ["--jobs", str(self.jobs)] if self.jobs else []
         further += ["--points", str(self.most)] if self.most != MOST_POINTS else []
         return replace(self.recipe, verb="sweep", further=further).command([])
+
+
+def sweep(
+    recipe: options.RecipeFile,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
+            metavar="A.B.C=VALUES",
+            autocompletion=completion.paths,
+        ),
+    ] = None,
+    file: options.SweepFile = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(help="Points run in parallel on shared cores (default: 1; with Ray: all cores).", min=1),
+    ] = None,
+    points: Annotated[int, typer.Option(help="Maximum number of points.", min=1)] = MOST_POINTS,
+    until: options.Until = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes per point.", min=1)] = None,
+    engine: options.Engine = None,
+    address: options.Address = None,
+    dry_run: options.DryRun = False,
+    on_code_change: options.OnCodeChange = "report",
+    quiet: options.Quiet = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON (with --dry-run).")] = False,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Run a sweep, or print its plan; exits with the code of the run."""
+    request = Request(
+        recipe, overrides or (), Runs(runs), Options(until, frozenset(), workers, engine, address, on_code_change)
+    )
+    asked = SweepRequest(request, file, jobs, points)
+    if dry_run:
+        plan_sweep(asked, stdout_console(), as_json)
+        return
+    with outlasting_readers():
+        raise typer.Exit(run_sweep(asked, stdout_console(), quiet))
 
 
 def ready(asked: SweepRequest) -> tuple[Sweep, list[Planner]]:
@@ -103,7 +145,7 @@ def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 
-def sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
+def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
     """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
 
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
@@ -121,7 +163,7 @@ def sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
     record: RunRecord | None = None
     try:
         with (
-            engine(asked.recipe.options, execution) as cluster,
+            requested_cluster(asked.recipe.options, execution) as cluster,
             StopRequest(shown=console.is_terminal and not quiet) as stop,
         ):
             if cluster is not None:

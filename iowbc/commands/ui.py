@@ -5,11 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+from typing import Annotated
 
-from rich.console import Console
+import typer
 
+from iowbc.commands import options
 from iowbc.commands.needs import HOST, require_free, require_training
-from iowbc.commands.printed import tell
+from iowbc.commands.printed import stdout_console, tell
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, setup_lock
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
@@ -21,8 +23,12 @@ VIEW = "iowbc"
 """Name under which MLflow keeps how the runs are shown."""
 
 
-def serve(runs: Runs, console: Console, port: int) -> int:
-    """Serve until interrupted; returns the server's exit code. Raises `UsageError` where it cannot begin."""
+def ui(
+    port: Annotated[int, typer.Option(help="Local port.", min=1, max=65535)] = 5000,
+    folder: options.RunsFolder = options.RUNS,
+) -> None:
+    """Serve until interrupted; exits with the server's code. Raises `UsageError` where it cannot begin."""
+    runs, console = Runs(folder), stdout_console()
     require_training("ui")
     require_writable_runs(runs)
     require_free(port)
@@ -44,7 +50,7 @@ def serve(runs: Runs, console: Console, port: int) -> int:
     environment.setdefault("PYTHONWARNINGS", "ignore")  # of MLflow's own code, which a user can do nothing about
     with subprocess.Popen(command, env=environment) as server:
         try:
-            return server.wait()
+            raise typer.Exit(server.wait())
         finally:
             server.terminate()
 

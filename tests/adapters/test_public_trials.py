@@ -147,13 +147,14 @@ def test_upright_references_leave_out_height_and_pitch(robot: Robot) -> None:
 
 
 @pytest.fixture
-def suites(tmp_path: Path) -> dict[str, Path]:
+def suites(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
     """The suites of the bench at the smallest size; MuJoCo stands in for Drake."""
     files = {engine: tmp_path / f"suite_{engine}.yaml" for engine in SUITES}
     for engine, written in files.items():
         lifting = SHORT["lifting"] | {"undisturbed": [], "with_share": [], "no_object": engine == "mujoco"}
         changes = SHORT | {"lifting": lifting, "scripts": None, "pushing": None}
         written.write_text(yaml.safe_dump({"extends": str(RECIPES / "public" / "carry.yaml"), "eval": changes}))
+    monkeypatch.setattr("iowbc.commands.bench_carry.SUITES", files)
     return files
 
 
@@ -163,7 +164,7 @@ def test_the_bench_writes_a_page_with_the_digests_of_controller_adapter_and_suit
     monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: "1.2.3")
     adapter, page = tmp_path / "mine.py", tmp_path / "page.md"
     adapter.write_text("from iowbc.adapters.holosoma import adapter\n")
-    carry(str(file), str(adapter), arms="measured", posture=False, workers=1, out=page, suites=suites)
+    carry(str(file), str(adapter), workers=1, out=page)
     text = page.read_text()
     assert f"walker.onnx, SHA-256 {policy_digest(file)}" in text
     assert f"mine.py, SHA-256 {hashlib.sha256(adapter.read_bytes()).hexdigest()}" in text
@@ -184,14 +185,13 @@ def test_every_trial_in_drake_is_one_of_the_bench() -> None:
     assert all(trial in planned for trial in part)
 
 
-def test_the_tutorial_plays_a_controller_of_ones_own(
-    suites: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("suites")
+def test_the_tutorial_plays_a_controller_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("iowbc.commands.bench_carry.drake_version", lambda: None)
     monkeypatch.chdir(tmp_path)
     write("tutorials/controller.md", tmp_path)
     policy = linear(tmp_path / "walker.onnx", np.zeros((15, 55), np.float32), np.zeros(15, np.float32))
-    carry("walker.onnx", "my_adapter.py", arms="measured", posture=True, workers=1, out=Path("page.md"), suites=suites)
+    carry("walker.onnx", "my_adapter.py", posture=True, workers=1, out=Path("page.md"))
     page = Path("page.md").read_text()
     assert "height and pitch" in page
     assert "| in Drake | not installed: pip install 'iowbc[drake]' |" in page

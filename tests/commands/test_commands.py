@@ -258,9 +258,9 @@ def test_what_is_damaged_is_neither_played_nor_compared_nor_reported(folder: Pat
     (folder / "runs" / "store" / "eval" / key("second", "eval") / "tables" / "counts.md").write_bytes(bytes(range(256)))
     store, console = Store(Runs(folder / "runs")), Console()
     with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
-        compare(store, console, ["first", "second"], folder / "compared")
+        compare(["first", "second"], folder / "compared", runs=folder / "runs")
     with pytest.raises(UsageError, match=r"counts\.md has 256 bytes.*to make it anew: iowbc run"):
-        report(store, console, ["second"], folder / "second.html")
+        report(["second"], folder / "second.html", runs=folder / "runs")
     (folder / "runs" / "store" / "teacher" / key("second", "teacher") / "recipe.yaml").write_text("simulation: 3\n")
     with pytest.raises(UsageError, match=r"recipe\.yaml has 14 bytes.*to make it anew: iowbc run"):
         named_source(store, console, "second/teacher", None, "lift")

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from rich.console import Console
+import typer
 
 from iowbc.commands import doctor
 from iowbc.pipeline.store.runs import Runs
@@ -17,12 +17,14 @@ def test_this_machine_is_fit(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("script", ["import os; os.kill(os.getpid(), 11)", "raise ValueError('no')"])
 def test_a_crash_of_the_contact_model_is_essential(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], script: str
 ) -> None:
     monkeypatch.setattr(doctor, "CONTACT_MODEL", script)
-    console = Console(record=True, width=200)
-    assert doctor.examine(Runs(tmp_path / "runs"), console) == 1
-    assert "pip install crocoddyl==3.2.1 pin==4.0.0" in console.export_text()
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(typer.Exit) as ended:
+        doctor.doctor(tmp_path / "runs")
+    assert ended.value.exit_code == 1
+    assert "pip install crocoddyl==3.2.1 pin==4.0.0" in capsys.readouterr().out
 
 
 def test_every_robot_is_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
-from iowbc.commands.export import export_page, exported_folder
+from iowbc.commands.export import export, exported_folder
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
@@ -25,12 +24,12 @@ def test_a_page_is_of_an_exported_controller(store: Store) -> None:
         exported_folder(store, "first/teacher")
 
 
-def test_a_folder_with_other_files_is_left_alone(store: Store, tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_left_alone(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "contract.json").write_text("{}")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
     with pytest.raises(UsageError, match="holds other files"):
-        export_page(store, Console(), str(tmp_path), tmp_path / "mine")
+        export(str(tmp_path), tmp_path / "mine", folder / "runs")
 
 
 def test_without_node_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,8 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import iowbc
+from iowbc.cli import BENCHMARKS, COMMANDS, app
 from iowbc.commands import completion
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +72,15 @@ def test_a_shell_completes_recipes_artifacts_stages_and_paths(folder: Path, monk
 
 
 @pytest.mark.parametrize(
-    ("line", "answer"), [("iowbc run --until tea", "teacher"), ("iowbc play second/tea", "second/teacher")]
+    ("line", "answer"),
+    [
+        ("iowbc run --until tea", "teacher"),
+        ("iowbc play second/tea", "second/teacher"),
+        ("iowbc doc", "doctor"),
+        ("iowbc bench tr", "train"),
+        ("iowbc bench sim --env", "--environments"),
+        ("iowbc run quick", "quickstart"),
+    ],
 )
 def test_the_command_line_answers_a_shells_question(folder: Path, line: str, answer: str) -> None:
     place = {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" ")), "IOWBC_RUNS": "runs"}
@@ -78,3 +88,21 @@ def test_the_command_line_answers_a_shells_question(folder: Path, line: str, ans
     words = [sys.executable, "-m", "iowbc"]
     done = subprocess.run(words, env=asked, cwd=folder, capture_output=True, text=True, check=False)
     assert done.stdout.split() == [answer]
+
+
+def test_the_list_of_commands_is_printed_before_any_of_them_is_imported() -> None:
+    program = (
+        "import sys\nfrom iowbc.cli import app\n"
+        "try:\n    app(['--help'])\n"
+        "finally:\n    print(*(name for name in sys.modules if name.startswith('iowbc.commands.')))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert [line.split()[0] for line in done.stdout.splitlines() if line.startswith("  ")][-20:] == [*COMMANDS, "bench"]
+    assert done.stdout.splitlines()[-1] == "iowbc.commands.process"
+
+
+@pytest.mark.parametrize("words", [*COMMANDS, *(f"bench {name}" for name in BENCHMARKS)])
+def test_every_command_that_is_listed_says_what_it_takes(words: str) -> None:
+    done = CliRunner().invoke(app, [*words.split(), "--help"])
+    assert done.exit_code == 0, done.output
+    assert f"{words} [OPTIONS]" in done.output

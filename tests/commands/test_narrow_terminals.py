@@ -15,7 +15,7 @@ from rich.console import Console
 
 from iowbc.commands.compare import compare
 from iowbc.commands.diff import diff
-from iowbc.commands.listing import list_artifacts, print_status, show
+from iowbc.commands.listing import ls, show, status
 from iowbc.commands.lookup import named
 from iowbc.commands.plan import PlannedStage, plan_table
 from iowbc.commands.printed import hanging
@@ -32,12 +32,17 @@ LONG = "lifting_with_partner_0.5/16kg/E_alpha"
 """The name of a metric as long as an evaluation's are."""
 
 
-def shown(tell: Callable[[Console], object], terminal: bool = False) -> list[str]:
+@pytest.fixture
+def shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
     """Lines that a command writes, of which none is too long."""
-    written = io.StringIO()
-    tell(Console(file=written, width=WIDTH, force_terminal=terminal, color_system=None))
-    lines = [line.rstrip() for line in written.getvalue().splitlines()]
-    assert [line for line in lines if len(line) > WIDTH] == []
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+
+    def lines(command: Callable[..., None], *arguments: object) -> list[str]:
+        command(*arguments)
+        written = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+        assert [line for line in written if len(line) > WIDTH] == []
+        return written
+
     return lines
 
 
@@ -52,8 +57,8 @@ def measured(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
     return store
 
 
-def test_a_comparison_keeps_every_number_and_the_difference(measured: Store) -> None:
-    lines = shown(lambda console: compare(measured, console, ["first", "second"]))
+def test_a_comparison_keeps_every_number_and_the_difference(measured: Store, shown: Callable[..., list[str]]) -> None:
+    lines = shown(compare, ["first", "second"])
     assert lines[0].split() == ["stage", "metric", "first", "second", "Δ", "second"]
     (row,) = [line.split() for line in lines if "0.01235" in line]
     assert row[0] == "teacher"
@@ -91,8 +96,11 @@ def test_a_narrow_comparison_folds_names_then_leaves_out_what_a_difference_tells
     assert others[-1:] == [f"(wider terminals show {left_out})"] or not left_out
 
 
-def test_a_difference_keeps_keys_and_numbers_whole(measured: Store) -> None:
-    lines = shown(lambda console: diff(measured, console, "first", "second"), terminal=True)
+def test_a_difference_keeps_keys_and_numbers_whole(
+    measured: Store, shown: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")  # lines are broken for a terminal alone
+    lines = shown(diff, "first", "second")
     text = " ".join(" ".join(lines).split())
     (key,) = re.findall(r"teacher: key (\w+) -> (\w+)", text)
     assert [len(digits) for digits in key] == [12, 12]
@@ -101,8 +109,10 @@ def test_a_difference_keeps_keys_and_numbers_whole(measured: Store) -> None:
 
 
 @pytest.mark.parametrize("word", ["first", "first/teacher"])
-def test_what_is_shown_of_a_run_keeps_keys_and_metrics_whole(measured: Store, word: str) -> None:
-    lines = shown(lambda console: show(measured, console, word))
+def test_what_is_shown_of_a_run_keeps_keys_and_metrics_whole(
+    measured: Store, shown: Callable[..., list[str]], word: str
+) -> None:
+    lines = shown(show, word)
     manifest = named(measured, "first/teacher").artifacts["teacher"].manifest
     heading = manifest.key if "/" in word else f"teacher {manifest.key[:12]}, made "
     for text in ("count 3", f"{LONG} 0.0123", f"other_{LONG} -1.23", heading):
@@ -115,7 +125,7 @@ def test_what_is_shown_of_a_run_keeps_keys_and_metrics_whole(measured: Store, wo
         assert stages == ["rg-dataset", "rg-fit", "teacher", "distill", "eval", "export"]
 
 
-def test_the_status_keeps_how_far_a_stage_is_and_every_recipe(measured: Store) -> None:
+def test_the_status_keeps_how_far_a_stage_is_and_every_recipe(measured: Store, shown: Callable[..., list[str]]) -> None:
     work = measured.runs.work / ("0123456789abcdef" * 4)
     work.mkdir(parents=True)
     record = {
@@ -132,7 +142,7 @@ def test_the_status_keeps_how_far_a_stage_is_and_every_recipe(measured: Store) -
         "curve": [[step, 0.25 * step] for step in range(200)],
     }
     (work / "progress.json").write_text(json.dumps(record))
-    lines = shown(lambda console: print_status(measured, console))
+    lines = shown(status)
     text = " ".join(" ".join(lines).split())
     assert "teacher of quickstart-seed-0-use_rg-true-d06fd9 (0123456789ab): stopped 2 h 05 min ago" in text
     assert "35 %, 2 h 05 min spent, attempt 2, 12.3 s an episode" in text
@@ -158,14 +168,16 @@ def test_differences_stand_stage_by_stage(folder: Path, command: Command) -> Non
 
 
 @pytest.mark.parametrize("width", [WIDTH, 120])
-def test_a_list_of_artifacts_keeps_every_column_whole(folder: Path, width: int) -> None:
-    written = io.StringIO()
+def test_a_list_of_artifacts_keeps_every_column_whole(
+    folder: Path, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
     store = Store(Runs(folder / "runs"))
     for artifact in store.artifacts("teacher"):
         metrics = {f"a_metric_with_a_name_of_its_own_{number}": 1.5 for number in range(3)}
         (artifact.folder / "summary.json").write_text(json.dumps({"metrics": metrics}))
-    list_artifacts(store, Console(file=written, width=width), None)
-    lines = written.getvalue().splitlines()
+    ls(runs=folder / "runs")
+    lines = capsys.readouterr().out.splitlines()
     assert all(len(line) <= width for line in lines)
     assert lines[0].split()[:6] == ["stage", "key", "used", "by", "made", "took"]
     for artifact in store.artifacts("teacher"):

@@ -5,27 +5,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from iowbc.commands.compare import report
 from iowbc.errors import UsageError
 from iowbc.pipeline.store.artifact import Artifact
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import Store
 
 
 def test_a_report_is_of_recipes_and_an_html_file(folder: Path) -> None:
-    store, console = Store(Runs(folder / "runs")), Console()
     with pytest.raises(UsageError, match="report takes recipes that have run"):
-        report(store, console, ["first/teacher"], folder / "page.html")
+        report(["first/teacher"], folder / "page.html", runs=folder / "runs")
     with pytest.raises(UsageError, match=r"ends in \.html"):
-        report(store, console, ["first"], folder / "page.txt")
+        report(["first"], folder / "page.txt", runs=folder / "runs")
 
 
 def test_what_several_runs_share_is_verified_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     verified, verify = [], Artifact.verify
     monkeypatch.setattr(Artifact, "verify", lambda artifact: (verified.append(artifact.folder), verify(artifact)))
-    report(Store(Runs(folder / "runs")), Console(), ["first", "second"], folder / "page.html")
+    report(["first", "second"], folder / "page.html", runs=folder / "runs")
     assert sorted(path.parent.name for path in verified).count("rg-fit") == 1
     assert len(verified) == len(set(verified)) > 0
 

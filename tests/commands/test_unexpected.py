@@ -18,7 +18,7 @@ BROKEN = """
 from iowbc.commands import listing
 def broken(*arguments):
     raise KeyError("what nobody foresaw")
-listing.list_artifacts = broken
+listing.known_recipes = broken
 from iowbc.cli import main
 main()
 """

@@ -1,28 +1,24 @@
-"""`init`, `schema` and `doctor`: commands to prepare the first run."""
+"""`iowbc init`: recipes and a robot description in a folder of the user's own."""
 
-import json
 import shutil
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from iowbc.cli.options import RunsFolder, console, runs_folder
+from iowbc.commands.printed import shown_path, stdout_console, tell
+from iowbc.errors import UsageError
+from iowbc.files import replacing
+from iowbc.pipeline.writability import require_writable
+from iowbc.recipe.reading.finding import known_files
+from iowbc.robot.description import robot_folder
 
 
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder to create or to fill.", metavar="DIR")],
     robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
 ) -> None:
-    """Copy the recipes and a robot description into a folder of your own."""
-    from iowbc.commands.printed import shown_path, tell
-    from iowbc.errors import UsageError
-    from iowbc.files import replacing
-    from iowbc.pipeline.writability import require_writable
-    from iowbc.recipe.reading.finding import known_files
-    from iowbc.robot.description import robot_folder
-
+    """Copy what is not there yet, and print it. Raises `UsageError`, also where a file would be replaced."""
     try:
         source = robot_folder(robot)
     except FileNotFoundError as error:
@@ -39,35 +35,14 @@ def init(
     if there:
         raise UsageError(f"{', '.join(there)} {'is' if len(there) == 1 else 'are'} there already; name another folder")
     require_writable(folder, "DIR")
+    console = stdout_console()
     for target, origin in origins.items():
         if target in same:
             continue
         with replacing(target) as fresh:
             shutil.copytree(origin, fresh) if origin.is_dir() else shutil.copyfile(origin, fresh)
-        tell(console(), shown_path(target))
-    console().print(f"to begin: cd {folder}, then `iowbc run quickstart`", highlight=False, soft_wrap=True)
-
-
-def schema(output: Annotated[Path | None, typer.Option(help="Output file (default: print).")] = None) -> None:
-    """Write the JSON Schema of recipes, for editors."""
-    from iowbc.errors import UsageError
-    from iowbc.recipe.recipe import recipe_schema
-
-    text = json.dumps(recipe_schema(), indent=2, ensure_ascii=False) + "\n"
-    if output is None:
-        sys.stdout.write(text)
-        return
-    try:
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"--output {output}: cannot be written: {error.strerror}; name another file") from None
-
-
-def doctor(runs: RunsFolder = None) -> None:
-    """Check versions, binaries, rendering, cores, memory and disk."""
-    from iowbc.commands.doctor import examine
-
-    raise typer.Exit(examine(runs_folder(runs), console()))
+        tell(console, shown_path(target))
+    console.print(f"to begin: cd {folder}, then `iowbc run quickstart`", highlight=False, soft_wrap=True)
 
 
 def _content(path: Path) -> dict[str, bytes]:

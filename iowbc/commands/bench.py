@@ -1,0 +1,109 @@
+"""`iowbc bench`: benchmarks of this machine and of two physics engines."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from iowbc.commands import completion, options
+from iowbc.commands.needs import require_training
+from iowbc.errors import IowbcError, UsageError, require_known
+from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.tracking.tracker import record_figures
+from iowbc.pipeline.writability import require_writable_runs
+from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.simulation.holding import SCENES
+from iowbc.robot.description import robot_folder
+
+BenchRecipe = Annotated[Path | None, typer.Argument(help="Recipe file (default: built-in values).", metavar="RECIPE")]
+BenchWorkers = Annotated[list[int] | None, typer.Option("--workers", help="Worker processes (repeatable).", min=1)]
+
+
+def sim(
+    recipe: BenchRecipe = None,
+    scene: options.SceneName = "lift",
+    environments: Annotated[int, typer.Option(help="Environments per worker.", min=1)] = 48,
+    workers: BenchWorkers = None,
+    others: Annotated[bool, typer.Option(help="Also measure other vector environments (default: on).")] = True,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Measure the vector environment. Raises `UsageError`, as the two below do."""
+    own, counts = _checked(runs, recipe, scene), tuple(workers or ())
+    from iowbc.benchmarks import simulation
+
+    figures = simulation.main(own, scene=scene, environments=environments, workers=counts, others=others)
+    record_figures(Runs(runs), "bench-sim", figures)
+
+
+def train(
+    recipe: BenchRecipe = None,
+    scene: options.SceneName = "lift",
+    turns: Annotated[int, typer.Option(help="Number of updates.", min=1)] = 6,
+    others: Annotated[
+        int | None,
+        typer.Option(help="Processes of plain stable-baselines3 (default: one per core; 0 skips it).", min=0),
+    ] = None,
+    runs: options.RunsFolder = options.RUNS,
+) -> None:
+    """Measure the teacher's training."""
+    own = _checked(runs, recipe, scene)
+    from iowbc.benchmarks import training
+
+    record_figures(Runs(runs), "bench-train", training.main(own, scene=scene, turns=turns, others=others))
+
+
+def rg(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: options.RunsFolder = options.RUNS) -> None:
+    """Measure the reference generator's labelling."""
+    own = _checked(runs, recipe)
+    from iowbc.benchmarks import reference
+
+    record_figures(Runs(runs), "bench-rg", reference.main(own, workers=tuple(workers or ())))
+
+
+def control(
+    what: Annotated[
+        str,
+        typer.Argument(
+            help="Export folder, or the recipe that made it.", metavar="WHAT", autocompletion=completion.ran
+        ),
+    ],
+    steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
+    skill: Annotated[Path | None, typer.Option(help="Folder of a skill that commands the controller.")] = None,
+) -> None:
+    """Measure the control step's time of an exported controller, and print it in quantiles."""
+    from iowbc.deploy.timing import step_seconds
+
+    print(f"{what}: {steps:,} control steps of one robot on one thread")
+    print(f"{'':16}{'median':>12}{'99th percentile':>18}{'longest':>12}")
+    for name, taken in zip(("time", "processor time"), 1e3 * step_seconds(what, steps, skill).T, strict=True):
+        median, late, longest = (f"{value:.3f} ms" for value in np.quantile(taken, (0.5, 0.99, 1.0)))
+        print(f"{name:16}{median:>12}{late:>18}{longest:>12}")
+
+
+def engines(
+    robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
+) -> None:
+    """Compare MuJoCo and Drake. Raises `UsageError`, and `IowbcError` where they differ."""
+    require_training("bench")
+    from iowbc.benchmarks import engines
+
+    try:
+        folder = robot_folder(robot)
+    except FileNotFoundError as error:
+        raise UsageError(str(error)) from None
+    differing = [row.name for row in engines.main(folder) if not row.agrees]
+    if differing:
+        raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
+
+
+def _checked(runs: Path, file: Path | None, scene: str | None = None) -> Recipe | None:
+    """The recipe in a file, once everything that a benchmark needs is there; None for the default one. Raises
+    `UsageError`, also for a scene that it does not have."""
+    recipe = load_recipe(file).recipe if file is not None else None
+    if scene is not None:
+        require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
+    require_training("bench")
+    require_writable_runs(Runs(runs))
+    return recipe
