@@ -78,7 +78,7 @@ class LazyCommand(TyperCommand):
 
 
 def _importing(module: str, name: str) -> Callable[[], Any]:
-    """What imports a command's function, which has the command's name."""
+    """A function that imports and returns the function of a command, which has the command's name."""
     return lambda: resolve_name(f"iowbc.commands.{module}:{name.replace('-', '_')}")
 
 

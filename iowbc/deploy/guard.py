@@ -1,4 +1,4 @@
-"""What is passed on to the motors: targets that are numbers and do not jump."""
+"""Guard of the joint targets sent to the motors: finite, and without jumps."""
 
 import logging
 from collections.abc import Mapping
@@ -10,8 +10,8 @@ from iowbc.arrays import Array, Mask
 
 LOG = logging.getLogger(__name__)
 JUMP = 2.0
-"""A target jumps where it moves further than this times what its joint moves in the time. The target of a PD loop asks
-for a torque, too: a policy that catches itself moves one by up to 1.3 times what the joint moves, three times in fifty
+"""Largest change of a target, as a multiple of the largest motion of its joint in the same time. The target of a PD
+loop sets a torque, too: the largest factor in 96 trials was 1.3, and a factor of 1 was exceeded three times in 79
 minutes of walking."""
 
 

@@ -55,7 +55,7 @@ class Learner:
         device: str = "cpu",
     ) -> None:
         """`mirrors`: of observation and action; `cores`: on which the networks learn; `value_only`: places of an
-        observation that the policy does not see; `device`: where the networks are, in torch's words."""
+        observation that the policy does not see; `device`: of the networks, as torch names it."""
         set_random_seed(seed)
         env.seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)

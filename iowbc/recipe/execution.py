@@ -23,8 +23,8 @@ class Execution(Section):
     cluster has cores. When empty a training stays on one node with its worker processes, which is better where many
     trainings run."""
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:[0-9]+)?)$")
-    """Where the networks of PPO learn, in torch's words: `cpu`, or `cuda` with a torch that has it. A graphics card
-    rounds otherwise: a training is then repeated closely, not bit for bit."""
+    """Device of PPO's networks: `cpu`, or `cuda` for a graphics card (`cuda:1` for the second), with a torch built for
+    it. Rounding differs from the processor's: a training is then repeated closely, not bit for bit."""
     copy_files: bool = False
     """Lets nodes copy what they read and write to their own disks although they see `runs/`: for shared file systems
     that are slow. Where they do not see it they copy in any case."""

@@ -23,7 +23,7 @@ POLL = 0.2
 
 
 def raised(error: Exception) -> BaseException | None:
-    """What the code on a node raised, by Ray's error; None where the node or worker is lost."""
+    """The exception of the code on a node, from Ray's error; None where the node or worker is lost."""
     cause: BaseException | None = error.cause if isinstance(error, ray.exceptions.RayTaskError) else None
     return None if isinstance(cause, ray.exceptions.RayError) else cause
 
@@ -190,5 +190,5 @@ class NodeSpread:
 
 
 def _called(function: Callable[..., Result], arguments: tuple[Any, ...], folders: Mapping[str, SharedFolder]) -> Result:
-    """What a function gives on this node, with the folders in their places here."""
+    """Result of a function on this node, with the folders at their places here."""
     return function(*arguments, **{name: placed(folder) for name, folder in folders.items()})
