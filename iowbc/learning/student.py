@@ -32,7 +32,7 @@ class Rows:
     privileged: slice
     """The teacher's part: the rest of s_t, and s_priv."""
     facts: NDArray[np.int64]
-    """Places of the object's mass and the base's velocity, which are read from the latent."""
+    """Places of what is to be read from the latent."""
     withheld: NDArray[np.int64]
     """Places in `privileged` of what the teacher is not told."""
     observation_mirror: MirrorMap
@@ -85,6 +85,8 @@ class StudentTraining:
         log_std = torch.stack([one.log_std for one in teachers]).mean(0).clamp(min=floor)
         self.loss = DistillationLoss(settings, log_std, self.network, rows.facts_mirror, rows.action_mirror, symmetry)
         self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
+        self.estimated = teacher.normalizer.mean[rows.privileged], teacher.normalizer.std[rows.privileged]
+        """Mean and standard deviation in whose terms the body sees s_priv."""
         self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)
         self.experience = Experience(
@@ -151,6 +153,7 @@ class StudentTraining:
         )
         found = self.environments.roll(rollout_policy, self.settings.rollout)
         facts = (found.observation[:-1][..., rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
+        facts = facts.clip(-self.network.normalizer.clip, self.network.normalizer.clip)
         frames, targets = found.observation[:-1, :, rows.observation], found.told["answer"]
         for frame, target, fact, ended in zip(frames, targets, facts, found.ended, strict=True):
             self.experience.add(frame, np.concatenate([target, fact], axis=1), self.starts)

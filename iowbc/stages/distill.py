@@ -21,7 +21,7 @@ PANELS = (
 )
 """Shown in the figure of the learning curves."""
 FACTS = ("object_mass", "base_linear_velocity")
-"""Privileged observations that the student's latent is to tell."""
+"""Privileged observations of the load, which `distill.auxiliary_of: load` reads from the latent."""
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -67,14 +67,16 @@ def run(job: Job) -> None:
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
         seen = observation_layout(robot, recipe.task.observation.observe_object and settings.observe_object)
         unseen = layout.state.parts[len(seen.parts) :]
+        unseen_mirror = side_by_side([*(part.kind(robot) for part in unseen), layout.extra.mirror]).as_float32()
+        load = settings.auxiliary_of == "load"
         rows = Rows(
             observation=slice(0, seen.size),
             privileged=slice(seen.size, layout.size),
-            facts=layout.privileged_places(FACTS),
+            facts=layout.privileged_places(FACTS) if load else np.arange(seen.size, layout.size),
             withheld=layout.privileged_places(settings.withheld) - seen.size,
             observation_mirror=seen.mirror,
-            privileged_mirror=side_by_side([*(part.kind(robot) for part in unseen), layout.extra.mirror]).as_float32(),
-            facts_mirror=side_by_side([own[name] for name in FACTS]),
+            privileged_mirror=unseen_mirror,
+            facts_mirror=side_by_side([own[name] for name in FACTS]) if load else unseen_mirror,
             action_mirror=action_mirror(robot),
         )
         training = StudentTraining(
@@ -93,7 +95,7 @@ def run(job: Job) -> None:
         environments.close()
 
     told = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
-    about = {"layout": told, "curriculum": curriculum}
+    about = {"layout": told, "curriculum": curriculum, "estimated": [part.tolist() for part in training.estimated]}
     save_network(training.network, training.architecture, job.out, "student", about)
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 
