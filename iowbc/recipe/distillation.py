@@ -70,4 +70,7 @@ class Distillation(Encoder):
         if self.batch > self.buffer:
             yield "", f"batch ({self.batch}) is larger than buffer ({self.buffer})"
         if self.auxiliary_of == "privileged" and self.start != "teacher":
-            yield "", "auxiliary_of: privileged needs an estimate of s_priv, which `start: teacher` alone gives a student"
+            yield (
+                "",
+                "auxiliary_of: a student estimates s_priv with `start: teacher` alone",
+            )
