@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 REPRESENTATION_LENGTH = 60
 PROBLEMS_TOLD = 50
-"""Problems of a recipe that are told; the others are counted."""
+"""Problems of a recipe that are reported; the others are counted."""
 
 
 @dataclass(frozen=True)

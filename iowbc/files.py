@@ -117,8 +117,8 @@ def read_checked(path: Path, key: str) -> bytes | None:
     except FileNotFoundError:
         return None
     try:
-        told = json.loads(head)
-        own, digest = told["key"], told["sha256"]
+        header = json.loads(head)
+        own, digest = header["key"], header["sha256"]
     except (ValueError, KeyError, TypeError) as reason:
         raise Damaged(f"{path} has no readable head: {reason}") from reason
     if digest != _digest(str(own), content):

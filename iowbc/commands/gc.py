@@ -52,7 +52,7 @@ def gc(
     """
     if not (unused or recipes or work or damaged):
         raise UsageError(
-            "gc removes only what it is told to: --unused (artifacts that no recipe ever used), --recipe NAME, "
+            "gc removes only what its options select: --unused (artifacts that no recipe ever used), --recipe NAME, "
             "--work (unfinished stages), --damaged; --older-than DAYS narrows it, --dry-run only lists"
         )
     store, console = Store(Runs(runs)), stdout_console()

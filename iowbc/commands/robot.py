@@ -192,7 +192,7 @@ def robot_sim(
     posture = controller.settled_posture(Ranges(controller.contract).standing)[0]
     frequency = controller.contract.control_frequency
     twin = Twin(controller.robot, simulation, frequency, scene, seed, posture, Support(kind, release), fixed)
-    stop, told = _stop_request(), False
+    stop, reported = _stop_request(), False
     view = None
     if page is not None:
         from iowbc.live.remote_view import RemoteView
@@ -203,7 +203,7 @@ def robot_sim(
     tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
 
     def watch(robot: Twin) -> None:
-        nonlocal told, view
+        nonlocal reported, view
         if tracking is not None:
             tracking.send(robot)
         if view is not None and robot.periods % POLLING == 0:
@@ -212,8 +212,8 @@ def robot_sim(
             except EOFError:
                 view = None
                 tell(console, "the page has ended; the robot goes on")
-        if robot.fallen and not told:
-            told = True
+        if robot.fallen and not reported:
+            reported = True
             tell(console, f"{robot.time:8.3f} s  fallen")
 
     def going() -> bool:

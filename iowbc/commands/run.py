@@ -105,10 +105,10 @@ def compare_variants(request: Request, loaded: Sequence[LoadedRecipe], console: 
         tell(console, f"no film: {reason}")
     if film is not None:
         tell(console, shown_path(film))
-    told = _report_of(output)
-    if told != before and loaded[0].recipe.execution.track:
+    report = _report_of(output)
+    if report != before and loaded[0].recipe.execution.track:
         files = [path for path in sorted(output.rglob("*")) if path.is_file()]
-        record_figures(request.runs, f"compare-{name}", {}, told, files)
+        record_figures(request.runs, f"compare-{name}", {}, report, files)
     tell(console, f"next:\n  iowbc report {name}")
 
 
@@ -179,8 +179,8 @@ def run_recipe(
     if tracker is not None and not delivered and backlog(request.runs):
         console.print("MLflow has not taken everything yet; the rest is sent in the background", highlight=False)
     if closing:
-        told = errors or Console(stderr=True)
-        told.print(closing, markup=False, highlight=False, soft_wrap=True)
+        error_console = errors or Console(stderr=True)
+        error_console.print(closing, markup=False, highlight=False, soft_wrap=True)
     return ending
 
 

@@ -22,7 +22,7 @@ def save_checkpoint(path: Path, key: str, arrays: Mapping[str, NDArray[Any]]) ->
 
 
 def load_checkpoint(path: Path, key: str, say: Callable[[str], None]) -> Arrays | None:
-    """Arrays of the newest whole checkpoint of this key, or None; `say` is told of damaged ones, now put aside."""
+    """Arrays of the newest whole checkpoint of this key, or None; `say` receives damaged ones, now put aside."""
     content, damaged = newest_checked(path, key)
     if damaged:
         names, verb = " and ".join(damaged), "is" if len(damaged) == 1 else "are"

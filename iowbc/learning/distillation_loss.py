@@ -59,7 +59,7 @@ class DistillationLoss(nn.Module):
         loss = kl = divergence(target, self.teacher_log_std, mean, self.log_std).mean()
         figures = {"kl" if self.settings.std == "learnt" else "kl_at_shared_std": float(kl.detach())}
         if self.settings.auxiliary:
-            read = nn.functional.mse_loss((self.reader or self.network.told)(latent), facts)
+            read = nn.functional.mse_loss((self.reader or self.network.body_context)(latent), facts)
             loss = loss + self.settings.auxiliary * read
             figures["auxiliary_error"] = float(read.detach())
         return loss, figures

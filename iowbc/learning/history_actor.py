@@ -70,13 +70,13 @@ class HistoryActor(Perceptron):
         flat = prepared.reshape(-1, prepared.shape[-1])
         frames, privileged = flat.tensor_split([self.length * self.observation], dim=1)
         frames = frames.reshape(-1, self.length, self.observation)
-        told = self.network.told(self.network.encoder(frames))
-        both = torch.cat([frames[:, -1], told], dim=1)
+        context = self.network.body_context(self.network.encoder(frames))
+        both = torch.cat([frames[:, -1], context], dim=1)
         parts = self.network.body.hidden(self.network.body.prepare(both))
         hidden = tuple(part.reshape(*prepared.shape[:-1], -1) for part in parts)
         if self.network.estimate is None:
             return hidden, prepared.new_zeros(())
-        return hidden, nn.functional.mse_loss(told.float(), privileged)
+        return hidden, nn.functional.mse_loss(context.float(), privileged)
 
     def head(self, hidden: Hidden) -> Tensor:
         return self.network.body.head(hidden)

@@ -154,8 +154,8 @@ class StudentNetwork(nn.Module):
 
     def act(self, newest: Tensor, latent: Tensor) -> Tensor:
         """The mean action."""
-        return cast(Tensor, self.body(torch.cat([newest, self.told(latent)], dim=1)))
+        return cast(Tensor, self.body(torch.cat([newest, self.body_context(latent)], dim=1)))
 
-    def told(self, latent: Tensor) -> Tensor:
+    def body_context(self, latent: Tensor) -> Tensor:
         """Second input of the body: the latent, or the estimate of s_priv."""
         return latent if self.estimate is None else cast(Tensor, self.estimate(latent))

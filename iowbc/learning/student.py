@@ -34,7 +34,7 @@ class Rows:
     facts: NDArray[np.int64]
     """Places of what is to be read from the latent."""
     withheld: NDArray[np.int64]
-    """Places in `privileged` of what the teacher is not told."""
+    """Places in `privileged` of what is masked from the teacher."""
     observation_mirror: MirrorMap
     privileged_mirror: MirrorMap
     facts_mirror: MirrorMap
@@ -154,13 +154,13 @@ class StudentTraining:
         found = self.environments.roll(rollout_policy, self.settings.rollout)
         facts = (found.observation[:-1][..., rows.facts] - self.facts_mean.numpy()) / self.facts_std.numpy()
         facts = facts.clip(-self.network.normalizer.clip, self.network.normalizer.clip)
-        frames, targets = found.observation[:-1, :, rows.observation], found.told["answer"]
+        frames, targets = found.observation[:-1, :, rows.observation], found.records["answer"]
         for frame, target, fact, ended in zip(frames, targets, facts, found.ended, strict=True):
             self.experience.add(frame, np.concatenate([target, fact], axis=1), self.starts)
             history.push(frame, self.starts)
             self.starts = ended
         self.observation = found.observation[-1]
-        return np.mean((found.told["own"] - targets) ** 2), np.mean(targets**2)
+        return np.mean((found.records["own"] - targets) ** 2), np.mean(targets**2)
 
     def _gradient_step(self) -> dict[str, float]:
         """One step, of a gradient no larger than the recipe's, down the loss; its figures as they were before."""

@@ -44,7 +44,7 @@ class TeacherTraining:
     ) -> None:
         """`mirrors`: of observation and action; `cores`: on which the networks learn while the environments rest;
         `value_only`: places of an observation that the policy does not see; `device`: of the networks, as torch names
-        it; `score`: a fixed evaluation, by which the best policy is kept; `say`: is told when the training goes back.
+        it; `score`: a fixed evaluation, by which the best policy is kept; `say`: is called when the training goes back.
         """
         self.settings, self.environments, self.mirrors = settings, environments, mirrors
         self.score = score if settings.check.every is not None else None

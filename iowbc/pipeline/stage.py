@@ -30,7 +30,7 @@ class Report(Protocol):
         """Print one line."""
 
     def files(self, path: Path) -> None:
-        """Let tracking have a file or folder of the stage while it runs; it may be told again."""
+        """Let tracking have a file or folder of the stage while it runs; it may be reported again."""
 
 
 class Member(Protocol):

@@ -39,7 +39,7 @@ class Trajectories:
     """Step and environment of each episode that its time limit ended, (k, 2), in order."""
     cut_observation: Array
     """The last row of those episodes, (k, S)."""
-    told: Mapping[str, Array]
+    records: Mapping[str, Array]
     """Further records of the policy, (T, n, ...) by name."""
     acting: float
     """Time that the policy took of it [s], the mean over those who worked side by side."""
@@ -49,7 +49,7 @@ def roll(environments: Stepped, rollout_policy: RolloutPolicy, steps: int) -> Tr
     """Makes a rollout of some steps. Raises ValueError where an action is not finite."""
     buffers, acting = environments.buffers, 0.0
     observations, actions, rewards, ends = [], [], [], []
-    told: list[Mapping[str, Array]] = []
+    records: list[Mapping[str, Array]] = []
     cut: list[tuple[int, int]] = []
     cut_off: list[Array] = []
     starts = rollout_policy.starts
@@ -62,7 +62,7 @@ def roll(environments: Stepped, rollout_policy: RolloutPolicy, steps: int) -> Tr
         acting += time.perf_counter() - began
         environments.step()
         actions.append(action)
-        told.append(beside)
+        records.append(beside)
         rewards.append(buffers["reward"].copy())
         ends.append(starts := buffers["done"].copy())
         for index in np.flatnonzero(starts & buffers["truncated"]).tolist():
@@ -76,7 +76,7 @@ def roll(environments: Stepped, rollout_policy: RolloutPolicy, steps: int) -> Tr
         ended=np.stack(ends),
         cut=np.array(cut, np.int64).reshape(-1, 2),
         cut_observation=np.array(cut_off, np.float32).reshape(len(cut), observations[0].shape[1]),
-        told={name: np.stack([beside[name] for beside in told]) for name in told[0]},
+        records={name: np.stack([beside[name] for beside in records]) for name in records[0]},
         acting=acting,
     )
 
@@ -106,6 +106,6 @@ def side_by_side(parts: Sequence[Trajectories]) -> Trajectories:
         ended=joined("ended"),
         cut=cut[order],
         cut_observation=np.concatenate([part.cut_observation for part in parts])[order],
-        told={name: np.concatenate([part.told[name] for part in parts], axis=1) for name in parts[0].told},
+        records={name: np.concatenate([part.records[name] for part in parts], axis=1) for name in parts[0].records},
         acting=float(np.mean([part.acting for part in parts])),
     )

@@ -94,8 +94,8 @@ def run(job: Job) -> None:
     finally:
         environments.close()
 
-    told = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
-    about = {"layout": told, "curriculum": curriculum, "estimated": [part.tolist() for part in training.estimated]}
+    layouts = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
+    about = {"layout": layouts, "curriculum": curriculum, "estimated": [part.tolist() for part in training.estimated]}
     save_network(training.network, training.architecture, job.out, "student", about)
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 

@@ -135,9 +135,9 @@ def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float
         job.report.say(f"probe: mass from {row['source']}: R² {row['R2']:.3f}, {row['RMSE']:.2f} kg")
     names = {"R2": "R2", "R2_trial": "R2_of_a_trial", "RMSE": "RMSE_kg"}
     return {
-        f"probe/{row['source'].replace(' ', '_')}/{told}": float(row[name])
+        f"probe/{row['source'].replace(' ', '_')}/{metric}": float(row[name])
         for _, row in figures.iterrows()
-        for name, told in names.items()
+        for name, metric in names.items()
     }
 
 

@@ -124,7 +124,9 @@ def test_a_student_that_is_asked_to_estimates_what_its_teacher_is_told(symmetry:
             training.update()
         histories, answers = training.experience.sample(200, np.random.default_rng(0))
         with torch.no_grad():
-            estimate = training.network.told(training.network.read(torch.from_numpy(histories))[1])[:, 0].numpy()
+            estimate = training.network.body_context(training.network.read(torch.from_numpy(histories))[1])[
+                :, 0
+            ].numpy()
         errors.append(np.mean((estimate - answers[:, 1]) ** 2))
     assert errors[1] < 0.2 * errors[0], errors
     with pytest.raises(ValueError, match="start: teacher"):

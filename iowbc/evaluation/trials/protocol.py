@@ -85,7 +85,7 @@ class Protocol:
         progress: Callable[[float, float, str], None] = lambda done, total, note: None,
         elsewhere: Callable[[Batches], Iterator[tuple[str, bytes]]] | None = None,
     ) -> None:
-        """`progress` is told trials done, trials known of, and what is played. `elsewhere` plays batches on other
+        """`progress` receives trials done, trials known of, and what is played. `elsewhere` plays batches on other
         machines and yields the name of each and what `played` returns."""
         self.world, self.policy = world, policy
         self.work, self.workers = work, workers

@@ -44,7 +44,7 @@ def play_episodes(
 ) -> list[Outcome]:
     """Play each episode to its end and return how they went, in their order; independent of `workers`.
 
-    progress: told the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
+    progress: receives the time reached within the episodes [s]. Raises Interrupted once `interrupted()` is true.
     """
     environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=tuple(episodes))
     try:

@@ -52,13 +52,13 @@ def holder(runs: Runs, key: str) -> Holder | None:
 def key_lock(
     runs: Runs, key: str, on_wait: Callable[[Holder], None], interrupted: Callable[[], bool]
 ) -> Iterator[bool]:
-    """Hold a key's lock, waiting for another holder after `on_wait` was told who it is.
+    """Hold a key's lock, waiting for another holder after `on_wait` received who it is.
 
     Yields False, without the lock, when `interrupted` turned true while waiting.
     """
     runs.locks.mkdir(parents=True, exist_ok=True)
     with lock_path(runs, key).open("a+") as file:
-        told = False
+        reported = False
         while True:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -67,9 +67,9 @@ def key_lock(
                 if interrupted():
                     yield False
                     return
-                if not told:
+                if not reported:
                     on_wait(_read(lock_path(runs, key)))
-                    told = True
+                    reported = True
                 time.sleep(POLL)
         file.seek(0)
         file.truncate()

@@ -27,7 +27,7 @@ class Runs:
         self.recipes = root / "recipes"
         """Artifacts that each recipe used last, `<name>.json`."""
         self.tracking = root / "tracking"
-        """Journals of what MLflow is told, until it has taken it."""
+        """Journals of what MLflow is to record, until it has taken it."""
         self.sweeps = root / "sweeps"
         """Points and results of each sweep, `<name>/`."""
         self.compared = root / "compare"

@@ -91,7 +91,7 @@ class RunRecord:
         return not unsent(path)
 
     def files(self, name: str, paths: Sequence[Path]) -> None:
-        """Files and folders below `runs` of a run; a folder's further files follow when it is told again."""
+        """Files and folders below `runs` of a run; a folder's further files follow when it is reported again."""
         self._journal.write("files", id=name, paths=[os.path.relpath(path, self.runs.root) for path in paths])
 
 
