@@ -27,7 +27,7 @@ class SkillLearning(PPO):
     needs no state of the simulation; an episode should therefore fit into one."""
     imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
     """First decisions, in which the robot does not learn from the reward: it acts, and imitates what it would do if it
-    knew the path (DAgger), while the value learns. From the reward alone 80,000 decisions had changed nothing."""
+    knew the path (DAgger), while the value learns. From the reward alone 76,000 decisions had changed nothing."""
     scripted_steps: int = Field(default=200_000, ge=0, le=10**12)
     """First decisions, those of the imitation included, in which every human is a scripted one."""
     learnt_share: float = Field(default=0.5, ge=0, le=1)
