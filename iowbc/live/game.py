@@ -21,8 +21,8 @@ from iowbc.sim.rendering.forces import Force
 from iowbc.skill.evaluation.games import acted
 from iowbc.skill.films import path_lines
 from iowbc.skill.game import COUNTED, TransportGame
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import PERSON, Plan, Rule
-from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 UNHURRIED = 600.0

@@ -1,6 +1,7 @@
 """The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,23 +9,22 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
 from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
-from iowbc.recipe.skill.task import TransportTask
+from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
+from iowbc.skill.agents import Human, NominalCommand, Wanted, by_the_clock, pursue
 from iowbc.skill.draws import EpisodeDraws
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
-from iowbc.skill.human import Human
-from iowbc.skill.lower_layer import LowerLayer
-from iowbc.skill.nominal import NominalCommand
+from iowbc.skill.lower_layer import LowerLayer, Student
 from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, Plan
-from iowbc.skill.pursuit import Wanted, by_the_clock, pursue
+from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES
 from iowbc.skill.reward import GameEnding, ending, potential, reward
 from iowbc.skill.situation import Origin, Situation, situation, turned
-from iowbc.skill.student import Student
 from iowbc.task.episodes import Episode
-from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers
+
+if TYPE_CHECKING:
+    from iowbc.skill.setup import GameSetup
 
 FOREVER = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
@@ -37,30 +37,17 @@ ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
 class GameBatch:
     """n games. `reset` and `step` read the actions from the buffers and leave everything else there."""
 
-    def __init__(
-        self,
-        specification: Specification,
-        *,
-        tasks: Mapping[str, TransportTask],
-        games: Indices,
-        scenes: Sequence[str],
-        keys: Keys,
-        partners: Sequence[str],
-        plans: Sequence[Plan] | None,
-        block: int,
-        buffers: Buffers,
-    ) -> None:
-        """`games`: global numbers, (n,); `scenes`, `keys` and, where there are any, `plans` of each; `block`: see
-        `iowbc.rollouts.blocks`."""
-        recipe, self._skill = specification.recipe, specification.recipe.skill
-        self.n, self.buffers, self._games, self._keys = len(games), buffers, games, keys
-        self.lower = LowerLayer(
-            specification,
-            games,
-            [Episode(scene, int(key), FOREVER, UNDISTURBED) for scene, key in zip(scenes, keys, strict=True)],
-            block,
-        )
-        n, period, own = self.n, self.lower.period, list(tasks.values())
+    def __init__(self, setup: "GameSetup", first: int, last: int, buffers: Buffers) -> None:
+        """The games from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
+        recipe, self._skill = setup.specification.recipe, setup.skill
+        self.buffers, self._games, self._keys = buffers, np.arange(first, last), setup.keys(first, last)
+        scenes, plans = setup.scenes[first:last], None if setup.plans is None else setup.plans[first:last]
+        episodes = [
+            Episode(scene, int(key), FOREVER, UNDISTURBED) for scene, key in zip(scenes, self._keys, strict=True)
+        ]
+        self.lower = LowerLayer(setup.specification, self._games, episodes, block_size(setup.count))
+        self.n = n = last - first
+        period, own = self.lower.period, list(setup.tasks.values())
         self.substeps = round(1.0 / (self._skill.frequency * period))
         """Control steps of a decision."""
         worlds = [getattr(recipe.simulation.scenes, scene) for scene in scenes]
@@ -68,7 +55,7 @@ class GameBatch:
         self._corners = np.array([shape_of(world.object).high[:2] for world in worlds])[:, None] * CORNERS
         self.paths = Paths([task.path for task in own])
         self._limit = np.array([round(task.duration * self._skill.frequency) for task in own])
-        self.drawn = EpisodeDraws(own, list(tasks), scenes, partners, self._skill.goal_known, plans)
+        self.drawn = EpisodeDraws(setup.tasks, scenes, setup.partners, self._skill.goal_known, plans)
         self._nominal = NominalCommand(self._skill, recipe.task.commands, self._pushing)
         self._human = Human(self._skill, n, period)
         self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n)
@@ -93,13 +80,10 @@ class GameBatch:
         """The student that controls from now on."""
         self.lower.take(student)
 
-    def meet_agent(self, share: float) -> None:
-        """Part of the episodes drawn from now on whose human is that of the actions."""
-        self.drawn.agent_share = share
-
-    def reset(self, seeds: Keys | None = None) -> None:
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
         """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
-        from them."""
+        from them. `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
+        self.drawn.agent_share = agent_share
         if seeds is not None:
             self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
         self.lower.rewind(self._keys)

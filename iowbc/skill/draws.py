@@ -1,6 +1,6 @@
 """What each episode of a game is: its task, its human, its load, and whether the robot knows the path."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -22,22 +22,21 @@ class EpisodeDraws:
 
     def __init__(
         self,
-        tasks: Sequence[TransportTask],
-        names: Sequence[str],
+        tasks: Mapping[str, TransportTask],
         scenes: Sequence[str],
         partners: Sequence[str],
         goal_known: float,
         plans: Sequence[Plan] | None,
     ) -> None:
-        """`tasks` with their `names`; `scenes`: of each game; `partners`: humans that are drawn; `goal_known`: how
-        often the robot knows the path; `plans`: one a game."""
-        n = len(scenes)
+        """`scenes`: of each game; `partners`: humans that are drawn; `goal_known`: how often the robot knows the path;
+        `plans`: one a game."""
+        n, own = len(scenes), list(tasks.values())
         self._goal_known, self._plans, self.agent_share = goal_known, plans, 0.0
         self._kinds = np.array([KINDS.index(kind) for kind in partners])
-        chances = np.array([[task.weight * (task.scene == scene) for task in tasks] for scene in scenes])
+        chances = np.array([[task.weight * (task.scene == scene) for task in own] for scene in scenes])
         self._tasks = np.cumsum(chances, axis=1) / chances.sum(axis=1, keepdims=True)
-        self._mass, self._share = (np.array([getattr(task, name) for task in tasks]) for name in ("mass", "share"))
-        resistance = [np.nan if task.rolling_resistance is None else task.rolling_resistance for task in tasks]
+        self._mass, self._share = (np.array([getattr(task, name) for task in own]) for name in ("mass", "share"))
+        resistance = [np.nan if task.rolling_resistance is None else task.rolling_resistance for task in own]
         self._resistance = np.array(resistance)
         self.task, self.kind, self.rule = np.zeros((3, n), np.int64)
         """Number of the task, of the human among `KINDS`, of the nominal command among `RULES`, (n,)."""
@@ -46,7 +45,7 @@ class EpisodeDraws:
         self.known, self.acts = np.zeros((2, n), np.bool_)
         """Whether the robot knows the path, and whether the human of the actions plays, (n,)."""
         if plans is not None:
-            self.task[:] = [list(names).index(plan.task) for plan in plans]
+            self.task[:] = [list(tasks).index(plan.task) for plan in plans]
             self.kind[:] = [KINDS.index(plan.partner) for plan in plans]
             self.known[:] = [plan.known for plan in plans]
 

@@ -1,18 +1,19 @@
 """The Markov game of a robot and a human who transport an object: n games at once, over worker processes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from iowbc.arrays import Array, Keys, Mask
+from iowbc.errors import Interrupted
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.figures import FIGURES
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.setup import GameSetup
-from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
@@ -20,6 +21,10 @@ from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 PATIENCE = 60.0
 """Time for a decision of all games before a worker counts as hung [s]."""
 COUNTED = ("success", "fallen", "dropped", "strayed", "diverged", "time_out", "known")
+
+
+ROBOT, HUMAN = "robot", "human"
+Actions = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -51,10 +56,39 @@ class Outcome:
     and partner are names."""
 
 
+class Game(Protocol):
+    """n games that are played side by side; see `TransportGame`."""
+
+    n: int
+    state_size: int
+
+    @property
+    def observation_sizes(self) -> Mapping[str, int]:
+        """Of each agent."""
+
+    @property
+    def action_sizes(self) -> Mapping[str, int]:
+        """Of each agent."""
+
+    @property
+    def human_acts(self) -> Mask:
+        """Games whose human is that of the actions, (n,)."""
+
+    @property
+    def privileged_actions(self) -> Array:
+        """What a robot that knew all would do now, (n, actions)."""
+
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
+        """Begin every game anew."""
+
+    def step(self, actions: Mapping[str, Array]) -> Outcome:
+        """One decision of both agents."""
+
+
 class TransportGame:
     """n games. What comes of them follows from seed and game, however many workers there are."""
 
-    agents = ("robot", "human")
+    agents = (ROBOT, HUMAN)
 
     def __init__(
         self,
@@ -104,10 +138,8 @@ class TransportGame:
         """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
 
         `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
-        self._call(Message.of(GameBatch.meet_agent, agent_share))
-        groups = self._workers.groups
-        own = [None if seeds is None else seeds[first:last] for first, last in groups]
-        self._workers.ask([Message.of(GameBatch.reset, part) for part in own])
+        own = [None if seeds is None else seeds[first:last] for first, last in self._workers.groups]
+        self._workers.ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
         self._workers.answers()
         return self._observed("now")
 
@@ -164,3 +196,33 @@ class TransportGame:
 
     def __exit__(self, *ended: object) -> None:
         self.close()
+
+
+def nominal(game: TransportGame) -> Callable[[Observed], Actions]:
+    """Zero actions: the robot's nominal command, and a human of the actions who stands."""
+    still = {agent: np.zeros((game.n, size), np.float32) for agent, size in game.action_sizes.items()}
+    return lambda observed: still
+
+
+def play_once(
+    game: TransportGame,
+    act: Callable[[Observed], Actions],
+    interrupted: Callable[[], bool] = lambda: False,
+    look: Callable[[int], None] = lambda decision: None,
+) -> dict[str, Array]:
+    """Figures of the first episode of every game, (n,) by name, in the order of the games.
+
+    `act` gives the actions for what is observed; `look` is told the number of each decision before it is made. Raises
+    Interrupted once `interrupted()` is true.
+    """
+    observed, decision = game.reset(), 0
+    rows: dict[int, dict[str, Array]] = {}
+    while len(rows) < game.n:
+        if interrupted():
+            raise Interrupted(f"stopped after {decision / game.decision_rate:.0f} s of {game.n} games")
+        look(decision)
+        outcome = game.step(act(observed))
+        observed, decision = outcome.observed, decision + 1
+        for place, row in enumerate(outcome.figures["environment"].tolist()):
+            rows.setdefault(row, {name: values[place] for name, values in outcome.figures.items()})
+    return {name: np.array([rows[row][name] for row in range(game.n)]) for name in rows[0]}

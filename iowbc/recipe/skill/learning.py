@@ -1,8 +1,9 @@
 """Multi-agent PPO of the skill layer: a robot and a human, with one critic."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat
 
 from iowbc.recipe.ppo import PPO
 from iowbc.recipe.section import COSMETIC, DEEPEST, Width
@@ -59,11 +60,9 @@ class SkillLearning(PPO):
     checkpoint_every: int = Field(default=5, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
-    @model_validator(mode="after")
-    def _minibatches_divide(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         samples = self.games * self.rollout
         if samples > LARGEST_ROLLOUT:
-            raise ValueError(f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory")
-        if samples % self.minibatches:
-            raise ValueError(f"minibatches ({self.minibatches}) does not divide games x rollout ({samples})")
-        return self
+            yield "", f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory"
+        elif samples % self.minibatches:
+            yield "", f"minibatches ({self.minibatches}) does not divide games x rollout ({samples})"

@@ -10,7 +10,7 @@ from iowbc.errors import StageFailed
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import load_robot
-from iowbc.skill.student import Student
+from iowbc.skill.lower_layer import Student
 from iowbc.task.specification import Specification
 
 OF_CONTROLLER = ("control_frequency", "commands", "references", "action")

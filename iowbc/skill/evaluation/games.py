@@ -14,8 +14,7 @@ from iowbc.arrays import Array
 from iowbc.errors import StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.skill.skill import Skill
-from iowbc.skill.episodes import play_once
-from iowbc.skill.game import Observed, TransportGame
+from iowbc.skill.game import Observed, TransportGame, play_once
 from iowbc.skill.plan import AGENT, Plan, Rule
 
 
