@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from iowbc.arrays import Array
 from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import watchdogs
@@ -44,7 +45,7 @@ class Listened:
     """Active controller of the robot's own, "" for none, None without an answer."""
 
 
-def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits: Limits) -> list[Check]:
+def checks(controller: Controller, heard: Listened, wanted: Array, limits: Limits) -> list[Check]:
     """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:
@@ -57,33 +58,27 @@ def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits
     beyond = watchdogs.beyond(sensors.posture, contract, limits)
     warmest, hottest = sensors.posture.temperature.max(), limits.temperature
     charge = None if heard.battery is None else int(heard.battery["soc"])
+    battery = "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
     model, order = int(state["mode_machine"]), int(state["mode_pr"])
+    mode = f"the robot's own controller {heard.mode!r} is active: release it first" if heard.mode else "released"
+    if heard.mode is None:
+        mode = "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
     return [
         Check("states", rate > 400.0, f"{rate:.0f} a second, 400 or more are needed"),
         Check("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
         Check("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
-        Check("mode", heard.mode == "", _mode(heard.mode)),
+        Check("mode", heard.mode == "", mode),
         Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
         Check("joints", beyond is None, beyond or "within limits, no motor overloaded, upright enough"),
-        Check("battery", charge is not None and charge >= limits.battery, _charge(charge, limits)),
+        Check("battery", charge is not None and charge >= limits.battery, battery),
         Check("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
         _dry_run(controller, sensors, wanted),
     ]
 
 
-def _mode(active: str | None) -> str:
-    if active is None:
-        return "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
-    return f"the robot's own controller {active!r} is active: release it first" if active else "released"
-
-
-def _charge(charge: int | None, limits: Limits) -> str:
-    return "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
-
-
-def _dry_run(controller: Controller, sensors: Sensors, wanted: "np.ndarray") -> Check:
+def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> Check:
     """Steps of the policy on the posture as measured, of which no command is sent."""
-    if any(name in quantities(of_object=True) for name in (port.name for port in controller.contract.inputs)):
+    if not quantities(of_object=True).keys().isdisjoint(port.name for port in controller.contract.inputs):
         return Check("policy", True, "observes the object: tried when its pose arrives")
     controller.reset()
     default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0

@@ -5,14 +5,14 @@ clock, bus or files, so that a log of its inputs gives its commands again bit fo
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.sensors import Measured, quantities
+from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import messages, watchdogs
 from iowbc.onboard.limits import LIMITS, Limits
@@ -102,11 +102,14 @@ class Machine:
         self.events = []
         self.sensors.take(given.states, given.now)
         self._charge = self._charge if given.charge is None else given.charge
-        reason = self._danger(given) if self.state in MOVING else None
-        if reason is not None:
+        wanted = given.wanted.request
+        if self.state in MOVING and (reason := self._danger(given)) is not None:
             self._enter(State.DAMPING, given, reason)
-        elif given.wanted.request not in (None, self.state):
-            self._request(given.wanted.request, given)
+        elif wanted is not None and wanted is not self.state:
+            if (refusal := self._refusal(wanted, given)) is None:
+                self._enter(wanted, given, "requested")
+            else:
+                self.events.append(f"{wanted} refused: {refusal}")
         if self.state in MOVING:
             self._warn()
         self._last = given.now
@@ -145,15 +148,8 @@ class Machine:
         self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
         self._warned |= found.keys()
 
-    def _request(self, wanted: State, given: Inputs) -> None:
-        """Enters the state that is asked for, or says why not."""
-        refusal = self._refusal(wanted, given)
-        if refusal is None:
-            self._enter(wanted, given, "requested")
-        else:
-            self.events.append(f"{wanted} refused: {refusal}")
-
     def _refusal(self, wanted: State, given: Inputs) -> str | None:
+        """The reason not to enter a state that is asked for."""
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
             return None
@@ -201,16 +197,13 @@ class Machine:
     def _act(self, given: Inputs) -> None:
         """A step of the policy every `_turns` turns; what it refuses leads to damping."""
         if self._turn == 0:
-            targets = self.controller.step(self._measured(given), given.wanted.command, measured_at=self.sensors.at)
+            measured = replace(self.sensors.measured, **given.wanted.seen)
+            targets = self.controller.step(measured, given.wanted.command, measured_at=self.sensors.at)
             if targets.held[0]:
                 self._enter(State.DAMPING, given, targets.reasons[0])
                 return
             self._target = targets.position[0]
         self._turn = (self._turn + 1) % self._turns
-
-    def _measured(self, given: Inputs) -> Measured:
-        measured = self.sensors.measured
-        return Measured(**(vars(measured) | dict(given.wanted.seen)))
 
     def _command(self, now: float) -> Record:
         command = messages.empty(messages.LOW_COMMAND)

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from iowbc.arrays import Array
 from iowbc.deploy.contract import Contract
 from iowbc.onboard.limits import Limits
 from iowbc.onboard.sensors import Posture, Sensors
@@ -33,8 +32,8 @@ def beyond(now: Posture, contract: Contract, limits: Limits) -> str | None:
         ("velocity", np.abs(now.velocity) - limits.speed * speed, now.velocity, "rad/s"),
         ("torque", np.abs(now.torque) - limits.torque * torque, now.torque, "N·m"),
     ):
-        if (reason := _worst(name, excess, value, unit, contract.joints)) is not None:
-            return reason
+        if excess[joint := int(np.argmax(excess))] > 0.0:
+            return f"{name} limit: {contract.joints[joint]} at {value[joint]:.2f} {unit}"
     return None
 
 
@@ -46,8 +45,3 @@ def exhausted(now: Posture, charge: float | None, joints: tuple[str, ...], least
     if now.temperature[hottest := int(np.argmax(now.temperature))] > most:
         found["temperature"] = f"temperature: {joints[hottest]} at {now.temperature[hottest]:.0f} °C, above {most:g}"
     return found
-
-
-def _worst(name: str, excess: Array, value: Array, unit: str, joints: tuple[str, ...]) -> str | None:
-    joint = int(np.argmax(excess))
-    return f"{name} limit: {joints[joint]} at {value[joint]:.2f} {unit}" if excess[joint] > 0.0 else None
