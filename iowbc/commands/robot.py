@@ -69,11 +69,10 @@ def robot(
     from iowbc.onboard.checks import checks
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.limits import LIMITS
-    from iowbc.onboard.log import LogWriter
+    from iowbc.onboard.log import LogWriter, export_digest
     from iowbc.onboard.machine import Machine
     from iowbc.onboard.operators import Keyboard, Ranges, Seeing, Udp, object_poses, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
-    from iowbc.onboard.replay import export_digest
 
     console = stdout_console()
     controller = Controller.load(exported_folder(what))

@@ -26,8 +26,7 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     import json
 
     from iowbc.onboard.errors_of_run import UNITS, read_run
-    from iowbc.onboard.log import read_messages
-    from iowbc.onboard.replay import replay
+    from iowbc.onboard.log import read_messages, replay
 
     folder = exported_folder(what)
     controller = Controller.load(folder)

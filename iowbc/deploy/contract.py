@@ -254,14 +254,6 @@ def generator_folder(contract: Contract, folder: Path) -> Path | None:
     return folder / GENERATOR
 
 
-def _newer(error: ValidationError) -> bool:
-    """Whether a contract is of a later format, or has nothing wrong but entries that are not known yet."""
-    found = error.errors(include_url=False)
-    return all(one["type"] == "extra_forbidden" for one in found) or any(
-        one["loc"] == ("format",) and isinstance(one["input"], int) and one["input"] > FORMAT for one in found
-    )
-
-
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
@@ -272,7 +264,9 @@ def read_contract(folder: Path | str) -> Contract:
             raise ContractBroken(f"{folder / CONTRACT}: has {size:,} bytes, which no contract has; export again")
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
     except ValidationError as error:
-        if _newer(error):
+        wrong = error.errors(include_url=False)
+        later = any(one["loc"] == ("format",) and isinstance(n := one["input"], int) and n > FORMAT for one in wrong)
+        if later or all(one["type"] == "extra_forbidden" for one in wrong):  # nothing but entries not known yet
             text = f"made by a newer version of iowbc than {version('iowbc')}; install that here, or export again"
             raise ContractBroken(f"{folder / CONTRACT}: {text} with this one: {error}") from error
         raise ContractBroken(

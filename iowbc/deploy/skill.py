@@ -108,8 +108,7 @@ class Skill:
         self.observation = robot_observation(
             command, measured, self._wrist_error, thing, self._pushing, unknown, no_path, self._felt
         )
-        yaw: Array = thing[:, YAW]
-        return yaw
+        return thing[:, YAW]
 
     def _decide(self, yaw: Array) -> None:
         action = run(self._session, {"observation": self.observation})["action"]

@@ -18,11 +18,11 @@ from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
 from iowbc.live.track import PAST, WINDOW, Played, Track, track_of
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
-from iowbc.skill.evaluation.games import acted
 from iowbc.skill.films import path_lines
 from iowbc.skill.game import COUNTED, TransportGame
 from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import PERSON, Plan, Rule
+from iowbc.skill.trained import acted
 from iowbc.task.specification import Specification
 
 UNHURRIED = 600.0
@@ -65,10 +65,6 @@ class GameSession(Played):
         self._witness: Witness | None = None
         self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
         self.reset()
-
-    def begin(self, request: GameRequest) -> None:
-        self._game.close()
-        self._open(request)
 
     def reset(self) -> None:
         self._seen = self._game.reset().observations["robot"]

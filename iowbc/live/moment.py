@@ -65,7 +65,6 @@ class SimulationWitness:
         return float(self._simulation.drawn["object_mass"][0]) if self._held else 0.0
 
     def look(self, seconds: float) -> Moment:
-        """The simulation as it is now."""
         data = self._appearance.update()
         bodies = _poses(data)
         return Moment(
@@ -109,7 +108,6 @@ class Witness(SimulationWitness):
         self._reference = mujoco.MjData(self.model)
 
     def look(self, seconds: float) -> Moment:
-        """The environment as it is now."""
         return replace(
             super().look(seconds),
             reference=self._posture(),

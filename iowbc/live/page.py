@@ -89,7 +89,10 @@ class Page:
             if button == "pause":
                 self._pause(not self.paused)
             elif button == "reset":
-                self._reset()
+                self._cursor = 0.0
+                if self._showing == LIVE:
+                    self.session.reset()
+                self._slide(0.0)
             elif self._showing == LIVE:
                 self.panel.press(button)
 
@@ -100,12 +103,6 @@ class Page:
             self._slide(0.0)
         elif not paused and self._cursor >= self.track.end:
             self._cursor = 0.0
-
-    def _reset(self) -> None:
-        self._cursor = 0.0
-        if self._showing == LIVE:
-            self.session.reset()
-        self._slide(0.0)
 
     def _slide(self, seconds: float) -> None:
         """Sets the slider of the time, which is then told from one that somebody drags."""
@@ -134,17 +131,14 @@ class Page:
         self.panel.status.content = f"Plays the trial again: {seconds:.0f} s"
 
     def _live(self, now: float) -> None:
-        """Drives the session by hand."""
         session, panel = self.session, self.panel
         self._begin_anew(now)
         if now >= self._looked + CHECKPOINTS:
             self._looked = now
             session.refresh()
         if panel.time.value != self._slid:
-            self._slid = panel.time.value
-            if not self.paused:
-                self.paused = True
-                panel.label_pause(True)
+            self._slid, self.paused = panel.time.value, True
+            panel.label_pause(True)
         if not self.paused and now >= self._due:
             panel.steer()
             session.drag(self.drawing.drags.now(self.drawing.away))
@@ -174,7 +168,6 @@ class Page:
             self.session.reset()
 
     def _again(self, elapsed: float) -> None:
-        """Moves on in a recorded trial."""
         if self.panel.time.value != self._slid:
             self._cursor = self._slid = self.panel.time.value
         elif not self.paused:

@@ -96,7 +96,6 @@ class ControlPanel(ABC):
 
     @property
     def shown(self) -> ShownParts:
-        """Parts that are to be drawn."""
         return ShownParts(**{name: box.value for name, box in self._shown.items()})
 
     def pressed(self) -> list[Button]:

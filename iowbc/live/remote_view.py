@@ -77,7 +77,6 @@ class RemoteView:
             self._requests.send(Picture(shown, status, supported))
 
     def close(self) -> None:
-        """Ends the page."""
         self._requests.close()
 
 

@@ -50,10 +50,6 @@ class Session(Played):
             self.checkpoint = time.strftime("checkpoint of %H:%M:%S", time.localtime(self.written))
         self._policy = open_policy(self.source, self.environment)
 
-    def begin(self, request: PlayRequest) -> None:
-        self.environment.close()
-        self._open(request)
-
     def reset(self) -> None:
         environment = self.environment
         self._observation = environment.reset()
@@ -119,8 +115,7 @@ class Session(Played):
     def _force(self, what: Pushed) -> Array:
         force, left = self._blow[what]
         self._blow[what] = (force, max(0, left - 1))
-        total: Array = self._pull[what] + (force if left else 0.0)
-        return total
+        return self._pull[what] + (force if left else 0.0)
 
     def close(self) -> None:
         self.environment.close()

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -55,14 +55,9 @@ class Track:
     held_weight: float
     """Of the object in the hands [N]; 0 without one."""
     joints: tuple[str, ...]
-    kept: int | None = None
-    """So many of the last moments are kept; None keeps all."""
+    moments: deque[Moment]
     ending: str = ""
     """Ending of the episode, once it has ended."""
-    moments: deque[Moment] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.moments = deque(maxlen=self.kept)
 
     @property
     def start(self) -> float:
@@ -111,9 +106,14 @@ class Played(ABC):
     checkpoint = ""
     """Which checkpoint of a training plays."""
 
-    @abstractmethod
     def begin(self, request: Any) -> None:
         """A new episode under other conditions."""
+        self.close()
+        self._open(request)
+
+    @abstractmethod
+    def _open(self, request: Any) -> None:
+        """Sets up the simulation of an episode."""
 
     @abstractmethod
     def reset(self) -> None:
@@ -148,7 +148,7 @@ def recorded(environment: VectorEnv) -> dict[str, Array]:
 
 
 def track_of(witness: Witness, world: Specification, title: str, kept: int | None = None) -> Track:
-    """An empty track of a witness's present episode in a world."""
+    """An empty track of a witness's present episode in a world; `kept`: how many of the last moments it keeps."""
     return Track(
         title=title,
         model=witness.model,
@@ -156,7 +156,7 @@ def track_of(witness: Witness, world: Specification, title: str, kept: int | Non
         gait_period=1.0 / world.recipe.task.references.gait.frequency,
         held_weight=witness.held_weight,
         joints=witness.batch.robot.joints,
-        kept=kept,
+        moments=deque(maxlen=kept),
     )
 
 

@@ -1,4 +1,4 @@
-"""Checks before a robot moves."""
+"""Checks before a robot moves, and reasons to damp one that moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,11 +7,11 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.control.sensors import quantities
+from iowbc.deploy.contract import Contract
 from iowbc.deploy.controller import Controller
-from iowbc.onboard import watchdogs
-from iowbc.onboard.limits import Limits
+from iowbc.onboard.limits import SafetyLimits
 from iowbc.onboard.messages import Record
-from iowbc.onboard.sensors import Sensors
+from iowbc.onboard.sensors import Posture, Sensors
 
 MODEL = 5
 """`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
@@ -45,7 +45,7 @@ class Listened:
     """Active controller of the robot's own, "" for none, None without an answer."""
 
 
-def checks(controller: Controller, heard: Listened, wanted: Array, limits: Limits) -> list[Check]:
+def checks(controller: Controller, heard: Listened, wanted: Array, limits: SafetyLimits) -> list[Check]:
     """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:
@@ -55,7 +55,7 @@ def checks(controller: Controller, heard: Listened, wanted: Array, limits: Limit
     sensors.take(tuple(heard.states), heard.seconds)
     assert sensors.posture is not None
     state, rate = heard.states[-1], len(heard.states) / heard.seconds
-    beyond = watchdogs.beyond(sensors.posture, contract, limits)
+    outside = beyond(sensors.posture, contract, limits)
     warmest, hottest = sensors.posture.temperature.max(), limits.temperature
     charge = None if heard.battery is None else int(heard.battery["soc"])
     battery = "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
@@ -69,7 +69,7 @@ def checks(controller: Controller, heard: Listened, wanted: Array, limits: Limit
         Check("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
         Check("mode", heard.mode == "", mode),
         Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
-        Check("joints", beyond is None, beyond or "within limits, no motor overloaded, upright enough"),
+        Check("joints", outside is None, outside or "within limits, no motor overloaded, upright enough"),
         Check("battery", charge is not None and charge >= limits.battery, battery),
         Check("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
         _dry_run(controller, sensors, wanted),
@@ -94,3 +94,43 @@ def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> Check:
     return Check(
         "policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})"
     )
+
+
+def stale(sensors: Sensors, now: float, limits: SafetyLimits) -> str | None:
+    """The reason where the newest state is old, or arrives late by the robot's own clock."""
+    age = now - sensors.at
+    if age > limits.state_age:
+        return f"stale state: nothing new for {1e3 * age:.0f} ms"
+    if sensors.late > limits.state_age:
+        return f"stale state: it arrives {1e3 * sensors.late:.0f} ms late"
+    return None
+
+
+def beyond(now: Posture, contract: Contract, limits: SafetyLimits) -> str | None:
+    """The reason where a measurement is no number or beyond a limit."""
+    measured = np.concatenate([now.position, now.velocity, now.torque, now.gravity, now.turning])
+    if not np.isfinite(measured).all():
+        return "a measurement is not finite"
+    if now.tilt > limits.tilt:
+        return f"tilt: {now.tilt:.2f} rad"
+    lower, upper = np.array(contract.lower), np.array(contract.upper)
+    outside = np.maximum(lower - now.position, now.position - upper)
+    speed, torque = np.array(contract.velocity_limit), np.array(contract.effort)
+    for name, excess, value, unit in (
+        ("position", outside - limits.position_margin, now.position, "rad"),
+        ("velocity", np.abs(now.velocity) - limits.speed * speed, now.velocity, "rad/s"),
+        ("torque", np.abs(now.torque) - limits.torque * torque, now.torque, "N·m"),
+    ):
+        if excess[joint := int(np.argmax(excess))] > 0.0:
+            return f"{name} limit: {contract.joints[joint]} at {value[joint]:.2f} {unit}"
+    return None
+
+
+def exhausted(now: Posture, charge: float | None, joints: tuple[str, ...], least: float, most: float) -> dict[str, str]:
+    """Complaints about a battery below `least` and a motor above `most` [°C]; `charge`: None where unknown [%]."""
+    found = {}
+    if charge is not None and charge < least:
+        found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"
+    if now.temperature[hottest := int(np.argmax(now.temperature))] > most:
+        found["temperature"] = f"temperature: {joints[hottest]} at {now.temperature[hottest]:.0f} °C, above {most:g}"
+    return found

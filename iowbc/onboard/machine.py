@@ -14,8 +14,8 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
-from iowbc.onboard import messages, watchdogs
-from iowbc.onboard.limits import LIMITS, Limits
+from iowbc.onboard import checks, messages
+from iowbc.onboard.limits import LIMITS, SafetyLimits
 from iowbc.onboard.messages import Record
 from iowbc.onboard.sensors import Sensors
 
@@ -76,7 +76,7 @@ class Inputs:
 class Machine:
     """State machine, watchdogs and controller of a robot."""
 
-    def __init__(self, controller: Controller, scene: str, limits: Limits = LIMITS) -> None:
+    def __init__(self, controller: Controller, scene: str, limits: SafetyLimits = LIMITS) -> None:
         """`controller` of one robot; `scene`: base grasp and expected load. Raises ValueError for an unknown scene."""
         self.controller, self.limits, self._scene = controller, limits, scene
         controller.reset(scene=scene)
@@ -110,8 +110,10 @@ class Machine:
                 self._enter(wanted, given, "requested")
             else:
                 self.events.append(f"{wanted} refused: {refusal}")
-        if self.state in MOVING:
-            self._warn()
+        if self.state in MOVING:  # warn once after each Stand of a battery that is low or a motor that is warm
+            found = self._exhausted(self.limits.battery, self.limits.temperature)
+            self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
+            self._warned |= found.keys()
         self._last = given.now
         if self.state is State.RUN:
             self._act(given)
@@ -133,20 +135,14 @@ class Machine:
         limits, posture = self.limits, self.sensors.posture
         assert posture is not None
         return (
-            watchdogs.stale(self.sensors, now, limits)
-            or watchdogs.beyond(posture, self._contract, limits)
+            checks.stale(self.sensors, now, limits)
+            or checks.beyond(posture, self._contract, limits)
             or next(iter(self._exhausted(limits.battery_empty, limits.temperature_hot).values()), None)
         )
 
     def _exhausted(self, least: float, most: float) -> dict[str, str]:
         assert self.sensors.posture is not None
-        return watchdogs.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
-
-    def _warn(self) -> None:
-        """Tells once after each Stand that the battery is low, or that a motor is warm."""
-        found = self._exhausted(self.limits.battery, self.limits.temperature)
-        self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
-        self._warned |= found.keys()
+        return checks.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
 
     def _refusal(self, wanted: State, given: Inputs) -> str | None:
         """The reason not to enter a state that is asked for."""

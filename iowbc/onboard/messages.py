@@ -65,7 +65,6 @@ HEADER = b"\x00\x01\x00\x00"
 
 
 def empty(kind: np.dtype[np.void]) -> Record:
-    """A message of zeros."""
     return np.zeros((), kind)
 
 

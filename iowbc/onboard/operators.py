@@ -62,8 +62,7 @@ class Ranges:
 
     def clipped(self, command: Array) -> Array:
         """The command within the ranges, (11,)."""
-        inside: Array = np.clip(command, self._low, self._high)
-        return inside
+        return np.clip(command, self._low, self._high)
 
 
 class Remote:
@@ -186,7 +185,6 @@ class Udp:
         return replace(last, request=request)
 
     def close(self) -> None:
-        """Gives the port free."""
         self._socket.close()
 
     def _given(self, given: Datagram, now: float) -> Wanted:

@@ -11,7 +11,6 @@ from typing import Protocol
 import numpy as np
 
 from iowbc.onboard import messages
-from iowbc.onboard.bus import Bus
 from iowbc.onboard.checks import Listened
 from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import FREQUENCY, Inputs, Machine, State
@@ -29,6 +28,25 @@ REALTIME_PRIORITY = 60
 """Above ordinary threads of the kernel's real-time class, below its own."""
 KEPT_TIMES = 1 << 20
 """Latest turns of which times are kept for the statistics: 35 minutes."""
+
+
+class Bus(Protocol):
+    """Publishes messages and takes those of other participants; topics follow from the kinds of messages."""
+
+    def publish(self, message: Record) -> None:
+        """Sends a message of any kind."""
+
+    def take(self, kind: np.dtype[np.void]) -> list[Record]:
+        """Messages of a kind from others since the last call, oldest first."""
+
+    def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
+        """Waits until there is something to take; False where nothing came in time."""
+
+    def high_level_mode(self, seconds: float) -> str | None:
+        """Name of the robot's own controller that is active, "" for none, None where the robot does not answer."""
+
+    def close(self) -> None:
+        """Leaves the bus."""
 
 
 class Clock(Protocol):

@@ -98,7 +98,6 @@ class Sensors:
 
     @property
     def measured(self) -> Measured:
-        """The newest measurements as a row."""
         assert self.posture is not None
         now = self.posture
         return Measured(

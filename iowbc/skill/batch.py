@@ -13,11 +13,10 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
 from iowbc.skill.agents import Human, NominalCommand, Wanted, by_the_clock, pursue
-from iowbc.skill.draws import EpisodeDraws
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
-from iowbc.skill.lower_layer import LowerLayer, Student
+from iowbc.skill.lower_layer import LowerLayer
 from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES
+from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, EpisodeDraws
 from iowbc.skill.reward import GameEnding, ending, potential, reward
 from iowbc.skill.situation import Origin, Situation, situation, turned
 from iowbc.task.episodes import Episode
@@ -45,7 +44,7 @@ class GameBatch:
         episodes = [
             Episode(scene, int(key), FOREVER, UNDISTURBED) for scene, key in zip(scenes, self._keys, strict=True)
         ]
-        self.lower = LowerLayer(setup.specification, self._games, episodes, block_size(setup.count))
+        self.lower = LowerLayer(setup.specification, setup.student, self._games, episodes, block_size(setup.count))
         self.n = n = last - first
         period, own = self.lower.period, list(setup.tasks.values())
         self.substeps = round(1.0 / (self._skill.frequency * period))
@@ -61,7 +60,7 @@ class GameBatch:
         self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n)
         self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self.substeps)
         self._sees_object = recipe.task.observation.observe_object and recipe.distill.observe_object
-        self.origin = Origin.blank(n)
+        self.origin = Origin(np.zeros((n, 3)), np.zeros(n))
         self._episode, self._decisions, self._touched = np.zeros((3, n), np.int64)
         self._total, self._potential = np.zeros((2, n))
         self._felt = np.zeros((n, self._skill.robot.history, 2, 3))
@@ -75,10 +74,6 @@ class GameBatch:
         """The games after the last control step."""
         self.watch: Callable[[], None] = lambda: None
         """Called after every control step."""
-
-    def take(self, student: Student) -> None:
-        """The student that controls from now on."""
-        self.lower.take(student)
 
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
         """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
@@ -101,7 +96,6 @@ class GameBatch:
         self.conclude()
 
     def decide(self) -> None:
-        """Takes over the actions."""
         action = {name: self.buffers[f"action/{name}"].astype(np.float64).clip(-1.0, 1.0) for name in self._action}
         self._jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
         self._action = action
@@ -110,7 +104,6 @@ class GameBatch:
         self._costs[:] = 0.0
 
     def control(self) -> None:
-        """One control step."""
         lower, simulation = self.lower, self.lower.simulation
         person = self.drawn.kind == KINDS.index(PERSON)
         if person.any():
@@ -126,14 +119,14 @@ class GameBatch:
         self.watch()
 
     def conclude(self) -> None:
-        """Judges the decision."""
-        self._decisions += 1
-        self._feel()
-        self._judge(self._costs * self.lower.period, self._jerk)
-
-    def _judge(self, costs: Array, jerk: Array) -> None:
         """Reward and endings of the decision just made; begins anew where a game has ended."""
+        self._decisions += 1
         lower, buffers, held = self.lower, self.buffers, ~self._pushing
+        force, wrists = self._hands.read(lower.measured.projected_gravity)
+        self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
+        memory, guidance = lower.memory, lower.guidance
+        target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
+        self._wrist_error = wrists - target
         touched = self._in_wall()
         end = ending(
             self._skill,
@@ -144,7 +137,9 @@ class GameBatch:
             late=self._decisions >= self._limit[self.drawn.task],
         )
         before, self._potential = self._potential, potential(self._skill, self.now, held)
-        buffers["reward"][:] = reward(self._skill, self._potential - before, end, costs, jerk, touched)
+        buffers["reward"][:] = reward(
+            self._skill, self._potential - before, end, self._costs * lower.period, self._jerk, touched
+        )
         self._total += buffers["reward"]
         self._touched += touched
         buffers["terminated"][:], buffers["truncated"][:] = end.terminated, end.time_out
@@ -193,8 +188,7 @@ class GameBatch:
         }
         unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
         self.buffers["privileged_action"][:] = nominal.action_of(by_rule["lead"], by_rule["follow"]) * unaware
-        command: Array = np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
-        return command
+        return np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
 
     def _intentions(self, action: Array) -> Array:
         """Intentions of the humans, (n, 5)."""
@@ -234,15 +228,7 @@ class GameBatch:
             touched |= np.abs(place.lateral) > self.paths.half_width(task, place.covered)
         return touched
 
-    def _feel(self) -> None:
-        """The robots' estimate of the forces on their hands."""
-        force, wrists = self._hands.read(self.lower.measured.projected_gravity)
-        self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
-        memory, references = self.lower.memory, self.lower.guidance.references
-        self._wrist_error = wrists - references.wrist_target(memory.posture, memory.command, self.lower.guidance.grasp)
-
     def _observe(self, time: str) -> None:
-        """Writes what agents and critic see."""
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
         path = seen.waypoints(self.paths, now, ahead, now.heading)
         thing = of_object(lower.measured, self._sees_object)

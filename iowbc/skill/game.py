@@ -106,7 +106,8 @@ class TransportGame:
         where a worker dies or hangs."""
         skill = specification.recipe.skill
         drawn = skill.partners.training if partners is None else partners
-        self.setup = GameSetup(specification, n, seed, tuple(drawn), None if plans is None else tuple(plans))
+        planned = None if plans is None else tuple(plans)
+        self.setup = GameSetup(specification, student, n, seed, tuple(drawn), planned)
         self.n, self.decision_rate = n, skill.frequency
         found = dict(sizes(skill))
         self.state_size = found.pop("state")
@@ -114,15 +115,13 @@ class TransportGame:
         self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
         self._buffers = self._workers.buffers
         self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
-        self._call(Message.of(GameBatch.take, student))
 
     @property
     def batch(self) -> GameBatch:
         """The games themselves, where they are played in this process."""
         if not isinstance(self._workers, InProcess):
             raise AttributeError("the games live in worker processes; make the game with workers=0")
-        batch: GameBatch = self._workers.batch
-        return batch
+        return self._workers.batch
 
     @property
     def human_acts(self) -> Mask:
@@ -139,15 +138,14 @@ class TransportGame:
 
         `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
         own = [None if seeds is None else seeds[first:last] for first, last in self._workers.groups]
-        self._workers.ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
-        self._workers.answers()
+        self._ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
         return self._observed("now")
 
     def step(self, actions: Mapping[str, Array]) -> Outcome:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
         finite."""
         self.act(actions)
-        self._call(Message.of(GameBatch.step))
+        self._ask([Message.of(GameBatch.step)] * len(self._workers.groups))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:
@@ -173,7 +171,6 @@ class TransportGame:
         )
 
     def close(self) -> None:
-        """Ends the workers."""
         self._workers.close()
 
     def _observed(self, time: str) -> Observed:
@@ -187,8 +184,8 @@ class TransportGame:
         values |= {name: np.array(known, object)[values[name].astype(np.int64)] for name, known in names.items()}
         return values | {name: values[name].astype(np.int64) for name in ("environment", "episode")}
 
-    def _call(self, message: Message) -> None:
-        self._workers.ask([message for _ in self._workers.groups])
+    def _ask(self, messages: Sequence[Message]) -> None:
+        self._workers.ask(messages)
         self._workers.answers()
 
     def __enter__(self) -> Self:

@@ -16,7 +16,7 @@ from iowbc.learning.ppo import adapted, explained_variance
 from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.skill.game import HUMAN, ROBOT, Game, Observed
-from iowbc.skill.trained import Trained
+from iowbc.skill.trained import Trained, acted
 
 Array = NDArray[np.float32]
 
@@ -43,7 +43,6 @@ class SkillTraining:
         }
         seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
         self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
-        self._factor = torch.ones(0)
         self.imitated = self._nothing_imitated()
         """Observations and privileged actions of the robot while it imitates."""
 
@@ -53,7 +52,6 @@ class SkillTraining:
 
     @property
     def trained(self) -> dict[str, Trained]:
-        """All networks that learn, by name."""
         return {**self.agents, "critic": self.critic}
 
     @property
@@ -153,7 +151,6 @@ class SkillTraining:
             return np.asarray(self.critic.network(torch.from_numpy(seen))[:, 0].numpy())
 
     def _learn(self, samples: Mapping[str, Tensor]) -> dict[str, float]:
-        """Gradient steps on a rollout."""
         explained = {"train/explained_variance": explained_variance(samples["value"], samples["target"])}
         if self.steps <= self.settings.imitation_steps:
             found = {"imitation_error": self._imitate(samples), "value_loss": self._fit(samples)}
@@ -250,11 +247,8 @@ class SkillTraining:
         observed, found = self.game.reset(), []
         for _ in range(decisions):
             found.append(observed.observations[ROBOT])
-            with torch.inference_mode():
-                actions = {
-                    name: agent.network(torch.from_numpy(observed.observations[name])).clamp(-1.0, 1.0).numpy()
-                    for name, agent in self.agents.items()
-                }
+            seen, sizes = observed.observations, self.game.action_sizes
+            actions = {name: acted(agent.network, seen[name], sizes[name]) for name, agent in self.agents.items()}
             observed = self.game.step(actions).observed
         return np.concatenate(found)
 
@@ -268,7 +262,6 @@ class SkillTraining:
         return whole
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`, on a training made from the same recipe."""
         for name, each in self.trained.items():
             each.restore(under(name, arrays))
         self.steps = int(arrays["steps"][0])

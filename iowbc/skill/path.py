@@ -61,8 +61,7 @@ class Paths:
     def half_width(self, path: Indices, covered: Array) -> Array:
         """Distance of the walls from the path, (n,) [m]; infinite where there are none."""
         index = np.round(covered / SPACING).astype(np.int64).clip(0, self._last[path])
-        width: Array = self._half_width[path, index]
-        return width
+        return self._half_width[path, index]
 
     def outline(self, path: int) -> tuple[Array, Array]:
         """Points of one path, (k, 2) [m], and of its walls on both sides, (2, k, 2), NaN where there are none."""
@@ -86,8 +85,7 @@ class Paths:
         at = (covered / SPACING).clip(0.0, last)
         low = np.minimum(at.astype(np.int64), last - 1)
         before, behind = values[path, low], values[path, low + 1]
-        read: Array = before + (at - low) * (behind - before)
-        return read
+        return before + (at - low) * (behind - before)
 
 
 def _points(path: Sequence[Stretch]) -> Array:

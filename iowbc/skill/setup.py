@@ -12,6 +12,7 @@ from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.skill.task import TransportTask
 from iowbc.skill.batch import HUMAN_ACTIONS, ROBOT_ACTIONS, GameBatch
 from iowbc.skill.figures import FIGURES
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
 from iowbc.task.scenes import scene_of
@@ -24,6 +25,8 @@ class GameSetup:
     """All games of a `TransportGame`."""
 
     specification: Specification
+    student: Student
+    """The controller below the games."""
     count: int
     """Number of games."""
     seed: int
@@ -44,12 +47,10 @@ class GameSetup:
 
     @property
     def skill(self) -> Skill:
-        """The recipe's section."""
         return self.specification.recipe.skill
 
     @cached_property
     def tasks(self) -> dict[str, TransportTask]:
-        """Transport tasks by name."""
         return {name: getattr(self.skill.tasks, name) for name in self.skill.tasks.names}
 
     @cached_property

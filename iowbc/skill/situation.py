@@ -20,11 +20,6 @@ class Origin:
     heading: Array
     """(n,) [rad]."""
 
-    @classmethod
-    def blank(cls, n: int) -> "Origin":
-        """All zero."""
-        return cls(np.zeros((n, 3)), np.zeros(n))
-
     def set(self, which: Indices, simulation: Simulation, moved: Motion) -> None:
         """Puts the frames of some environments, (k,), where object and robot are."""
         self.position[which] = simulation.state.object_position[which]

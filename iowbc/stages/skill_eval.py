@@ -64,8 +64,7 @@ def run(job: Job) -> None:
     from iowbc.pipeline.store.runs import read_yaml
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
-    from iowbc.skill.evaluation.controllers import on_controller
-    from iowbc.skill.evaluation.games import Evaluation, cases
+    from iowbc.skill.evaluation.games import Evaluation, cases, on_controller
     from iowbc.skill.evaluation.tables import figure, headline, tables
     from iowbc.skill.game import TransportGame
     from iowbc.skill.lower_layer import load_student

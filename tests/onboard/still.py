@@ -7,7 +7,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
-from iowbc.onboard.limits import Limits
+from iowbc.onboard.limits import SafetyLimits
 from iowbc.onboard.machine import Inputs, Machine, State, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges
@@ -25,7 +25,7 @@ class Still:
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
-        self.machine = Machine(self.controller, "free", Limits(ramp=RAMP))
+        self.machine = Machine(self.controller, "free", SafetyLimits(ramp=RAMP))
         self.standing: Array = Ranges(self.controller.contract).standing
         self.posture = self.controller.settled_posture(self.standing)[0]
         self.begin = float(next(BEGINNINGS))

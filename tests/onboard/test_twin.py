@@ -13,7 +13,7 @@ from iowbc.errors import UsageError
 from iowbc.evaluation.exported import exported_world
 from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
-from iowbc.onboard.limits import Limits
+from iowbc.onboard.limits import SafetyLimits
 from iowbc.onboard.machine import Inputs, Machine, State, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges, object_poses
@@ -102,7 +102,7 @@ def test_a_fixture_is_released_when_asked_and_a_band_lowers_the_robot_and_slacke
 
 def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot_sends(sighted: Path) -> None:
     controller = Controller.load(sighted)
-    machine, standing = Machine(controller, "lift", Limits(ramp=0.1)), Ranges(controller.contract).standing
+    machine, standing = Machine(controller, "lift", SafetyLimits(ramp=0.1)), Ranges(controller.contract).standing
     fixed = {"impulse_scale": 0.0, "push_scale": 0.0, "partner_share": 0.0, "object_mass": 4.0}
     posture = controller.settled_posture(standing)[0]
     simulation = exported_world(sighted).recipe.simulation

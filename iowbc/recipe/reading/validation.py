@@ -190,20 +190,15 @@ def _inside(annotation: Any, name: str) -> Iterator[Any]:
         if name in model.model_fields:
             yield model.model_fields[name].annotation
         elif issubclass(model, NamedEntries):
-            yield model.own_type()
+            yield get_args(model.__annotations__["__pydantic_extra__"])[1]
     for collection in _alternatives(annotation):
         if collection not in models:
             yield from [argument for argument in get_args(collection) if argument is not Ellipsis][-1:]
 
 
-@functools.cache
-def _all_paths() -> list[tuple[str, ...]]:
-    return list(_known_paths(Recipe, ()))
-
-
 def _elsewhere(name: str) -> str:
     """`; did you mean 'section.name'?` where a misplaced key belongs to exactly one other section."""
-    places = [path for path in _all_paths() if path[-1] == name]
+    places = [path for path in _known_paths(Recipe, ()) if path[-1] == name]
     return f"; did you mean '{'.'.join(places[0])}'?" if len(places) == 1 else ""
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.section import LATER, OWN_NAME, NamedEntries, Section
+from iowbc.recipe.section import LATER, NamedEntries, OwnName, Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.recipe.task.joint_references import References
@@ -38,9 +38,7 @@ class Observation(Section):
     observe_object: bool = True
     """Puts into s_t the object's pose and rates in the base frame (eq. 5); otherwise teacher and student have
     proprioception alone. `distill.observe_object` is for the student."""
-    own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnPart] = Field(
-        default_factory=dict, json_schema_extra=LATER
-    )
+    own: dict[OwnName, OwnPart] = Field(default_factory=dict, json_schema_extra=LATER)
     """Parts of s_priv of one's own, by name; only what trains or plays a policy that sees s_priv executes them."""
 
 
@@ -89,7 +87,6 @@ class SceneShares(NamedEntries):
 
     @classmethod
     def only(cls, scene: str) -> Self:
-        """One scene alone."""
         return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
 
     def problems(self) -> Iterator[tuple[str, str]]:

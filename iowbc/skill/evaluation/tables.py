@@ -105,8 +105,7 @@ def by_training(games: pd.DataFrame, figure: str) -> Values:
     wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
         index="training", columns=UNIT, values=figure
     )
-    found: Values = wide.to_numpy(np.float64)
-    return found
+    return wide.to_numpy(np.float64)
 
 
 def worst_partner(games: pd.DataFrame) -> tuple[float, float, float]:
