@@ -20,8 +20,8 @@ from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
 from iowbc.skill.films import path_lines
 from iowbc.skill.game import COUNTED, TransportGame
-from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import PERSON, Plan, Rule
+from iowbc.skill.student import Student
 from iowbc.skill.trained import acted
 from iowbc.task.specification import Specification
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.skill.game import TransportGame, nominal, play_once
-from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
+from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2

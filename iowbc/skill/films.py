@@ -11,9 +11,9 @@ from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.game import Actions, Observed, TransportGame, nominal, play_once
-from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import Plan
 from iowbc.skill.situation import turned
+from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 PATH, WALL = (0.1, 0.35, 0.8, 1.0), (0.55, 0.2, 0.15, 1.0)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from iowbc.arrays import Array, Keys, Mask
 from iowbc.errors import Interrupted
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.figures import FIGURES
-from iowbc.skill.lower_layer import Student
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.setup import GameSetup
+from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
@@ -23,7 +23,6 @@ PATIENCE = 60.0
 COUNTED = ("success", "fallen", "dropped", "strayed", "diverged", "time_out", "known")
 
 
-ROBOT, HUMAN = "robot", "human"
 Actions = Mapping[str, Array]
 
 
@@ -56,39 +55,10 @@ class Outcome:
     and partner are names."""
 
 
-class Game(Protocol):
-    """n games that are played side by side; see `TransportGame`."""
-
-    n: int
-    state_size: int
-
-    @property
-    def observation_sizes(self) -> Mapping[str, int]:
-        """Of each agent."""
-
-    @property
-    def action_sizes(self) -> Mapping[str, int]:
-        """Of each agent."""
-
-    @property
-    def human_acts(self) -> Mask:
-        """Games whose human is that of the actions, (n,)."""
-
-    @property
-    def privileged_actions(self) -> Array:
-        """What a robot that knew all would do now, (n, actions)."""
-
-    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
-        """Begin every game anew."""
-
-    def step(self, actions: Mapping[str, Array]) -> Outcome:
-        """One decision of both agents."""
-
-
 class TransportGame:
     """n games. What comes of them follows from seed and game, however many workers there are."""
 
-    agents = (ROBOT, HUMAN)
+    agents = ("robot", "human")
 
     def __init__(
         self,

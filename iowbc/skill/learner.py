@@ -15,7 +15,8 @@ from iowbc.learning.policy import VALUE_GAIN
 from iowbc.learning.ppo import adapted, explained_variance
 from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.learning import SkillLearning
-from iowbc.skill.game import HUMAN, ROBOT, Game, Observed
+from iowbc.skill.game import Observed
+from iowbc.skill.markov_game import HUMAN, ROBOT, Game
 from iowbc.skill.trained import Trained, acted
 
 Array = NDArray[np.float32]

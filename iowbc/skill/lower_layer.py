@@ -1,17 +1,15 @@
 """The lower layer of the game: environments with the frozen student at the control frequency."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Keys
 from iowbc.control.command import nominal_command
-from iowbc.errors import StageFailed
 from iowbc.rollouts.blocks import in_blocks
 from iowbc.rollouts.history import History
-from iowbc.rollouts.policies import HistoryPolicy
+from iowbc.skill.student import Student
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.judge import Judgement
@@ -19,29 +17,6 @@ from iowbc.task.motion import Motion
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
-
-
-@dataclass(frozen=True)
-class Student:
-    """A student and the length of its history."""
-
-    policy: HistoryPolicy
-    history: int
-    """Observations in H_t."""
-    observation: int
-    """Size of the part of s_t that it sees."""
-
-
-def load_student(folder: Path) -> Student:
-    """The student in the artifact of `distill`. Raises StageFailed for a policy that is none."""
-    from iowbc.learning.as_numpy import student_policy
-    from iowbc.learning.networks import StudentNetwork
-    from iowbc.learning.storage import load_network
-
-    network, about = load_network(folder)
-    if not isinstance(network, StudentNetwork):
-        raise StageFailed(f"{folder} holds no student; name an artifact of the stage `distill`")
-    return Student(student_policy(network), int(about["architecture"]["history"]), network.observation)
 
 
 class LowerLayer(Batch):

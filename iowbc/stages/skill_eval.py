@@ -67,7 +67,7 @@ def run(job: Job) -> None:
     from iowbc.skill.evaluation.games import Evaluation, cases, on_controller
     from iowbc.skill.evaluation.tables import figure, headline, tables
     from iowbc.skill.game import TransportGame
-    from iowbc.skill.lower_layer import load_student
+    from iowbc.skill.student import load_student
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Keys
-from iowbc.skill.game import HUMAN, ROBOT, Observed, Outcome
+from iowbc.skill.game import Observed, Outcome
+from iowbc.skill.markov_game import HUMAN, ROBOT
 
 PERIOD, FRICTION, DECISIONS = 0.2, 0.6, 25
 

@@ -11,8 +11,8 @@ from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import robot_folder
 from iowbc.skill.admission import admissions
 from iowbc.skill.films import film_game
-from iowbc.skill.lower_layer import Student, load_student
 from iowbc.skill.plan import Plan
+from iowbc.skill.student import Student, load_student
 from iowbc.task.specification import Specification
 
 PUBLISHED = Path("runs/published")

@@ -18,8 +18,8 @@ from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import load_robot
 from iowbc.skill.game import Observed, TransportGame, play_once
-from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import AGENT, Plan, Rule
+from iowbc.skill.student import Student
 from iowbc.skill.trained import acted
 from iowbc.task.specification import Specification
 
