@@ -136,9 +136,7 @@ class GameSession(Played):
 class GamePanel(ControlPanel):
     """Choice of the game; the mouse does the rest."""
 
-    def __init__(self, gui: viser.GuiApi, session: GameSession, trials: Sequence[str]) -> None:
-        self._session = session
-        super().__init__(gui, session, trials)
+    _session: GameSession
 
     def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
         request, gui = self._session.request, self._gui

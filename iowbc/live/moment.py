@@ -108,20 +108,18 @@ class Witness(SimulationWitness):
         self._reference = mujoco.MjData(self.model)
 
     def look(self, seconds: float) -> Moment:
-        return replace(
-            super().look(seconds),
-            reference=self._posture(),
-            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
-            signals={name: values[0].copy() for name, values in self._signals.items()},
-        )
-
-    def _posture(self) -> Array:
+        moment = super().look(seconds)
         robot, memory, reference = self._simulation.robot, self.batch.memory, self._reference
         reference.qpos[:] = self._appearance.data.qpos
         joints = reference.qpos[self._world.layout.joints]
         joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
         mujoco.mj_kinematics(self.model, reference)
-        return _poses(reference)
+        return replace(
+            moment,
+            reference=_poses(reference),
+            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
+            signals={name: values[0].copy() for name, values in self._signals.items()},
+        )
 
 
 def _poses(data: Any) -> Array:

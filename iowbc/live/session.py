@@ -75,8 +75,10 @@ class Session(Played):
     def step(self) -> None:
         if self.track.ending:
             return
-        self._apply()
         environment, layout = self.environment, self.environment.layout
+        simulation = environment.batch.simulation
+        simulation.planned_push[0] = self._force("robot")
+        simulation.planned_impulse[0] = self._force("object") if simulation.state.has_object[0] else 0.0
         seen = self._observation
         action = self._policy.act(seen[:, layout.observation], seen[:, layout.privileged])
         self._observation, _, done, infos = environment.step(action)
@@ -105,12 +107,6 @@ class Session(Played):
     def pull(self, what: Pushed, force: Array) -> None:
         """A steady force, world frame, (3,) [N], until another is told."""
         self._pull[what] = np.asarray(force, np.float64)
-
-    def _apply(self) -> None:
-        simulation = self.environment.batch.simulation
-        carried = simulation.state.has_object[0]
-        simulation.planned_push[0] = self._force("robot")
-        simulation.planned_impulse[0] = self._force("object") if carried else 0.0
 
     def _force(self, what: Pushed) -> Array:
         force, left = self._blow[what]

@@ -79,10 +79,6 @@ def path_lines(batch: GameBatch, game: int) -> list[tuple[Array, tuple[float, ..
         present = np.isfinite(wall[:, 0])
         pieces = np.split(np.arange(len(wall)), np.flatnonzero(np.diff(present)) + 1)
         lines += [(wall[piece][[*range(0, len(piece), EVERY), -1]], WALL) for piece in pieces if present[piece[0]]]
-    return [(_in_world(batch, game, line), colour) for line, colour in lines]
-
-
-def _in_world(batch: GameBatch, game: int, points: Array) -> Array:
-    origin = batch.origin
-    moved = turned(points, np.full(len(points), origin.heading[game])) + origin.position[game, :2]
-    return np.column_stack([moved, np.full(len(points), HEIGHT)])
+    heading, start = batch.origin.heading[game], batch.origin.position[game, :2]
+    moved = [(turned(line, np.full(len(line), heading)) + start, colour) for line, colour in lines]
+    return [(np.column_stack([line, np.full(len(line), HEIGHT)]), colour) for line, colour in moved]
