@@ -1,6 +1,6 @@
 """Admission of transport tasks: a task is one where two are needed, and where they need to heed each other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +59,6 @@ def admissions(
     trials: int,
     workers: int,
     tasks: Sequence[str] = (),
-    interrupted: Callable[[], bool] = lambda: False,
 ) -> list[Admission]:
     """Plays every task, or those named, with each scripted pair; `trials` of each, with the same seeds."""
     names = tuple(tasks) or specification.recipe.skill.tasks.names
@@ -70,7 +69,7 @@ def admissions(
         for seed in range(trials)
     ]
     with TransportGame(specification, student, n=len(plans), workers=workers, plans=plans) as game:
-        figures = play_once(game, nominal(game), interrupted)
+        figures = play_once(game, nominal(game))
 
     def means(name: str, own: Mask) -> dict[str, float]:
         rows: Array = figures[name][own].astype(np.float64).reshape(len(PAIRS), trials).mean(axis=1)

@@ -160,7 +160,8 @@ class GameBatch:
         lower.simulation.hold(self.drawn.draw(which, key), which)
         lower.wanted[which] = self._nominal.standing()[which]
         lower.start(which)
-        self.origin.set(which, lower.simulation, lower.moved)
+        self.origin.position[which] = lower.simulation.state.object_position[which]
+        self.origin.heading[which] = lower.moved.heading[which]
         covered = np.zeros(self.n) if len(which) == self.n else self.now.covered.copy()
         covered[which] = 0.0
         self.now = self._situation(covered)

@@ -1,6 +1,5 @@
 """Films of games: force arrows, and the path and its walls on the ground."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from iowbc.evaluation.films import with_text, written_film
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.skill.batch import GameBatch
-from iowbc.skill.game import Actions, Observed, TransportGame, nominal, play_once
+from iowbc.skill.game import TransportGame, nominal, play_once
 from iowbc.skill.plan import Plan
 from iowbc.skill.situation import turned
 from iowbc.skill.student import Student
@@ -31,16 +30,11 @@ def film_game(
     plan: Plan,
     path: Path,
     video: Video,
-    act: Callable[[TransportGame], Callable[[Observed], Actions]] = nominal,
-    interrupted: Callable[[], bool] = lambda: False,
 ) -> dict[str, Array]:
-    """Films the first episode of a planned game into an mp4 file, by default with nominal commands; its figures.
-
-    Raises NoRenderer where nothing can be drawn, Interrupted.
-    """
+    """Films the first episode of a planned game with nominal commands into an mp4 file; its figures. Raises NoRenderer
+    where nothing can be drawn."""
     with TransportGame(specification, student, n=1, plans=(plan,)) as game, written_film(path, video.fps) as add:
         batch = game.batch
-        act_now = act(game)
         game.reset()
         simulation = batch.lower.simulation
         azimuth = float(np.degrees(batch.origin.heading[0])) + VIEW
@@ -59,7 +53,7 @@ def film_game(
                     frames += 1
 
             batch.watch = watch
-            return play_once(game, act_now, interrupted)
+            return play_once(game, nominal(game))
 
 
 def captions(batch: GameBatch, plan: Plan, seconds: float) -> list[str]:

@@ -175,19 +175,14 @@ def play_once(
     game: TransportGame,
     act: Callable[[Observed], Actions],
     interrupted: Callable[[], bool] = lambda: False,
-    look: Callable[[int], None] = lambda decision: None,
 ) -> dict[str, Array]:
-    """Figures of the first episode of every game, (n,) by name, in the order of the games.
-
-    `act` gives the actions for what is observed; `look` is told the number of each decision before it is made. Raises
-    Interrupted once `interrupted()` is true.
-    """
+    """Figures of the first episode of every game, (n,) by name, in the order of the games. `act` gives the actions for
+    what is observed. Raises Interrupted once `interrupted()` is true."""
     observed, decision = game.reset(), 0
     rows: dict[int, dict[str, Array]] = {}
     while len(rows) < game.n:
         if interrupted():
             raise Interrupted(f"stopped after {decision / game.decision_rate:.0f} s of {game.n} games")
-        look(decision)
         outcome = game.step(act(observed))
         observed, decision = outcome.observed, decision + 1
         for place, row in enumerate(outcome.figures["environment"].tolist()):

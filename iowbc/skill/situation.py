@@ -20,11 +20,6 @@ class Origin:
     heading: Array
     """(n,) [rad]."""
 
-    def set(self, which: Indices, simulation: Simulation, moved: Motion) -> None:
-        """Puts the frames of some environments, (k,), where object and robot are."""
-        self.position[which] = simulation.state.object_position[which]
-        self.heading[which] = moved.heading[which]
-
     def turned(self, vectors: Array) -> Array:
         """World vectors (n, 3) or planar ones (n, 2) in these frames."""
         return turned(vectors, -self.heading)

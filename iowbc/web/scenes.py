@@ -70,10 +70,11 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
     started, drawn = simulation.worlds[0], simulation.drawn
     layout, physics = started.layout, recipe.simulation.physics
     timing = Timing(simulation.period, physics.timestep, 0)
+    own = started.fields.of(0)  # after its start, for those that differ between simulations
     described = {
         "kind": scene.kind,
         "xml": _plain(scene_spec(robot, physics, scene, timing, dressed=False)),
-        "fields": _fields(started),
+        "fields": {each: np.ravel(own.get(each, getattr(started.model, each))).tolist() for each in FIELDS},
         "start": started.qpos[0].tolist(),
         "period": simulation.period,
         "substeps": timing.substeps,
@@ -146,12 +147,6 @@ def _plain(spec: Any) -> str:
     for part in (*spec.actuators, *spec.sensors):
         part.nsample = 0
     return spec.to_xml()
-
-
-def _fields(world: World) -> dict[str, list[float]]:
-    """The model's numbers as the simulation has them after its start, those that differ between simulations too."""
-    own: Mapping[str, Array] = world.fields.of(0)
-    return {name: np.ravel(own[name] if name in own else getattr(world.model, name)).tolist() for name in FIELDS}
 
 
 def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
