@@ -39,7 +39,7 @@ class Moment:
     """Figures of the step just made, each (k,); in an environment those that a trial records."""
 
 
-class SimulationWitness:
+class SimulationRecorder:
     """Takes down the moments of the first environment of a simulation, which know no reference and no command."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -98,7 +98,7 @@ class SimulationWitness:
         return np.column_stack([hull, np.zeros(len(hull))])
 
 
-class Witness(SimulationWitness):
+class MomentRecorder(SimulationRecorder):
     """Takes down the moments of the first environment of a batch, in its present episode."""
 
     def __init__(self, batch: Batch, signals: Mapping[str, Array]) -> None:

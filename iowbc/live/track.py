@@ -17,7 +17,7 @@ from iowbc.evaluation.trials.rollout import RECORDED, in_batch, play_in, trace_o
 from iowbc.evaluation.trials.table import replayed
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks
-from iowbc.live.moment import Moment, Witness
+from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
@@ -147,15 +147,15 @@ def recorded(environment: VectorEnv) -> dict[str, Array]:
     return {name: environment.signals[name] for name in RECORDED}
 
 
-def track_of(witness: Witness, world: Specification, title: str, kept: int | None = None) -> Track:
-    """An empty track of a witness's present episode in a world; `kept`: how many of the last moments it keeps."""
+def track_of(recorder: MomentRecorder, world: Specification, title: str, kept: int | None = None) -> Track:
+    """An empty track of a recorder's present episode in a world; `kept`: how many of the last moments it keeps."""
     return Track(
         title=title,
-        model=witness.model,
-        period=witness.batch.period,
+        model=recorder.model,
+        period=recorder.batch.period,
         gait_period=1.0 / world.recipe.task.references.gait.frequency,
-        held_weight=witness.held_weight,
-        joints=witness.batch.robot.joints,
+        held_weight=recorder.held_weight,
+        joints=recorder.batch.robot.joints,
         moments=deque(maxlen=kept),
     )
 
@@ -183,16 +183,16 @@ def played_again(
     """
     environment = VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     seen: list[Moment] = []
-    witness: list[Witness] = []
+    recorder: list[MomentRecorder] = []
 
     def look(seconds: float) -> None:
-        if not witness:
-            witness.append(Witness(environment.batch, recorded(environment)))
-        seen.append(witness[0].look(seconds))
+        if not recorder:
+            recorder.append(MomentRecorder(environment.batch, recorded(environment)))
+        seen.append(recorder[0].look(seconds))
 
     try:
         outcome = play_in(environment, in_batch(actor.policy, row), interrupted, progress, look)[0]
-        track = track_of(witness[0], actor.world, _title(row))
+        track = track_of(recorder[0], actor.world, _title(row))
         track.ending = outcome.ending
         track.moments.extend(seen)
         return track

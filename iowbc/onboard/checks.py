@@ -11,7 +11,7 @@ from iowbc.deploy.contract import Contract
 from iowbc.deploy.controller import Controller
 from iowbc.onboard.limits import SafetyLimits
 from iowbc.onboard.messages import Record
-from iowbc.onboard.sensors import Posture, Sensors
+from iowbc.onboard.sensors import MeasuredState, Sensors
 
 MODEL = 5
 """`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
@@ -24,7 +24,7 @@ FURTHEST = 1.0
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckResult:
     """One check and how it ended."""
 
     name: str
@@ -45,12 +45,12 @@ class Listened:
     """Active controller of the robot's own, "" for none, None without an answer."""
 
 
-def checks(controller: Controller, heard: Listened, wanted: Array, limits: SafetyLimits) -> list[Check]:
+def checks(controller: Controller, heard: Listened, wanted: Array, limits: SafetyLimits) -> list[CheckResult]:
     """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:
         text = f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?"
-        return [Check("states", False, text)]
+        return [CheckResult("states", False, text)]
     sensors = Sensors(len(contract.joints))
     sensors.take(tuple(heard.states), heard.seconds)
     assert sensors.posture is not None
@@ -64,34 +64,34 @@ def checks(controller: Controller, heard: Listened, wanted: Array, limits: Safet
     if heard.mode is None:
         mode = "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
     return [
-        Check("states", rate > 400.0, f"{rate:.0f} a second, 400 or more are needed"),
-        Check("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
-        Check("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
-        Check("mode", heard.mode == "", mode),
-        Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
-        Check("joints", outside is None, outside or "within limits, no motor overloaded, upright enough"),
-        Check("battery", charge is not None and charge >= limits.battery, battery),
-        Check("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
+        CheckResult("states", rate > 400.0, f"{rate:.0f} a second, 400 or more are needed"),
+        CheckResult("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
+        CheckResult("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
+        CheckResult("mode", heard.mode == "", mode),
+        CheckResult("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
+        CheckResult("joints", outside is None, outside or "within limits, no motor overloaded, upright enough"),
+        CheckResult("battery", charge is not None and charge >= limits.battery, battery),
+        CheckResult("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
         _dry_run(controller, sensors, wanted),
     ]
 
 
-def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> Check:
+def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> CheckResult:
     """Steps of the policy on the posture as measured, of which no command is sent."""
     if not quantities(of_object=True).keys().isdisjoint(port.name for port in controller.contract.inputs):
-        return Check("policy", True, "observes the object: tried when its pose arrives")
+        return CheckResult("policy", True, "observes the object: tried when its pose arrives")
     controller.reset()
     default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0
     for step in range(DRY_STEPS):
         targets = controller.step(sensors.measured, wanted, measured_at=float(step))
         if targets.held[0]:
-            return Check("policy", False, targets.reasons[0])
+            return CheckResult("policy", False, targets.reasons[0])
         away = np.abs(targets.position[0] - default)
         joint = int(np.argmax(away))
         furthest = max(furthest, float(away[joint]))
     controller.reset()
     name = controller.contract.joints[joint]
-    return Check(
+    return CheckResult(
         "policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})"
     )
 
@@ -106,7 +106,7 @@ def stale(sensors: Sensors, now: float, limits: SafetyLimits) -> str | None:
     return None
 
 
-def beyond(now: Posture, contract: Contract, limits: SafetyLimits) -> str | None:
+def beyond(now: MeasuredState, contract: Contract, limits: SafetyLimits) -> str | None:
     """The reason where a measurement is no number or beyond a limit."""
     measured = np.concatenate([now.position, now.velocity, now.torque, now.gravity, now.turning])
     if not np.isfinite(measured).all():
@@ -126,7 +126,9 @@ def beyond(now: Posture, contract: Contract, limits: SafetyLimits) -> str | None
     return None
 
 
-def exhausted(now: Posture, charge: float | None, joints: tuple[str, ...], least: float, most: float) -> dict[str, str]:
+def exhausted(
+    now: MeasuredState, charge: float | None, joints: tuple[str, ...], least: float, most: float
+) -> dict[str, str]:
     """Complaints about a battery below `least` and a motor above `most` [°C]; `charge`: None where unknown [%]."""
     found = {}
     if charge is not None and charge < least:

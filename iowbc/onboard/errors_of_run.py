@@ -20,7 +20,7 @@ from iowbc.robot.description import Robot
 
 
 @dataclass(frozen=True)
-class Run:
+class LoggedRun:
     """Motion of a robot in Run, at the rate of the policy; first axis: T control steps."""
 
     time: Array
@@ -51,7 +51,7 @@ class Run:
 UNITS = {"E_v": "m/s", "E_ψ": "rad", "E_α": "rad", "E_h": "m"}
 
 
-def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> Run:
+def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> LoggedRun:
     """The part of a log in which the policy acted. Raises UsageError where it never did, Damaged for another file."""
     sensors, every = Sensors(len(robot.joints)), round(FREQUENCY / control_frequency)
     full, rows, soles, begin = 0.99 * robot.kp, [], [], None
@@ -73,7 +73,7 @@ def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency:
     if len(rows) < 2:
         raise UsageError(f"{path}: the robot never ran")
     table, feet = np.array(rows), np.array(soles)
-    return Run(
+    return LoggedRun(
         time=table[:, 0],
         command=table[:, 3:],
         height=-feet[..., 2].min(axis=1),

@@ -19,7 +19,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.errors import Damaged, UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.limits import SafetyLimits
-from iowbc.onboard.machine import Inputs, Machine, State, Wanted
+from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record, from_cdr, to_cdr
 
 TOPICS = {messages.LOW_STATE: "rt/lowstate", messages.LOW_COMMAND: "rt/lowcmd"}
@@ -52,7 +52,7 @@ class LogWriter:
         self._thread = threading.Thread(target=self._write, name="log")
         self._thread.start()
 
-    def turn(self, given: Inputs, command: Record) -> None:
+    def turn(self, given: TurnInputs, command: Record) -> None:
         wanted = given.wanted
         self.add(
             "inputs",
@@ -122,7 +122,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 
-def read_turns(path: Path) -> Iterator[tuple[Inputs, Record]]:
+def read_turns(path: Path) -> Iterator[tuple[TurnInputs, Record]]:
     """Inputs and command of each turn of the loop, in order. Raises Damaged and UsageError."""
     inputs: dict[str, Any] | None = None
     states: list[Record] = []
@@ -135,7 +135,7 @@ def read_turns(path: Path) -> Iterator[tuple[Inputs, Record]]:
             yield _inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data)
 
 
-def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:
+def _inputs(logged: dict[str, Any], states: list[Record]) -> TurnInputs:
     request = logged["request"]
     wanted = Wanted(
         command=np.array(logged["command"]),
@@ -144,7 +144,7 @@ def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:
         seen={name: np.array(values) for name, values in logged["seen"].items()},
         seen_at=_never(logged["seen_at"]),
     )
-    return Inputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
+    return TurnInputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
 
 
 def _finite(time: float) -> float | None:

@@ -59,7 +59,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Inputs:
+class TurnInputs:
     """Inputs of a turn of the loop."""
 
     now: float
@@ -97,7 +97,7 @@ class Machine:
         self._warned: set[str] = set()
         self._from = self._goal = self._target = np.array(contract.default_position)
 
-    def turn(self, given: Inputs) -> Record:
+    def turn(self, given: TurnInputs) -> Record:
         """The command to send."""
         self.events = []
         self.sensors.take(given.states, given.now)
@@ -119,7 +119,7 @@ class Machine:
             self._act(given)
         return self._command(given.now)
 
-    def _danger(self, given: Inputs) -> str | None:
+    def _danger(self, given: TurnInputs) -> str | None:
         """The reason to damp, if there is one."""
         limits = self.limits
         if given.others:
@@ -144,7 +144,7 @@ class Machine:
         assert self.sensors.posture is not None
         return checks.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
 
-    def _refusal(self, wanted: State, given: Inputs) -> str | None:
+    def _refusal(self, wanted: State, given: TurnInputs) -> str | None:
         """The reason not to enter a state that is asked for."""
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
@@ -168,7 +168,7 @@ class Machine:
             return self._uninformed(given)
         return None
 
-    def _uninformed(self, given: Inputs) -> str | None:
+    def _uninformed(self, given: TurnInputs) -> str | None:
         """The reason where the newest command, or object pose that the policy observes, is old."""
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
@@ -179,7 +179,7 @@ class Machine:
             return f"stale object pose: nothing new for {age:.2f} s"
         return None
 
-    def _enter(self, state: State, given: Inputs, why: str) -> None:
+    def _enter(self, state: State, given: TurnInputs, why: str) -> None:
         self.state, self._entered, self._turn = state, given.now, 0
         self.events.append(f"{state}: {why}")
         if state is State.STAND:
@@ -190,7 +190,7 @@ class Machine:
         elif state is State.RUN:
             self.controller.reset(scene=self._scene)
 
-    def _act(self, given: Inputs) -> None:
+    def _act(self, given: TurnInputs) -> None:
         """A step of the policy every `_turns` turns; what it refuses leads to damping."""
         if self._turn == 0:
             measured = replace(self.sensors.measured, **given.wanted.seen)

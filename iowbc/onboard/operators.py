@@ -200,7 +200,7 @@ class Udp:
 
 
 @dataclass(frozen=True)
-class Seeing:
+class OperatorWithPoses:
     """An operator beside whom another source delivers the object's pose."""
 
     operator: Operator

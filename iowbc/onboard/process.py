@@ -13,7 +13,7 @@ import numpy as np
 from iowbc.onboard import messages
 from iowbc.onboard.checks import Listened
 from iowbc.onboard.log import LogWriter
-from iowbc.onboard.machine import FREQUENCY, Inputs, Machine, State
+from iowbc.onboard.machine import FREQUENCY, Machine, State, TurnInputs
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator
 
@@ -22,7 +22,7 @@ PATIENCE = 1.0
 """Time after which a robot in lock step counts as gone [s]."""
 DISCOVERY = 10.0
 """For how long the first state is waited for [s]: participants find each other within some seconds."""
-FAREWELL = 0.5
+FINAL_DAMPING = 0.5
 """For how long damping is commanded at the end [s]."""
 REALTIME_PRIORITY = 60
 """Above ordinary threads of the kernel's real-time class, below its own."""
@@ -170,7 +170,7 @@ def drive(
             wanted = replace(wanted, request=State.DAMPING)
         batteries = bus.take(messages.BATTERY_STATE)
         charge = float(batteries[-1]["soc"]) if batteries else None
-        given = Inputs(now, states, wanted, others, charge)
+        given = TurnInputs(now, states, wanted, others, charge)
         command = machine.turn(given)
         bus.publish(command)
         for event in machine.events:
@@ -181,7 +181,7 @@ def drive(
             log.turn(given, command)
         kept[:, turns % KEPT_TIMES] = clock.late, time.perf_counter() - started
         turns += 1
-        if leaving is not None and now - leaving >= FAREWELL:
+        if leaving is not None and now - leaving >= FINAL_DAMPING:
             times = Times(*kept[:, :turns])
             if log is not None:
                 log.add("timing", now, text=str(times))

@@ -15,7 +15,7 @@ from iowbc.skill.situation import Situation, turned
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ObjectMotion:
     """Motion of the object, frame of the start."""
 
     velocity: Array
@@ -28,23 +28,23 @@ class Wanted:
     """Of the path a little ahead, (n,) [m]."""
 
 
-def pursue(settings: Pursuit, paths: Paths, now: Situation) -> Wanted:
+def pursue(settings: Pursuit, paths: Paths, now: Situation) -> ObjectMotion:
     """v = v_0 min(1, way left / slowing) t - k e n, with the tangent t, the distance e from the path, its normal n."""
     speed = settings.speed * np.minimum(1.0, now.left / settings.slowing)
     return _along(settings, paths, now, now.covered, speed, -settings.lateral * now.lateral)
 
 
-def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array, pace: Array | float = 1.0) -> Wanted:
+def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array, pace: Array | float) -> ObjectMotion:
     """The path at a pace (n,) times the nominal speed, whatever the object does; `seconds` (n,) since the start."""
     covered = settings.speed * pace * seconds
     speed = settings.speed * pace * (covered < paths.length[now.path])
     return _along(settings, paths, now, covered, speed, np.zeros(len(seconds)))
 
 
-def _along(settings: Pursuit, paths: Paths, now: Situation, covered: Array, speed: Array, aside: Array) -> Wanted:
+def _along(settings: Pursuit, paths: Paths, now: Situation, covered: Array, speed: Array, aside: Array) -> ObjectMotion:
     heading = paths.heading(now.path, covered)
     cosine, sine = np.cos(heading), np.sin(heading)
-    return Wanted(
+    return ObjectMotion(
         velocity=np.stack([speed * cosine - aside * sine, speed * sine + aside * cosine], axis=1),
         yaw_rate=paths.curvature(now.path, covered) * speed,
         heading=heading,
@@ -60,7 +60,7 @@ class NominalCommand(SkillCommand):
         super().__init__(skill.robot, commands, pushing)
         self._pursuit = skill.pursuit
 
-    def leading(self, wanted: Wanted, now: Situation) -> Array:
+    def leading(self, wanted: ObjectMotion, now: Situation) -> Array:
         """Commands that move the object as wanted: the base goes round the object's centre as it turns.
 
         v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the height of the path, and
@@ -107,7 +107,7 @@ class Human:
         scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
         return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)
 
-    def of_script(self, wanted: Wanted, now: Situation) -> Array:
+    def of_script(self, wanted: ObjectMotion, now: Situation) -> Array:
         """Intentions (n, 5) that move the object as wanted: the handle goes round its centre as it turns."""
         rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.yaw)
         arm = now.handle - now.position

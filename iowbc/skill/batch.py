@@ -12,7 +12,7 @@ from iowbc.control.skill_observation import YAW, joined, of_object, robot_observ
 from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
-from iowbc.skill.agents import Human, NominalCommand, Wanted, by_the_clock, pursue
+from iowbc.skill.agents import Human, NominalCommand, ObjectMotion, by_the_clock, pursue
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
 from iowbc.skill.lower_layer import LowerLayer
 from iowbc.skill.path import Paths
@@ -25,7 +25,7 @@ from iowbc.task.vector.shared import Buffers
 if TYPE_CHECKING:
     from iowbc.skill.setup import GameSetup
 
-FOREVER = 1e6
+NO_LIMIT = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """The human is the disturbance."""
@@ -42,7 +42,7 @@ class GameBatch:
         self.buffers, self._games, self._keys = buffers, np.arange(first, last), setup.keys(first, last)
         scenes, plans = setup.scenes[first:last], None if setup.plans is None else setup.plans[first:last]
         episodes = [
-            Episode(scene, int(key), FOREVER, UNDISTURBED) for scene, key in zip(scenes, self._keys, strict=True)
+            Episode(scene, int(key), NO_LIMIT, UNDISTURBED) for scene, key in zip(scenes, self._keys, strict=True)
         ]
         self.lower = LowerLayer(setup.specification, setup.student, self._games, episodes, block_size(setup.count))
         self.n = n = last - first
@@ -199,7 +199,7 @@ class GameBatch:
         acting = led + self._human.of_action(action, self.now)
         return np.where(self.drawn.acts[:, None], acting, scripted)
 
-    def _by_the_clock(self, pace: Array | float) -> Wanted:
+    def _by_the_clock(self, pace: Array | float) -> ObjectMotion:
         return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
 
     def _costs_now(self) -> Array:

@@ -37,7 +37,7 @@ class Observed:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class GameOutcome:
     """What came of a decision of n games."""
 
     observed: Observed
@@ -111,7 +111,7 @@ class TransportGame:
         self._ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
         return self._observed("now")
 
-    def step(self, actions: Mapping[str, Array]) -> Outcome:
+    def step(self, actions: Mapping[str, Array]) -> GameOutcome:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
         finite."""
         self.act(actions)
@@ -127,11 +127,11 @@ class TransportGame:
                 raise ValueError(f"actions of {agent} have {text}; expected finite ones of shape {buffer.shape}")
             buffer[:] = given
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> GameOutcome:
         """What came of the last decision."""
         buffers = self._buffers
         terminated, truncated = buffers["terminated"].copy(), buffers["truncated"].copy()
-        return Outcome(
+        return GameOutcome(
             observed=self._observed("now"),
             reward=buffers["reward"].copy(),
             terminated=terminated,

@@ -14,7 +14,7 @@ from iowbc.evaluation.exported import exported_world
 from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
 from iowbc.onboard.limits import SafetyLimits
-from iowbc.onboard.machine import Inputs, Machine, State, Wanted
+from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges, object_poses
 from iowbc.onboard.process import PERIOD
@@ -114,7 +114,7 @@ def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot
         now = turn * PERIOD
         pose = poses.wanted(now, None)
         wanted = Wanted(standing, now, requests.get(turn), pose.seen, pose.seen_at)
-        twin.command(machine.turn(Inputs(now, (twin.state,), wanted)))
+        twin.command(machine.turn(TurnInputs(now, (twin.state,), wanted)))
         twin.step()
         tracking.send(twin)
     tracking.close()

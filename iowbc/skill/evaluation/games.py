@@ -42,14 +42,14 @@ class Competitor:
 
 
 @dataclass(frozen=True)
-class Case:
+class GameCase:
     """An episode that every competitor plays."""
 
     plan: Plan
     episode: int
 
 
-def cases(skill: Skill, learnt_human: bool) -> list[Case]:
+def cases(skill: Skill, learnt_human: bool) -> list[GameCase]:
     """All episodes of an evaluation. `learnt_human`: whether there is one to play with."""
     asked, kinds = skill.eval, skill.partners
     partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
@@ -61,11 +61,11 @@ def cases(skill: Skill, learnt_human: bool) -> list[Case]:
         low, high = task.mass
         masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
         for mass, episode in itertools.product(masses, range(asked.episodes)):
-            found.append(Case(Plan(name, partner, known, mass=mass, seed=asked.seed + episode), episode))
+            found.append(GameCase(Plan(name, partner, known, mass=mass, seed=asked.seed + episode), episode))
     return found
 
 
-class Evaluation:
+class GameEvaluation:
     """Plays competitors in batches of games; a batch that is finished is kept in `work`."""
 
     def __init__(
@@ -80,7 +80,7 @@ class Evaluation:
         competitor; `games`: in a batch."""
         self._make, self._human, self._games, self._work, self._interrupted = make, human, games, work, interrupted
 
-    def batches(self, competitor: Competitor, planned: Sequence[Case]) -> Iterator[pd.DataFrame]:
+    def batches(self, competitor: Competitor, planned: Sequence[GameCase]) -> Iterator[pd.DataFrame]:
         """Rows of the episodes, batch by batch, those of one length together.
 
         Raises Interrupted where the job is asked to stop; finished batches are kept.
@@ -96,7 +96,7 @@ class Evaluation:
                 partial.rename(path)
             yield pd.read_parquet(path)
 
-    def _played(self, competitor: Competitor, planned: Sequence[Case]) -> pd.DataFrame:
+    def _played(self, competitor: Competitor, planned: Sequence[GameCase]) -> pd.DataFrame:
         """The first episode of a game of each case."""
         plans = [replace(case.plan, rule=competitor.rule) for case in planned]
         with closing(self._make(competitor.controller, plans)) as game:
