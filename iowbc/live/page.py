@@ -105,7 +105,7 @@ class Page:
             self._cursor = 0.0
 
     def _slide(self, seconds: float) -> None:
-        """Sets the slider of the time, which is then told from one that somebody drags."""
+        """Sets the time slider and remembers its value, from which a drag of the slider differs."""
         self.panel.time.value = seconds
         self._slid = self.panel.time.value
 

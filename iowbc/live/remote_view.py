@@ -73,7 +73,7 @@ class RemoteView:
         """Sends the simulation as it is now, `seconds` since its start, with other forces `beside` its own."""
         moment = self._recorder.look(seconds)
         shown = replace(moment, forces=(*moment.forces, *beside))
-        with contextlib.suppress(BrokenPipeError):  # of a page that has ended, which `asked` tells
+        with contextlib.suppress(BrokenPipeError):  # of a page that has ended, as `asked` finds
             self._requests.send(Picture(shown, status, supported))
 
     def close(self) -> None:

@@ -105,7 +105,7 @@ class Session(Played):
             self.pull(what, force)
 
     def pull(self, what: Pushed, force: Array) -> None:
-        """A steady force, world frame, (3,) [N], until another is told."""
+        """A steady force, world frame, (3,) [N], until the next call."""
         self._pull[what] = np.asarray(force, np.float64)
 
     def _force(self, what: Pushed) -> Array:

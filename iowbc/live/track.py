@@ -121,7 +121,7 @@ class Played(ABC):
 
     @abstractmethod
     def step(self) -> None:
-        """One control period. After an episode's end, told in `track.ending`, nothing moves until a reset."""
+        """One control period. After an episode's end, which `track.ending` names, nothing moves until a reset."""
 
     @abstractmethod
     def drag(self, drags: Sequence[Drag]) -> None:
@@ -179,7 +179,7 @@ def played_again(
 ) -> Track:
     """The trial of a row of the actor's table, taken down step by step.
 
-    progress: told the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
+    progress: receives the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
     """
     environment = VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     seen: list[Moment] = []

@@ -132,7 +132,7 @@ def load_sweep(
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
     settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and go before what the file says.
-    most: points at most. counted: is told their number before any is read.
+    most: points at most. counted: receives their number before any is read.
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
@@ -175,7 +175,7 @@ def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) 
 
 
 def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue]) -> LoadedRecipe:
-    """The recipe under a name that tells its settings, the same in every sweep that has it."""
+    """The recipe under a name that contains its settings, the same in every sweep that has it."""
     if not settings:
         return loaded
     name = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in settings.items())])

@@ -15,7 +15,7 @@ SOLVED, UNSOLVED = 0.8, 0.2
 """Success of the reference pair, at least, and of a lone robot, at most: four of five trials."""
 DRAGGED = 1.5
 """Partner force with a passive robot that succeeds, at least, in parts of the reference pair's: a controller that
-yields lets itself be led while it is told to stand, and only the force tells that it does not help."""
+yields lets itself be led while it is commanded to stand, and only the force shows that it does not help."""
 PAIRS: dict[str, tuple[str, Rule]] = {
     "reference": ("path", "lead"),
     "lone robot": (ABSENT, "lead"),

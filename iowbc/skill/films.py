@@ -58,11 +58,11 @@ def film_game(
 
 def captions(batch: GameBatch, plan: Plan, seconds: float) -> list[str]:
     """Lines of text: task and human; time, way covered and the human's horizontal force."""
-    told = "both know the path" if plan.known else "only the human knows the path"
+    goal = "both know the path" if plan.known else "only the human knows the path"
     force = float(np.linalg.norm(batch.lower.simulation.state.partner_force[0, :2]))
     mass = float(batch.lower.simulation.drawn["object_mass"][0])
     way = f"{batch.now.covered[0]:.1f} of {batch.now.covered[0] + batch.now.left[0]:.1f} m"
-    return [f"{plan.task}, {mass:.0f} kg, human: {plan.partner}; {told}", f"{seconds:4.1f} s   {way}   {force:3.0f} N"]
+    return [f"{plan.task}, {mass:.0f} kg, human: {plan.partner}; {goal}", f"{seconds:4.1f} s   {way}   {force:3.0f} N"]
 
 
 def path_lines(batch: GameBatch, game: int) -> list[tuple[Array, tuple[float, ...]]]:

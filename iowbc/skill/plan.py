@@ -86,7 +86,7 @@ class EpisodeDraws:
             self.task[which] = (chance[:, :1] >= self._tasks[which]).sum(axis=1)
             scripted = self._kinds[(chance[:, 1] * len(self._kinds)).astype(np.int64)]
             self.kind[which] = np.where(chance[:, 5] < self.agent_share, KINDS.index(AGENT), scripted)
-            leads = self.kind[which] != FOLLOWER  # a human who follows tells nobody where to go
+            leads = self.kind[which] != FOLLOWER  # a human who follows shows nobody the goal
             self.known[which] = (chance[:, 2] < self._goal_known) | ~leads
         task, kind = self.task[which], self.kind[which]
         mass, share = (

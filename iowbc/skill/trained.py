@@ -20,7 +20,7 @@ class Trained:
     """A network that learns, with the running statistics of its inputs and its optimiser."""
 
     def __init__(self, inputs: int, outputs: int, settings: SkillLearning, gain: float, rate: float) -> None:
-        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's step size."""
+        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's learning rate."""
         self.architecture: dict[str, Any] = {
             "inputs": inputs,
             "actions": outputs,

@@ -44,7 +44,7 @@ def with_files(tree: Located, folder: Path) -> Located:
 LARGEST_FILE = 1_000_000
 """Bytes of the largest recipe that is read."""
 LONGEST_PATH = 300
-"""Characters of a path that cannot be read which are told, the last ones."""
+"""Number of last characters of an unreadable path that an error shows."""
 LONGEST_CHAIN = 20
 """Recipes that extend one another, at most."""
 OWN_KEYS = ("name", "description")

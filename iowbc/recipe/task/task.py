@@ -56,7 +56,7 @@ class Termination(Section):
     lag: float | None = Field(default=None, gt=0.0)
     """An episode ends when robot and object are this far behind the command [m], forgotten with the time constant
     `lag_time`; empty never ends one. It costs like a fall, so that standing is no safe answer to a command to walk.
-    Nothing that the policy observes tells the lag; with 0.5 m walking was learnt later.
+    Nothing that the policy observes shows the lag; with 0.5 m walking was learnt later.
     Only where the command can be followed: not in a push, not above level 1 of locomotion, not in trials."""
     lag_time: float = Field(default=3.0, gt=0.0)
     """Time in which a lag is forgotten [s]: at 0.4 m/s a robot may stand in place for 1.6 s, and three fifths of the

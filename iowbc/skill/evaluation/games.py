@@ -33,7 +33,7 @@ class Competitor:
 
     label: str
     training: str
-    """What tells trainings under one label apart."""
+    """Distinguishes trainings under one label."""
     rule: Rule | None
     robot: TeacherNetwork | None
     """The trained policy; None acts as the rule says."""
@@ -57,7 +57,7 @@ def cases(skill: Skill, learnt_human: bool) -> list[GameCase]:
     found = []
     for (name, task), known, partner in itertools.product(tasks.items(), asked.known, partners):
         if partner == "follower" and not known:
-            continue  # who follows tells nobody where to go
+            continue  # a human who follows shows nobody the goal
         low, high = task.mass
         masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
         for mass, episode in itertools.product(masses, range(asked.episodes)):
