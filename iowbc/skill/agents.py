@@ -73,16 +73,12 @@ class NominalCommand(SkillCommand):
         command[:, 0] += rate * arm[:, 1]
         command[:, 1] -= rate * arm[:, 0]
         command[:, YAW_RATE] = rate
-        self._raise(command, 2.0 * wanted.height - now.position[:, 2])
-        return command
-
-    def _raise(self, command: Array, height: Array) -> None:
-        """Raises the hands by heights (n,) [m]: with the legs as far as they go, then with the arms."""
-        low, high = self._commands.height
-        legs = (command[:, HEIGHT] + height * ~self._pushing).clip(low, high)
+        height, (low, high) = 2.0 * wanted.height - now.position[:, 2], self._commands.height
+        legs = (command[:, HEIGHT] + height * ~self._pushing).clip(low, high)  # as far as they go, then the arms
         rest = command[:, HEIGHT] + height * ~self._pushing - legs
         command[:, HEIGHT] = legs
         command[:, OFFSET][:, 2::3] += rest[:, None]
+        return command
 
 
 class Human:

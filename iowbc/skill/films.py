@@ -24,13 +24,7 @@ VIEW = -115.0
 """Direction of the view from the path's first heading, to the left of it [degrees]: from its left, past the handle."""
 
 
-def film_game(
-    specification: Specification,
-    student: Student,
-    plan: Plan,
-    path: Path,
-    video: Video,
-) -> dict[str, Array]:
+def film_game(specification: Specification, student: Student, plan: Plan, path: Path, video: Video) -> dict[str, Array]:
     """Films the first episode of a planned game with nominal commands into an mp4 file; its figures. Raises NoRenderer
     where nothing can be drawn."""
     with TransportGame(specification, student, n=1, plans=(plan,)) as game, written_film(path, video.fps) as add:

@@ -172,9 +172,7 @@ def nominal(game: TransportGame) -> Callable[[Observed], Actions]:
 
 
 def play_once(
-    game: TransportGame,
-    act: Callable[[Observed], Actions],
-    interrupted: Callable[[], bool] = lambda: False,
+    game: TransportGame, act: Callable[[Observed], Actions], interrupted: Callable[[], bool] = lambda: False
 ) -> dict[str, Array]:
     """Figures of the first episode of every game, (n,) by name, in the order of the games. `act` gives the actions for
     what is observed. Raises Interrupted once `interrupted()` is true."""

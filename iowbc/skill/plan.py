@@ -93,14 +93,13 @@ class EpisodeDraws:
             low + (high - low) * chance[:, column]
             for column, (low, high) in ((3, self._mass[task].T), (4, self._share[task].T))
         )
-        if self._plans is not None:
-            plans = [self._plans[row] for row in which]
-            held = np.array([[plan.mass, plan.share] for plan in plans], np.float64)
-            mass, share = np.where(np.isnan(held.T), (mass, share), held.T)
         self.rule[which] = np.where(self.known[which], RULES.index("lead"), RULES.index("follow"))
         if self._plans is not None:
-            asked = {row: self._plans[row].rule for row in which.tolist()}
-            self.rule[which] = [self.rule[row] if rule is None else RULES.index(rule) for row, rule in asked.items()]
+            plans = {row: self._plans[row] for row in which.tolist()}
+            held = np.array([[plan.mass, plan.share] for plan in plans.values()], np.float64)
+            mass, share = np.where(np.isnan(held.T), (mass, share), held.T)
+            asked = {row: plan.rule for row, plan in plans.items() if plan.rule is not None}
+            self.rule[[*asked]] = [RULES.index(rule) for rule in asked.values()]
         slow, fast = CLOCK_PACE
         self.pace[which] = slow + (fast - slow) * chance[:, 5]
         self.acts[which] = kind == KINDS.index(AGENT)

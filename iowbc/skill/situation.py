@@ -67,8 +67,7 @@ def situation(
     """The games after a control step; `covered` (n,): way along the paths at an earlier time [m]."""
     state = simulation.state
     position = origin.turned(state.object_position - origin.position)
-    axes = [rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2]]
-    forward, up = axes
+    forward, up = (rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2])
     yaw = wrapped(np.arctan2(forward[:, 1], forward[:, 0]) - origin.heading)
     place = paths.place(path, position[:, :2], covered)
     return Situation(
