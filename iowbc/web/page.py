@@ -86,12 +86,10 @@ def require_node() -> None:
     advice = f"install Node.js {OLDEST_NODE} or newer with npm (nodejs.org, or `apt install nodejs npm`)"
     if missing:
         raise UsageError(f"a web page needs {' and '.join(missing)} to be bundled: {advice}")
-    found = subprocess.run(["node", "--version"], capture_output=True, text=True, check=False).stdout.strip()
-    number = found.removeprefix("v").partition(".")[0]
+    told = subprocess.run(["node", "--version"], capture_output=True, text=True, check=False).stdout.strip()
+    number = told.removeprefix("v").partition(".")[0]
     if not number.isdecimal() or int(number) < OLDEST_NODE:
-        raise UsageError(
-            f"a web page needs Node.js {OLDEST_NODE} or newer, found {found or 'none that runs'}: {advice}"
-        )
+        raise UsageError(f"a web page needs Node.js {OLDEST_NODE} or newer, found {told or 'none that runs'}: {advice}")
 
 
 def bundle(parts: Path, out: Path) -> None:
@@ -122,5 +120,5 @@ def licenses(parts: Path) -> str:
 def _run(words: list[str], folder: Path, advice: str) -> None:
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        output = "\n".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
-        raise UsageError(f"{advice}:\n{output}")
+        told = "\n".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
+        raise UsageError(f"{advice}:\n{told}")
