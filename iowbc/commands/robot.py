@@ -20,7 +20,7 @@ from iowbc.errors import UsageError, require_known
 
 if TYPE_CHECKING:
     from iowbc.live.remote_view import RemoteView
-    from iowbc.onboard.checks import Check
+    from iowbc.onboard.checks import CheckResult
     from iowbc.onboard.process import Clock
     from iowbc.twin.robot import Twin
 
@@ -69,11 +69,10 @@ def robot(
     from iowbc.onboard.checks import checks
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.limits import LIMITS
-    from iowbc.onboard.log import LogWriter
+    from iowbc.onboard.log import LogWriter, export_digest
     from iowbc.onboard.machine import Machine
-    from iowbc.onboard.operators import Keyboard, Ranges, Seeing, Udp, object_poses, operator, single_keys
+    from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Ranges, Udp, object_poses, operator, single_keys
     from iowbc.onboard.process import LockStep, MonotonicClock, drive, listen, prefer_this_process
-    from iowbc.onboard.replay import export_digest
 
     console = stdout_console()
     controller = Controller.load(exported_folder(what))
@@ -110,7 +109,7 @@ def robot(
         times = drive(
             bus,
             Machine(controller, scene),
-            source if poses is None else Seeing(source, poses),
+            source if poses is None else OperatorWithPoses(source, poses),
             clock,
             seconds=seconds,
             log=writer,
@@ -127,7 +126,7 @@ def _stop_request() -> threading.Event:
     return stop
 
 
-def report_checks(console: Console, found: "list[Check]", waived: Collection[str]) -> None:
+def report_checks(console: Console, found: "list[CheckResult]", waived: Collection[str]) -> None:
     """Print the checks. Raises UsageError for failed ones that are not waived."""
     for name in waived:
         require_known(name, "check", [check.name for check in found])

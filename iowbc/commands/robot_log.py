@@ -14,7 +14,7 @@ from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError
 
 if TYPE_CHECKING:
-    from iowbc.onboard.errors_of_run import Run
+    from iowbc.onboard.errors_of_run import LoggedRun
 
 
 def report_log(console: Console, what: str, log: Path, output: Path) -> None:
@@ -26,8 +26,7 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     import json
 
     from iowbc.onboard.errors_of_run import UNITS, read_run
-    from iowbc.onboard.log import read_messages
-    from iowbc.onboard.replay import replay
+    from iowbc.onboard.log import read_messages, replay
 
     folder = exported_folder(what)
     controller = Controller.load(folder)
@@ -47,7 +46,7 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     tell(console, f"{shown_path(output)}: command and robot over time")
 
 
-def _draw(run: "Run", path: Path) -> None:
+def _draw(run: "LoggedRun", path: Path) -> None:
     """Write the figure as PNG: what was commanded, and what the robot did."""
     from matplotlib.figure import Figure
 

@@ -27,8 +27,6 @@ LARGEST_CONTRACT = 1_000_000
 FORMAT: Literal[4] = 4
 """Format of the contracts that are written and read."""
 GENERATOR_FILES = (WEIGHTS, ARCHITECTURE, FEASIBLE)
-
-
 TORQUE = (
     "torque = clip(kp * (target - position) - kd * velocity, -effort, effort) for each joint [N·m], computed at "
     "physics_frequency or faster; target holds between two steps of the graph"
@@ -141,7 +139,9 @@ class Contract(Section):
     """Artifact keys of the stages that went into the graph."""
 
     @model_validator(mode="after")
-    def _a_number_for_each_joint(self) -> Self:
+    def _sizes_and_ports_fit(self) -> Self:
+        """A number for each joint; the inputs that the control loop gives, and the outputs that it uses, whatever else
+        the graph has."""
         joints = len(self.joints)
         for name in ("kp", "kd", "effort", "velocity_limit", "lower", "upper", "default_position"):
             values = getattr(self, name)
@@ -154,21 +154,12 @@ class Contract(Section):
             raise ValueError(f"files: {', '.join(outside)} lie outside of the folder")
         if len(self.action_scale) != len(self.support):
             raise ValueError(f"action_scale: {len(self.action_scale)} numbers for {len(self.support)} support joints")
-        return self
-
-    @model_validator(mode="after")
-    def _numbers_of_motors(self) -> Self:
         for name in ("kp", "kd", "effort", "velocity_limit"):
             values = getattr(self, name)
             if min(values, default=0.0) < 0.0:
                 raise ValueError(f"{name}: {min(values)} is negative")
         if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
             raise ValueError(f"lower {self.lower} does not lie below upper {self.upper}")
-        return self
-
-    @model_validator(mode="after")
-    def _what_the_loop_passes_on(self) -> Self:
-        """The control loop gives these inputs, and uses these outputs, whatever else the graph has."""
         support, size = len(self.support), sum(math.prod(part.shape) for part in self.state)
         needed: dict[str, dict[str, tuple[int, ...]]] = {
             "inputs": {"command": (len(COMMAND),), "grasp": (2, 3), "load": (1,), "state": (size,)},
@@ -263,14 +254,6 @@ def generator_folder(contract: Contract, folder: Path) -> Path | None:
     return folder / GENERATOR
 
 
-def _newer(error: ValidationError) -> bool:
-    """Whether a contract is of a later format, or has nothing wrong but entries that are not known yet."""
-    found = error.errors(include_url=False)
-    return all(one["type"] == "extra_forbidden" for one in found) or any(
-        one["loc"] == ("format",) and isinstance(one["input"], int) and one["input"] > FORMAT for one in found
-    )
-
-
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
@@ -281,7 +264,9 @@ def read_contract(folder: Path | str) -> Contract:
             raise ContractBroken(f"{folder / CONTRACT}: has {size:,} bytes, which no contract has; export again")
         contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
     except ValidationError as error:
-        if _newer(error):
+        wrong = error.errors(include_url=False)
+        later = any(one["loc"] == ("format",) and isinstance(n := one["input"], int) and n > FORMAT for one in wrong)
+        if later or all(one["type"] == "extra_forbidden" for one in wrong):  # nothing but entries not known yet
             text = f"made by a newer version of iowbc than {version('iowbc')}; install that here, or export again"
             raise ContractBroken(f"{folder / CONTRACT}: {text} with this one: {error}") from error
         raise ContractBroken(

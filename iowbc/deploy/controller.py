@@ -187,7 +187,13 @@ class Controller:
         ones."""
         wanted = np.asarray(command, np.float64)
         values = vars(measured) | {"command": np.tile(wanted, (self.robots, 1)) if wanted.ndim == 1 else wanted}
-        given = {name: self._shaped(name, values[name], good.shape) for name, good in self._good.items()}
+        given = {}
+        for name, good in self._good.items():
+            if (value := values[name]) is None:
+                raise ValueError(f"{name}: this policy needs it, with shape {good.shape}; got nothing")
+            if np.shape(value) != good.shape:
+                raise ValueError(f"{name}: expected shape {good.shape}, got {np.shape(value)}")
+            given[name] = np.array(value, np.float64)
         stamps = None if measured_at is None else np.broadcast_to(np.asarray(measured_at, np.float64), self.robots)
         with np.errstate(over="ignore", invalid="ignore"):
             refusals = self._plausibility.refusals(given, stamps)
@@ -204,23 +210,13 @@ class Controller:
     def _as_inputs(self, given: dict[str, Array]) -> Values:
         return {name: np.array(value, np.float32) for name, value in (given | self._scene).items()}
 
-    @staticmethod
-    def _shaped(name: str, value: Array | None, shape: tuple[int, ...]) -> Array:
-        """A copy of a value that has its shape. Raises ValueError."""
-        if value is None:
-            raise ValueError(f"{name}: this policy needs it, with shape {shape}; got nothing")
-        if np.shape(value) != shape:
-            raise ValueError(f"{name}: expected shape {shape}, got {np.shape(value)}")
-        return np.array(value, np.float64)
-
 
 def base_grasp(grasps: Grasps, scene: str) -> tuple[float, float, float]:
     """The left wrist's base grasp in a scene [m]. Raises ValueError for a scene without one."""
     known = dict(grasps)
     if scene not in known:
         raise ValueError(f"no base grasp for scene {scene!r}; known: {', '.join(known)}")
-    grasp: tuple[float, float, float] = known[scene]
-    return grasp
+    return known[scene]
 
 
 def _require_numbers(path: Path, outputs: Values, said: dict[str, tuple[int, ...]]) -> None:

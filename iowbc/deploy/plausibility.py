@@ -106,5 +106,4 @@ class Plausibility:
             new = (np.isfinite(measurement) & (measurement != self._last)).any(axis=1)
         self._last = measurement
         self._repeated = np.where(new, 0, self._repeated + 1)
-        old: Mask = self._repeated * self._period > self._longest + 0.5 * self._period
-        return old
+        return self._repeated * self._period > self._longest + 0.5 * self._period

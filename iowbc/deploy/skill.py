@@ -84,7 +84,11 @@ class Skill:
         A robot whose measurements are no numbers keeps its command. Raises ValueError for a missing quantity.
         """
         if self._yaw is not None:
-            self._decide(self._yaw)
+            action = run(self._session, {"observation": self.observation})["action"]
+            nominal = self._rule.following(self._felt[:, -1].sum(axis=1), self._yaw)
+            decided = self._rule.with_action(nominal, action)
+            whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
+            self._command = np.where(whole, decided, self._command)
         if self._passed:
             target = self._controller.outputs["target"].astype(np.float64)
             self._hands.add(target, measured.joint_position, measured.joint_velocity)
@@ -108,11 +112,4 @@ class Skill:
         self.observation = robot_observation(
             command, measured, self._wrist_error, thing, self._pushing, unknown, no_path, self._felt
         )
-        yaw: Array = thing[:, YAW]
-        return yaw
-
-    def _decide(self, yaw: Array) -> None:
-        action = run(self._session, {"observation": self.observation})["action"]
-        decided = self._rule.with_action(self._rule.following(self._felt[:, -1].sum(axis=1), yaw), action)
-        whole: Mask = np.asarray(np.isfinite(decided).all(axis=1))[:, None]
-        self._command = np.where(whole, decided, self._command)
+        return thing[:, YAW]

@@ -1,10 +1,11 @@
 """The contract of an exported skill: what a caller must know beside the controller's own contract."""
 
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError
 
 from iowbc.control.skill_observation import SENSED
 from iowbc.deploy.contract import LARGEST_CONTRACT, digest
@@ -40,11 +41,9 @@ class SkillContract(Section):
     files: dict[str, str] = Field(default_factory=dict)
     """SHA-256 of the other files, by name."""
 
-    @model_validator(mode="after")
-    def _of_the_history(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if self.observation != (size := SENSED + 6 * self.robot.history):
-            raise ValueError(f"observation: {self.observation}, with robot.history {self.robot.history} it is {size}")
-        return self
+            yield "", f"observation: {self.observation}, with robot.history {self.robot.history} it is {size}"
 
 
 def seal_skill(contract: SkillContract, folder: Path) -> None:

@@ -13,19 +13,19 @@ from iowbc.arrays import Array
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import GameMarks
-from iowbc.live.moment import Moment, Witness
+from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
 from iowbc.live.track import PAST, WINDOW, Played, Track, track_of
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
-from iowbc.skill.evaluation.games import acted
 from iowbc.skill.films import path_lines
 from iowbc.skill.game import COUNTED, TransportGame
 from iowbc.skill.plan import PERSON, Plan, Rule
 from iowbc.skill.student import Student
+from iowbc.skill.trained import acted
 from iowbc.task.specification import Specification
 
-UNHURRIED = 600.0
+TIME_LIMIT = 600.0
 """Time limit of a game [s]: a person looks about first."""
 ROBOTS: dict[str, Rule | None] = {"skill": None, "admittance follower": "follow", "stands": "stand"}
 """Robots that a person can compare: the trained skill, and the rule of one without."""
@@ -50,7 +50,7 @@ class GameSession(Played):
         """`skill`: the robot's policy. Raises UsageError for an unknown task."""
         recipe = world.recipe
         tasks = recipe.skill.tasks
-        slow = {name: getattr(tasks, name).model_copy(update={"duration": UNHURRIED}) for name in tasks.names}
+        slow = {name: getattr(tasks, name).model_copy(update={"duration": TIME_LIMIT}) for name in tasks.names}
         section = recipe.skill.model_copy(update={"tasks": tasks.model_copy(update=slow)})
         self.world, self._student = replace(world, recipe=recipe.model_copy(update={"skill": section})), student
         self._skill = skill
@@ -62,13 +62,9 @@ class GameSession(Played):
         self.request, self._game = request, TransportGame(self.world, self._student, n=1, plans=(plan,))
         self._lower = self._game.batch.lower
         self.robot, self.period = self._lower.robot, self._lower.period
-        self._witness: Witness | None = None
+        self._recorder: MomentRecorder | None = None
         self._signals = {name: np.zeros((1, 1)) for name in ("covered", "length", "lateral", "share")}
         self.reset()
-
-    def begin(self, request: GameRequest) -> None:
-        self._game.close()
-        self._open(request)
 
     def reset(self) -> None:
         self._seen = self._game.reset().observations["robot"]
@@ -77,10 +73,10 @@ class GameSession(Played):
         away = self._lower.simulation.partner.at - state.object_position
         handle = rotations.rotate_inverse(state.object_quaternion, away)[0]
         self.marks = GameMarks(tuple(path_lines(batch, 0)), handle)
-        self._witness = self._witness or Witness(self._lower, self._signals)
+        self._recorder = self._recorder or MomentRecorder(self._lower, self._signals)
         mass = self._lower.simulation.drawn["object_mass"][0]
         title = f"{self.request.task}, {mass:.0f} kg"
-        self.track = track_of(self._witness, self.world, title, round(PAST / self.period))
+        self.track = track_of(self._recorder, self.world, title, round(PAST / self.period))
         self.track.moments.append(self._look())
 
     def step(self) -> None:
@@ -130,8 +126,8 @@ class GameSession(Played):
         force = simulation.state.partner_force[0]
         signals["covered"][:], signals["length"][:] = now.covered, now.covered + now.left
         signals["lateral"][:], signals["share"][:] = now.lateral, force[2]
-        assert self._witness is not None
-        moment = self._witness.look(self._steps * self.period)
+        assert self._recorder is not None
+        moment = self._recorder.look(self._steps * self.period)
         pull = Force("partner", simulation.partner.at[0], force * [1.0, 1.0, 0.0])
         others = tuple(force for force in moment.forces if force.kind != "partner")
         return replace(moment, forces=(pull, *others))
@@ -140,9 +136,7 @@ class GameSession(Played):
 class GamePanel(ControlPanel):
     """Choice of the game; the mouse does the rest."""
 
-    def __init__(self, gui: viser.GuiApi, session: GameSession, trials: Sequence[str]) -> None:
-        self._session = session
-        super().__init__(gui, session, trials)
+    _session: GameSession
 
     def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
         request, gui = self._session.request, self._gui

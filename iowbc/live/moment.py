@@ -39,7 +39,7 @@ class Moment:
     """Figures of the step just made, each (k,); in an environment those that a trial records."""
 
 
-class SimulationWitness:
+class SimulationRecorder:
     """Takes down the moments of the first environment of a simulation, which know no reference and no command."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -65,7 +65,6 @@ class SimulationWitness:
         return float(self._simulation.drawn["object_mass"][0]) if self._held else 0.0
 
     def look(self, seconds: float) -> Moment:
-        """The simulation as it is now."""
         data = self._appearance.update()
         bodies = _poses(data)
         return Moment(
@@ -99,7 +98,7 @@ class SimulationWitness:
         return np.column_stack([hull, np.zeros(len(hull))])
 
 
-class Witness(SimulationWitness):
+class MomentRecorder(SimulationRecorder):
     """Takes down the moments of the first environment of a batch, in its present episode."""
 
     def __init__(self, batch: Batch, signals: Mapping[str, Array]) -> None:
@@ -109,21 +108,18 @@ class Witness(SimulationWitness):
         self._reference = mujoco.MjData(self.model)
 
     def look(self, seconds: float) -> Moment:
-        """The environment as it is now."""
-        return replace(
-            super().look(seconds),
-            reference=self._posture(),
-            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
-            signals={name: values[0].copy() for name, values in self._signals.items()},
-        )
-
-    def _posture(self) -> Array:
+        moment = super().look(seconds)
         robot, memory, reference = self._simulation.robot, self.batch.memory, self._reference
         reference.qpos[:] = self._appearance.data.qpos
         joints = reference.qpos[self._world.layout.joints]
         joints[robot.support], joints[robot.interaction] = memory.support[0], memory.arms[0]
         mujoco.mj_kinematics(self.model, reference)
-        return _poses(reference)
+        return replace(
+            moment,
+            reference=_poses(reference),
+            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
+            signals={name: values[0].copy() for name, values in self._signals.items()},
+        )
 
 
 def _poses(data: Any) -> Array:

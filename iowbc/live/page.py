@@ -19,7 +19,7 @@ READING = 0.25
 """Time between two sets of figures [s]."""
 SETTLED = 0.4
 """A new episode begins when the controls have stood still for so long [s]."""
-LYING = 2.0
+RESTART_DELAY = 2.0
 """An episode that has ended stays to be seen for so long [s]."""
 CHECKPOINTS = 2.0
 """Time between two looks for a newer checkpoint [s]."""
@@ -73,23 +73,26 @@ class Page:
         if not self._now:
             self._now = self._due = now
         elapsed, self._now = now - self._now, now
-        self._heed_buttons()
+        self._handle_buttons()
         if self.panel.showing.value != self._showing:
             self._change_to(self.panel.showing.value)
         if self._showing == LIVE:
             self._live(now)
         else:
-            self._again(elapsed)
+            self._replay(elapsed)
         if now >= self._drawn + PICTURES:
             self._drawn = now
             self._draw(now)
 
-    def _heed_buttons(self) -> None:
+    def _handle_buttons(self) -> None:
         for button in self.panel.pressed():
             if button == "pause":
                 self._pause(not self.paused)
             elif button == "reset":
-                self._reset()
+                self._cursor = 0.0
+                if self._showing == LIVE:
+                    self.session.reset()
+                self._slide(0.0)
             elif self._showing == LIVE:
                 self.panel.press(button)
 
@@ -101,14 +104,8 @@ class Page:
         elif not paused and self._cursor >= self.track.end:
             self._cursor = 0.0
 
-    def _reset(self) -> None:
-        self._cursor = 0.0
-        if self._showing == LIVE:
-            self.session.reset()
-        self._slide(0.0)
-
     def _slide(self, seconds: float) -> None:
-        """Sets the slider of the time, which is then told from one that somebody drags."""
+        """Sets the time slider and remembers its value, from which a drag of the slider differs."""
         self.panel.time.value = seconds
         self._slid = self.panel.time.value
 
@@ -134,7 +131,6 @@ class Page:
         self.panel.status.content = f"Plays the trial again: {seconds:.0f} s"
 
     def _live(self, now: float) -> None:
-        """Drives the session by hand."""
         session, panel = self.session, self.panel
         self._begin_anew(now)
         if now >= self._looked + CHECKPOINTS:
@@ -152,7 +148,7 @@ class Page:
             self._due = max(self._due + session.period / panel.speed.value, now - BEHIND)
         elif self.paused:
             self._due = now + PICTURES
-        self._get_up(now)
+        self._restart_after_end(now)
         self.track = session.track
         self.place = self.track.place(self.track.end + (panel.time.value if self.paused else 0.0))
 
@@ -164,17 +160,16 @@ class Page:
         elif wish != self.session.request and now >= self._wished + SETTLED:
             self.session.begin(wish)
 
-    def _get_up(self, now: float) -> None:
+    def _restart_after_end(self, now: float) -> None:
         """Begins again some time after an episode's end."""
         if not self.session.track.ending:
             self._ended = None
         elif self._ended is None:
             self._ended = now
-        elif now >= self._ended + LYING and not self.paused:
+        elif now >= self._ended + RESTART_DELAY and not self.paused:
             self.session.reset()
 
-    def _again(self, elapsed: float) -> None:
-        """Moves on in a recorded trial."""
+    def _replay(self, elapsed: float) -> None:
         if self.panel.time.value != self._slid:
             self._cursor = self._slid = self.panel.time.value
         elif not self.paused:

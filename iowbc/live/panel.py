@@ -47,7 +47,7 @@ class ControlPanel(ABC):
 
     def __init__(self, gui: viser.GuiApi, session: Played, trials: Sequence[str]) -> None:
         """`trials`: titles of recorded trials to choose from; none are offered where there are none."""
-        self._gui = gui
+        self._gui, self._session = gui, session
         self._pressed: SimpleQueue[Button] = SimpleQueue()
         gui.main_panel.dock_right()
         self.status = gui.add_markdown("")
@@ -96,7 +96,6 @@ class ControlPanel(ABC):
 
     @property
     def shown(self) -> ShownParts:
-        """Parts that are to be drawn."""
         return ShownParts(**{name: box.value for name, box in self._shown.items()})
 
     def pressed(self) -> list[Button]:
@@ -111,13 +110,11 @@ class ControlPanel(ABC):
 class DrivingPanel(ControlPanel):
     """Controls of a policy that is driven by hand: command, pushes, conditions of the episode."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session, trials: Sequence[str]) -> None:
-        self._session, self._recipe = session, session.source.world.recipe
-        self._request: PlayRequest = session.request
-        super().__init__(gui, session, trials)
+    _session: Session
 
     def _add_tabs(self, tabs: viser.GuiTabGroupHandle) -> None:
-        gui = self._gui
+        gui, self._recipe = self._gui, self._session.source.world.recipe
+        self._request: PlayRequest = self._session.request
         with tabs.add_tab("Command"):
             self._command = self._commands(self._recipe.task.commands)
             gui.add_button("Stand still").on_click(lambda _: self._stand())

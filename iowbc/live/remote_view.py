@@ -16,7 +16,7 @@ import viser
 from iowbc.arrays import Array
 from iowbc.live.drag import Pushed, spring_pulls
 from iowbc.live.drawing import Drawing, ShownParts
-from iowbc.live.moment import Moment, SimulationWitness
+from iowbc.live.moment import Moment, SimulationRecorder
 from iowbc.live.page import PICTURES
 from iowbc.live.server import serving
 from iowbc.robot.description import Robot
@@ -54,9 +54,9 @@ class RemoteView:
 
     def __init__(self, simulation: Simulation, port: int) -> None:
         """Begins to serve at a free port of this machine."""
-        self._witness = SimulationWitness(simulation)
+        self._recorder = SimulationRecorder(simulation)
         self._requests, theirs = multiprocessing.Pipe()
-        given = theirs, port, simulation.robot, self._witness.model
+        given = theirs, port, simulation.robot, self._recorder.model
         process = multiprocessing.get_context("spawn").Process(target=_serve, args=given, daemon=True)
         process.start()
         theirs.close()
@@ -71,13 +71,12 @@ class RemoteView:
 
     def answer(self, seconds: float, beside: Sequence[Force], status: str, supported: bool) -> None:
         """Sends the simulation as it is now, `seconds` since its start, with other forces `beside` its own."""
-        moment = self._witness.look(seconds)
+        moment = self._recorder.look(seconds)
         shown = replace(moment, forces=(*moment.forces, *beside))
-        with contextlib.suppress(BrokenPipeError):  # of a page that has ended, which `asked` tells
+        with contextlib.suppress(BrokenPipeError):  # of a page that has ended, as `asked` finds
             self._requests.send(Picture(shown, status, supported))
 
     def close(self) -> None:
-        """Ends the page."""
         self._requests.close()
 
 

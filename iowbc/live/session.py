@@ -13,13 +13,13 @@ from iowbc.evaluation.play import Source, open_policy, requested_episode
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Drag, Pushed, spring_pulls
-from iowbc.live.moment import Witness
+from iowbc.live.moment import MomentRecorder
 from iowbc.live.track import PAST, Played, recorded, track_of
 from iowbc.recipe.evaluation.segment import Segment
 
 AN_HOUR = (Segment(duration=600.0),) * 6
 """The longest that an episode lasts."""
-BLOW = 0.1
+PUSH_DURATION = 0.1
 """Length of a push [s]; as long as those of `eval.robustness.pushes`."""
 
 
@@ -40,7 +40,7 @@ class Session(Played):
         self.environment.batch.guidance.commander.steer(self.wanted)
         self.robot, self.period = self.environment.batch.robot, self.environment.period
         self._load()
-        self._witness: Witness | None = None
+        self._recorder: MomentRecorder | None = None
         self.reset()
 
     def _load(self) -> None:
@@ -50,20 +50,16 @@ class Session(Played):
             self.checkpoint = time.strftime("checkpoint of %H:%M:%S", time.localtime(self.written))
         self._policy = open_policy(self.source, self.environment)
 
-    def begin(self, request: PlayRequest) -> None:
-        self.environment.close()
-        self._open(request)
-
     def reset(self) -> None:
         environment = self.environment
         self._observation = environment.reset()
         self._policy.reset(np.ones(1, np.bool_))
         self._steps = 0
-        self._blow = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
-        self._witness = witness = self._witness or Witness(environment.batch, recorded(environment))
+        self._pushes = {"robot": (np.zeros(3), 0), "object": (np.zeros(3), 0)}
+        self._recorder = recorder = self._recorder or MomentRecorder(environment.batch, recorded(environment))
         title = f"{self.request.scene}, {self.request.object_mass:g} kg"
-        self.track = track_of(witness, self.source.world, title, round(PAST / environment.period))
-        self._look = witness.look
+        self.track = track_of(recorder, self.source.world, title, round(PAST / environment.period))
+        self._look = recorder.look
         self.track.moments.append(self._look(0.0))
 
     def refresh(self) -> bool:
@@ -79,8 +75,10 @@ class Session(Played):
     def step(self) -> None:
         if self.track.ending:
             return
-        self._apply()
         environment, layout = self.environment, self.environment.layout
+        simulation = environment.batch.simulation
+        simulation.planned_push[0] = self._force("robot")
+        simulation.planned_impulse[0] = self._force("object") if simulation.state.has_object[0] else 0.0
         seen = self._observation
         action = self._policy.act(seen[:, layout.observation], seen[:, layout.privileged])
         self._observation, _, done, infos = environment.step(action)
@@ -92,14 +90,14 @@ class Session(Played):
             self.track.moments.append(self._look(self._steps * environment.period))
 
     def push(self, what: Pushed, direction: str, impulse: float) -> None:
-        """A blow over `BLOW`, `direction` one of `DIRECTIONS` from the commanded heading, `impulse` [N·s]."""
+        """A blow over `PUSH_DURATION`, `direction` one of `DIRECTIONS` from the commanded heading, `impulse` [N·s]."""
         forward, left = DIRECTIONS[direction]
         heading = float(self.environment.batch.memory.heading_reference[0])
         cosine, sine = np.cos(heading), np.sin(heading)
-        steps = max(1, round(BLOW / self.environment.period))
+        steps = max(1, round(PUSH_DURATION / self.environment.period))
         force = impulse / (steps * self.environment.period)
         along = np.array([cosine * forward - sine * left, sine * forward + cosine * left, 0.0])
-        self._blow[what] = (force * along, steps)
+        self._pushes[what] = (force * along, steps)
 
     def drag(self, drags: Sequence[Drag]) -> None:
         """Pulls at what mice drag, by a spring of bounded force, and at nothing else."""
@@ -107,20 +105,13 @@ class Session(Played):
             self.pull(what, force)
 
     def pull(self, what: Pushed, force: Array) -> None:
-        """A steady force, world frame, (3,) [N], until another is told."""
+        """A steady force, world frame, (3,) [N], until the next call."""
         self._pull[what] = np.asarray(force, np.float64)
 
-    def _apply(self) -> None:
-        simulation = self.environment.batch.simulation
-        carried = simulation.state.has_object[0]
-        simulation.planned_push[0] = self._force("robot")
-        simulation.planned_impulse[0] = self._force("object") if carried else 0.0
-
     def _force(self, what: Pushed) -> Array:
-        force, left = self._blow[what]
-        self._blow[what] = (force, max(0, left - 1))
-        total: Array = self._pull[what] + (force if left else 0.0)
-        return total
+        force, left = self._pushes[what]
+        self._pushes[what] = (force, max(0, left - 1))
+        return self._pull[what] + (force if left else 0.0)
 
     def close(self) -> None:
         self.environment.close()

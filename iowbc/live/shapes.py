@@ -47,7 +47,9 @@ def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[BodyMesh]:
     chosen: dict[tuple[int, tuple[float, ...]], list[tuple[Array, Array]]] = {}
     for geom in range(model.ngeom):
         if model.geom_type[geom] != GEOM.mjGEOM_PLANE.value and wanted(geom):
-            key = int(model.geom_bodyid[geom]), tuple(_colour(model, geom))
+            material = model.geom_matid[geom]
+            colour = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+            key = int(model.geom_bodyid[geom]), tuple(round(float(part), 4) for part in colour)
             chosen.setdefault(key, []).append(_triangles(model, geom))
     for (body, colour), parts in chosen.items():
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
@@ -56,28 +58,20 @@ def _merged(model: Any, wanted: Callable[[int], bool]) -> Iterator[BodyMesh]:
         yield BodyMesh(model.body(body).name, vertices, faces, colour)  # type: ignore[arg-type]
 
 
-def _colour(model: Any, geom: int) -> list[float]:
-    material = model.geom_matid[geom]
-    return [round(float(part), 4) for part in (model.geom_rgba[geom] if material < 0 else model.mat_rgba[material])]
-
-
 def _triangles(model: Any, geom: int) -> tuple[Array, Array]:
     """Vertices in the body's frame, and faces."""
     kind, size = GEOM(model.geom_type[geom]), model.geom_size[geom]
     if kind == GEOM.mjGEOM_MESH:
-        vertices, faces = _mesh(model, int(model.geom_dataid[geom]))
+        mesh = int(model.geom_dataid[geom])
+        first, start = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+        vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+        faces = model.mesh_face[start : start + model.mesh_facenum[mesh]]
     else:
         made = _primitive(kind, size)
         vertices, faces = np.asarray(made.vertices), np.asarray(made.faces)
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
     return vertices @ turn.reshape(3, 3).T + model.geom_pos[geom], faces
-
-
-def _mesh(model: Any, mesh: int) -> tuple[Array, Array]:
-    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    start, number = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    return model.mesh_vert[first : first + count], model.mesh_face[start : start + number]
 
 
 def _primitive(kind: Any, size: Array) -> Any:

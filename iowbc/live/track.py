@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ from iowbc.evaluation.trials.rollout import RECORDED, in_batch, play_in, trace_o
 from iowbc.evaluation.trials.table import replayed
 from iowbc.live.drag import Drag
 from iowbc.live.drawing import VIEW, GameMarks
-from iowbc.live.moment import Moment, Witness
+from iowbc.live.moment import Moment, MomentRecorder
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
@@ -55,14 +55,9 @@ class Track:
     held_weight: float
     """Of the object in the hands [N]; 0 without one."""
     joints: tuple[str, ...]
-    kept: int | None = None
-    """So many of the last moments are kept; None keeps all."""
+    moments: deque[Moment]
     ending: str = ""
     """Ending of the episode, once it has ended."""
-    moments: deque[Moment] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.moments = deque(maxlen=self.kept)
 
     @property
     def start(self) -> float:
@@ -111,9 +106,14 @@ class Played(ABC):
     checkpoint = ""
     """Which checkpoint of a training plays."""
 
-    @abstractmethod
     def begin(self, request: Any) -> None:
         """A new episode under other conditions."""
+        self.close()
+        self._open(request)
+
+    @abstractmethod
+    def _open(self, request: Any) -> None:
+        """Sets up the simulation of an episode."""
 
     @abstractmethod
     def reset(self) -> None:
@@ -121,7 +121,7 @@ class Played(ABC):
 
     @abstractmethod
     def step(self) -> None:
-        """One control period. After an episode's end, told in `track.ending`, nothing moves until a reset."""
+        """One control period. After an episode's end, which `track.ending` names, nothing moves until a reset."""
 
     @abstractmethod
     def drag(self, drags: Sequence[Drag]) -> None:
@@ -147,16 +147,16 @@ def recorded(environment: VectorEnv) -> dict[str, Array]:
     return {name: environment.signals[name] for name in RECORDED}
 
 
-def track_of(witness: Witness, world: Specification, title: str, kept: int | None = None) -> Track:
-    """An empty track of a witness's present episode in a world."""
+def track_of(recorder: MomentRecorder, world: Specification, title: str, kept: int | None = None) -> Track:
+    """An empty track of a recorder's present episode in a world; `kept`: how many of the last moments it keeps."""
     return Track(
         title=title,
-        model=witness.model,
-        period=witness.batch.period,
+        model=recorder.model,
+        period=recorder.batch.period,
         gait_period=1.0 / world.recipe.task.references.gait.frequency,
-        held_weight=witness.held_weight,
-        joints=witness.batch.robot.joints,
-        kept=kept,
+        held_weight=recorder.held_weight,
+        joints=recorder.batch.robot.joints,
+        moments=deque(maxlen=kept),
     )
 
 
@@ -179,20 +179,20 @@ def played_again(
 ) -> Track:
     """The trial of a row of the actor's table, taken down step by step.
 
-    progress: told the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
+    progress: receives the time reached within the trial [s]. Raises Interrupted once `interrupted()` is true.
     """
     environment = VectorEnv(actor.world, num_envs=1, workers=0, seed=0, episodes=(replayed(row),))
     seen: list[Moment] = []
-    witness: list[Witness] = []
+    recorder: list[MomentRecorder] = []
 
     def look(seconds: float) -> None:
-        if not witness:
-            witness.append(Witness(environment.batch, recorded(environment)))
-        seen.append(witness[0].look(seconds))
+        if not recorder:
+            recorder.append(MomentRecorder(environment.batch, recorded(environment)))
+        seen.append(recorder[0].look(seconds))
 
     try:
         outcome = play_in(environment, in_batch(actor.policy, row), interrupted, progress, look)[0]
-        track = track_of(witness[0], actor.world, _title(row))
+        track = track_of(recorder[0], actor.world, _title(row))
         track.ending = outcome.ending
         track.moments.extend(seen)
         return track

@@ -1,16 +1,17 @@
-"""Checks before a robot moves."""
+"""Checks before a robot moves, and reasons to damp one that moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from iowbc.arrays import Array
 from iowbc.control.sensors import quantities
+from iowbc.deploy.contract import Contract
 from iowbc.deploy.controller import Controller
-from iowbc.onboard import watchdogs
-from iowbc.onboard.limits import Limits
+from iowbc.onboard.limits import SafetyLimits
 from iowbc.onboard.messages import Record
-from iowbc.onboard.sensors import Sensors
+from iowbc.onboard.sensors import MeasuredState, Sensors
 
 MODEL = 5
 """`mode_machine` of the G1 with 29 joints, revision 1.0, whose masses and gears the MJCF has."""
@@ -23,7 +24,7 @@ FURTHEST = 1.0
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckResult:
     """One check and how it ended."""
 
     name: str
@@ -44,58 +45,94 @@ class Listened:
     """Active controller of the robot's own, "" for none, None without an answer."""
 
 
-def checks(controller: Controller, heard: Listened, wanted: "np.ndarray", limits: Limits) -> list[Check]:
+def checks(controller: Controller, heard: Listened, wanted: Array, limits: SafetyLimits) -> list[CheckResult]:
     """All checks, in the order in which they are worth reading; `wanted`: the command to stand, (11,)."""
     contract = controller.contract
     if not heard.states:
         text = f"no rt/lowstate in {heard.seconds:g} s: is the robot on, is the network right?"
-        return [Check("states", False, text)]
+        return [CheckResult("states", False, text)]
     sensors = Sensors(len(contract.joints))
     sensors.take(tuple(heard.states), heard.seconds)
     assert sensors.posture is not None
     state, rate = heard.states[-1], len(heard.states) / heard.seconds
-    beyond = watchdogs.beyond(sensors.posture, contract, limits)
+    outside = beyond(sensors.posture, contract, limits)
     warmest, hottest = sensors.posture.temperature.max(), limits.temperature
     charge = None if heard.battery is None else int(heard.battery["soc"])
+    battery = "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
     model, order = int(state["mode_machine"]), int(state["mode_pr"])
+    mode = f"the robot's own controller {heard.mode!r} is active: release it first" if heard.mode else "released"
+    if heard.mode is None:
+        mode = "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
     return [
-        Check("states", rate > 400.0, f"{rate:.0f} a second, 400 or more are needed"),
-        Check("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
-        Check("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
-        Check("mode", heard.mode == "", _mode(heard.mode)),
-        Check("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
-        Check("joints", beyond is None, beyond or "within limits, no motor overloaded, upright enough"),
-        Check("battery", charge is not None and charge >= limits.battery, _charge(charge, limits)),
-        Check("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
+        CheckResult("states", rate > 400.0, f"{rate:.0f} a second, 400 or more are needed"),
+        CheckResult("model", model == MODEL, f"mode_machine is {model}, that of the exported robot {MODEL}"),
+        CheckResult("ankles", order == PITCH_ROLL, f"mode_pr is {order}, {PITCH_ROLL} (pitch and roll) is needed"),
+        CheckResult("mode", heard.mode == "", mode),
+        CheckResult("publishers", not heard.others, f"{heard.others} low-level commands of other programs"),
+        CheckResult("joints", outside is None, outside or "within limits, no motor overloaded, upright enough"),
+        CheckResult("battery", charge is not None and charge >= limits.battery, battery),
+        CheckResult("temperature", warmest <= hottest, f"warmest motor {warmest:.0f} °C, {hottest:g} allowed"),
         _dry_run(controller, sensors, wanted),
     ]
 
 
-def _mode(active: str | None) -> str:
-    if active is None:
-        return "the motion switcher does not answer: it is unknown whether the robot's own controller is released"
-    return f"the robot's own controller {active!r} is active: release it first" if active else "released"
-
-
-def _charge(charge: int | None, limits: Limits) -> str:
-    return "no rt/lf/bmsstate" if charge is None else f"{charge} %, {limits.battery:g} or more are needed"
-
-
-def _dry_run(controller: Controller, sensors: Sensors, wanted: "np.ndarray") -> Check:
+def _dry_run(controller: Controller, sensors: Sensors, wanted: Array) -> CheckResult:
     """Steps of the policy on the posture as measured, of which no command is sent."""
-    if any(name in quantities(of_object=True) for name in (port.name for port in controller.contract.inputs)):
-        return Check("policy", True, "observes the object: tried when its pose arrives")
+    if not quantities(of_object=True).keys().isdisjoint(port.name for port in controller.contract.inputs):
+        return CheckResult("policy", True, "observes the object: tried when its pose arrives")
     controller.reset()
     default, furthest, joint = np.array(controller.contract.default_position), 0.0, 0
     for step in range(DRY_STEPS):
         targets = controller.step(sensors.measured, wanted, measured_at=float(step))
         if targets.held[0]:
-            return Check("policy", False, targets.reasons[0])
+            return CheckResult("policy", False, targets.reasons[0])
         away = np.abs(targets.position[0] - default)
         joint = int(np.argmax(away))
         furthest = max(furthest, float(away[joint]))
     controller.reset()
     name = controller.contract.joints[joint]
-    return Check(
+    return CheckResult(
         "policy", furthest <= FURTHEST, f"targets at most {furthest:.2f} rad from the default posture ({name})"
     )
+
+
+def stale(sensors: Sensors, now: float, limits: SafetyLimits) -> str | None:
+    """The reason where the newest state is old, or arrives late by the robot's own clock."""
+    age = now - sensors.at
+    if age > limits.state_age:
+        return f"stale state: nothing new for {1e3 * age:.0f} ms"
+    if sensors.late > limits.state_age:
+        return f"stale state: it arrives {1e3 * sensors.late:.0f} ms late"
+    return None
+
+
+def beyond(now: MeasuredState, contract: Contract, limits: SafetyLimits) -> str | None:
+    """The reason where a measurement is no number or beyond a limit."""
+    measured = np.concatenate([now.position, now.velocity, now.torque, now.gravity, now.turning])
+    if not np.isfinite(measured).all():
+        return "a measurement is not finite"
+    if now.tilt > limits.tilt:
+        return f"tilt: {now.tilt:.2f} rad"
+    lower, upper = np.array(contract.lower), np.array(contract.upper)
+    outside = np.maximum(lower - now.position, now.position - upper)
+    speed, torque = np.array(contract.velocity_limit), np.array(contract.effort)
+    for name, excess, value, unit in (
+        ("position", outside - limits.position_margin, now.position, "rad"),
+        ("velocity", np.abs(now.velocity) - limits.speed * speed, now.velocity, "rad/s"),
+        ("torque", np.abs(now.torque) - limits.torque * torque, now.torque, "N·m"),
+    ):
+        if excess[joint := int(np.argmax(excess))] > 0.0:
+            return f"{name} limit: {contract.joints[joint]} at {value[joint]:.2f} {unit}"
+    return None
+
+
+def exhausted(
+    now: MeasuredState, charge: float | None, joints: tuple[str, ...], least: float, most: float
+) -> dict[str, str]:
+    """Complaints about a battery below `least` and a motor above `most` [°C]; `charge`: None where unknown [%]."""
+    found = {}
+    if charge is not None and charge < least:
+        found["battery"] = f"battery at {charge:.0f} %, less than {least:g}"
+    if now.temperature[hottest := int(np.argmax(now.temperature))] > most:
+        found["temperature"] = f"temperature: {joints[hottest]} at {now.temperature[hottest]:.0f} °C, above {most:g}"
+    return found

@@ -40,7 +40,6 @@ LOOPBACK = """<General><AllowMulticast>false</AllowMulticast></General>
 
 
 def _struct(name: str, **members: Any) -> Any:
-    """An IDL type by its full name."""
     made = types.new_class(
         name.rpartition(".")[2], (IdlStruct,), {"typename": name}, lambda space: space.update(__annotations__=members)
     )
@@ -48,7 +47,6 @@ def _struct(name: str, **members: Any) -> Any:
 
 
 def _idl_type(kind: np.dtype[np.void]) -> Any:
-    """The IDL type of a message."""
     annotated: dict[str, Any] = {}
     for name in kind.names or ():
         base, shape = kind[name].subdtype or (kind[name], ())
@@ -89,7 +87,7 @@ def _configured(domain: int, configuration: str) -> Domain:
 
 
 class DdsBus:
-    """A participant of the bus; see `iowbc.onboard.bus.Bus`."""
+    """A participant of the bus; see `iowbc.onboard.process.Bus`."""
 
     def __init__(self, network: str, domain: int = 0) -> None:
         """`network`: interface, as `lo` or `eth0`. Raises UsageError for one that Cyclone DDS cannot use."""

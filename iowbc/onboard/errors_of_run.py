@@ -20,7 +20,7 @@ from iowbc.robot.description import Robot
 
 
 @dataclass(frozen=True)
-class Run:
+class LoggedRun:
     """Motion of a robot in Run, at the rate of the policy; first axis: T control steps."""
 
     time: Array
@@ -51,27 +51,29 @@ class Run:
 UNITS = {"E_v": "m/s", "E_ψ": "rad", "E_α": "rad", "E_h": "m"}
 
 
-def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> Run:
+def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency: float) -> LoggedRun:
     """The part of a log in which the policy acted. Raises UsageError where it never did, Damaged for another file."""
     sensors, every = Sensors(len(robot.joints)), round(FREQUENCY / control_frequency)
     full, rows, soles, begin = 0.99 * robot.kp, [], [], None
-    for number, turn in enumerate(read_turns(path)):
-        begin = turn.given.now if begin is None else begin
-        sensors.take(turn.given.states, turn.given.now)
-        stiff = (turn.command["motor_cmd"]["kp"][: len(robot.joints)] >= full).all()
+    for number, (given, command) in enumerate(read_turns(path)):
+        begin = given.now if begin is None else begin
+        sensors.take(given.states, given.now)
+        stiff = (command["motor_cmd"]["kp"][: len(robot.joints)] >= full).all()
         if number % every or not stiff or sensors.posture is None:
             continue
-        now, wanted = sensors.posture, turn.given.wanted
+        now, wanted = sensors.posture, given.wanted
         angles = dict(zip(robot.joints, now.position, strict=True))
-        upright = rotations.matrix(rotations.from_euler(*_lean(now.gravity), np.zeros(())))
+        x, y, z = now.gravity
+        roll, pitch = np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))
+        upright = rotations.matrix(rotations.from_euler(roll, pitch, np.zeros(())))
         feet = np.stack([upright @ robot.tree.forward(angles, robot.base, sole)[0] for sole in robot.soles])
-        pitch = float(rotations.lean_of(upright @ _torso(robot, angles)))
-        rows.append([turn.given.now - begin, pitch, sensors.heading, *wanted.command])
+        lean = float(rotations.lean_of(upright @ _torso(robot, angles)))
+        rows.append([given.now - begin, lean, sensors.heading, *wanted.command])
         soles.append(feet)
     if len(rows) < 2:
         raise UsageError(f"{path}: the robot never ran")
     table, feet = np.array(rows), np.array(soles)
-    return Run(
+    return LoggedRun(
         time=table[:, 0],
         command=table[:, 3:],
         height=-feet[..., 2].min(axis=1),
@@ -79,11 +81,6 @@ def read_run(path: Path, robot: Robot, control_frequency: float, gait_frequency:
         heading=table[:, 2],
         velocity=_averaged(_velocity(feet, table[:, 0], table[:, 2]), round(control_frequency / gait_frequency)),
     )
-
-
-def _lean(gravity: Array) -> tuple[Array, Array]:
-    """Roll and pitch of a base by the direction of gravity in it."""
-    return np.arctan2(-gravity[1], -gravity[2]), np.arctan2(gravity[0], np.hypot(gravity[1], gravity[2]))
 
 
 def _torso(robot: Robot, angles: dict[str, float]) -> Array:

@@ -5,7 +5,7 @@ from pydantic import Field
 from iowbc.recipe.section import Section
 
 
-class Limits(Section):
+class SafetyLimits(Section):
     """Limits of checks and watchdogs."""
 
     state_age: float = Field(default=0.015, gt=0.0)
@@ -45,4 +45,4 @@ class Limits(Section):
     """Velocity gains while damping, as a multiple of the contract's."""
 
 
-LIMITS = Limits()
+LIMITS = SafetyLimits()

@@ -1,4 +1,4 @@
-"""The log of a robot: every message and every input of the state machine, in the MCAP format.
+"""The log of a robot: every message and every input of the state machine, in the MCAP format; and its replay.
 
 Messages of one turn of the loop have one time. `inputs` begins a turn, and the low-level command ends it.
 """
@@ -15,9 +15,11 @@ import numpy as np
 from mcap.reader import NonSeekingReader
 from mcap.writer import Writer
 
+from iowbc.deploy.controller import Controller
 from iowbc.errors import Damaged, UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.machine import Inputs, State, Wanted
+from iowbc.onboard.limits import SafetyLimits
+from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record, from_cdr, to_cdr
 
 TOPICS = {messages.LOW_STATE: "rt/lowstate", messages.LOW_COMMAND: "rt/lowcmd"}
@@ -50,8 +52,7 @@ class LogWriter:
         self._thread = threading.Thread(target=self._write, name="log")
         self._thread.start()
 
-    def turn(self, given: Inputs, command: Record) -> None:
-        """A turn of the loop."""
+    def turn(self, given: TurnInputs, command: Record) -> None:
         wanted = given.wanted
         self.add(
             "inputs",
@@ -89,14 +90,6 @@ class LogWriter:
         self._file.close()
 
 
-@dataclass(frozen=True)
-class Turn:
-    """A logged turn of the loop."""
-
-    given: Inputs
-    command: Record
-
-
 def read_about(path: Path) -> dict[str, str]:
     """Header of the log, by the program that wrote it. Raises Damaged."""
     with path.open("rb") as file:
@@ -129,8 +122,8 @@ def read_messages(path: Path) -> Iterator[tuple[str, float, bytes]]:
                 raise Damaged(f"{path}: {type(error).__name__}: {error}") from error
 
 
-def read_turns(path: Path) -> Iterator[Turn]:
-    """The turns of a log, in order. Raises Damaged and UsageError."""
+def read_turns(path: Path) -> Iterator[tuple[TurnInputs, Record]]:
+    """Inputs and command of each turn of the loop, in order. Raises Damaged and UsageError."""
     inputs: dict[str, Any] | None = None
     states: list[Record] = []
     for topic, _, data in read_messages(path):
@@ -139,10 +132,10 @@ def read_turns(path: Path) -> Iterator[Turn]:
         elif topic == TOPICS[messages.LOW_STATE]:
             states.append(from_cdr(messages.LOW_STATE, data))
         elif topic == TOPICS[messages.LOW_COMMAND] and inputs is not None:
-            yield Turn(_inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data))
+            yield _inputs(inputs, states), from_cdr(messages.LOW_COMMAND, data)
 
 
-def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:
+def _inputs(logged: dict[str, Any], states: list[Record]) -> TurnInputs:
     request = logged["request"]
     wanted = Wanted(
         command=np.array(logged["command"]),
@@ -151,7 +144,7 @@ def _inputs(logged: dict[str, Any], states: list[Record]) -> Inputs:
         seen={name: np.array(values) for name, values in logged["seen"].items()},
         seen_at=_never(logged["seen_at"]),
     )
-    return Inputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
+    return TurnInputs(logged["now"], tuple(states), wanted, logged["others"], logged.get("charge"))
 
 
 def _finite(time: float) -> float | None:
@@ -161,3 +154,37 @@ def _finite(time: float) -> float | None:
 
 def _never(time: float | None) -> float:
     return -np.inf if time is None else time
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """Result of a replay."""
+
+    turns: int
+    different: int
+    first: float | None
+    """Time of the first command that differs [s]."""
+
+
+def export_digest(controller: Controller) -> str:
+    """Names of the exported programs in a log: the digests of their files."""
+    return ",".join(f"{name}:{value}" for name, value in sorted(controller.contract.files.items()))
+
+
+def replay(path: Path, folder: Path) -> Replayed:
+    """Runs the inputs of a log through the state machine of the exported controller in `folder`: every command must
+    come out bit for bit. Raises UsageError for the log of another export, Damaged for a file that is no log.
+    """
+    about = read_about(path)
+    controller = Controller.load(folder)
+    if export_digest(controller) != about["export"]:
+        raise UsageError(f"{path}: logged with another export ({about['recipe']}); give the folder of that one")
+    machine = Machine(controller, about["scene"], SafetyLimits.model_validate_json(about["limits"]))
+    turns = different = 0
+    first: float | None = None
+    for given, command in read_turns(path):
+        turns += 1
+        if machine.turn(given).tobytes() != command.tobytes():
+            different += 1
+            first = given.now if first is None else first
+    return Replayed(turns, different, first)

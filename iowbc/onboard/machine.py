@@ -5,17 +5,17 @@ clock, bus or files, so that a log of its inputs gives its commands again bit fo
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.control.sensors import Measured, quantities
+from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
-from iowbc.onboard import messages, watchdogs
-from iowbc.onboard.limits import LIMITS, Limits
+from iowbc.onboard import checks, messages
+from iowbc.onboard.limits import LIMITS, SafetyLimits
 from iowbc.onboard.messages import Record
 from iowbc.onboard.sensors import Sensors
 
@@ -59,7 +59,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Inputs:
+class TurnInputs:
     """Inputs of a turn of the loop."""
 
     now: float
@@ -76,7 +76,7 @@ class Inputs:
 class Machine:
     """State machine, watchdogs and controller of a robot."""
 
-    def __init__(self, controller: Controller, scene: str, limits: Limits = LIMITS) -> None:
+    def __init__(self, controller: Controller, scene: str, limits: SafetyLimits = LIMITS) -> None:
         """`controller` of one robot; `scene`: base grasp and expected load. Raises ValueError for an unknown scene."""
         self.controller, self.limits, self._scene = controller, limits, scene
         controller.reset(scene=scene)
@@ -97,24 +97,29 @@ class Machine:
         self._warned: set[str] = set()
         self._from = self._goal = self._target = np.array(contract.default_position)
 
-    def turn(self, given: Inputs) -> Record:
+    def turn(self, given: TurnInputs) -> Record:
         """The command to send."""
         self.events = []
         self.sensors.take(given.states, given.now)
         self._charge = self._charge if given.charge is None else given.charge
-        reason = self._danger(given) if self.state in MOVING else None
-        if reason is not None:
+        wanted = given.wanted.request
+        if self.state in MOVING and (reason := self._danger(given)) is not None:
             self._enter(State.DAMPING, given, reason)
-        elif given.wanted.request not in (None, self.state):
-            self._request(given.wanted.request, given)
-        if self.state in MOVING:
-            self._warn()
+        elif wanted is not None and wanted is not self.state:
+            if (refusal := self._refusal(wanted, given)) is None:
+                self._enter(wanted, given, "requested")
+            else:
+                self.events.append(f"{wanted} refused: {refusal}")
+        if self.state in MOVING:  # warn once after each Stand of a battery that is low or a motor that is warm
+            found = self._exhausted(self.limits.battery, self.limits.temperature)
+            self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
+            self._warned |= found.keys()
         self._last = given.now
         if self.state is State.RUN:
             self._act(given)
         return self._command(given.now)
 
-    def _danger(self, given: Inputs) -> str | None:
+    def _danger(self, given: TurnInputs) -> str | None:
         """The reason to damp, if there is one."""
         limits = self.limits
         if given.others:
@@ -130,30 +135,17 @@ class Machine:
         limits, posture = self.limits, self.sensors.posture
         assert posture is not None
         return (
-            watchdogs.stale(self.sensors, now, limits)
-            or watchdogs.beyond(posture, self._contract, limits)
+            checks.stale(self.sensors, now, limits)
+            or checks.beyond(posture, self._contract, limits)
             or next(iter(self._exhausted(limits.battery_empty, limits.temperature_hot).values()), None)
         )
 
     def _exhausted(self, least: float, most: float) -> dict[str, str]:
         assert self.sensors.posture is not None
-        return watchdogs.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
+        return checks.exhausted(self.sensors.posture, self._charge, self._contract.joints, least, most)
 
-    def _warn(self) -> None:
-        """Tells once after each Stand that the battery is low, or that a motor is warm."""
-        found = self._exhausted(self.limits.battery, self.limits.temperature)
-        self.events += [f"warning: {text}" for name, text in found.items() if name not in self._warned]
-        self._warned |= found.keys()
-
-    def _request(self, wanted: State, given: Inputs) -> None:
-        """Enters the state that is asked for, or says why not."""
-        refusal = self._refusal(wanted, given)
-        if refusal is None:
-            self._enter(wanted, given, "requested")
-        else:
-            self.events.append(f"{wanted} refused: {refusal}")
-
-    def _refusal(self, wanted: State, given: Inputs) -> str | None:
+    def _refusal(self, wanted: State, given: TurnInputs) -> str | None:
+        """The reason not to enter a state that is asked for."""
         limits, now = self.limits, self.sensors.posture
         if wanted not in BEFORE:
             return None
@@ -176,7 +168,7 @@ class Machine:
             return self._uninformed(given)
         return None
 
-    def _uninformed(self, given: Inputs) -> str | None:
+    def _uninformed(self, given: TurnInputs) -> str | None:
         """The reason where the newest command, or object pose that the policy observes, is old."""
         wanted, limits = given.wanted, self.limits
         if (age := given.now - wanted.at) > limits.command_age:
@@ -187,7 +179,7 @@ class Machine:
             return f"stale object pose: nothing new for {age:.2f} s"
         return None
 
-    def _enter(self, state: State, given: Inputs, why: str) -> None:
+    def _enter(self, state: State, given: TurnInputs, why: str) -> None:
         self.state, self._entered, self._turn = state, given.now, 0
         self.events.append(f"{state}: {why}")
         if state is State.STAND:
@@ -198,19 +190,16 @@ class Machine:
         elif state is State.RUN:
             self.controller.reset(scene=self._scene)
 
-    def _act(self, given: Inputs) -> None:
+    def _act(self, given: TurnInputs) -> None:
         """A step of the policy every `_turns` turns; what it refuses leads to damping."""
         if self._turn == 0:
-            targets = self.controller.step(self._measured(given), given.wanted.command, measured_at=self.sensors.at)
+            measured = replace(self.sensors.measured, **given.wanted.seen)
+            targets = self.controller.step(measured, given.wanted.command, measured_at=self.sensors.at)
             if targets.held[0]:
                 self._enter(State.DAMPING, given, targets.reasons[0])
                 return
             self._target = targets.position[0]
         self._turn = (self._turn + 1) % self._turns
-
-    def _measured(self, given: Inputs) -> Measured:
-        measured = self.sensors.measured
-        return Measured(**(vars(measured) | dict(given.wanted.seen)))
 
     def _command(self, now: float) -> Record:
         command = messages.empty(messages.LOW_COMMAND)

@@ -22,68 +22,33 @@ Record = np.ndarray[Any, np.dtype[np.void]]
 """A message: an array of shape () of one of the types below."""
 
 
-def _record(*fields: Any) -> np.dtype[np.void]:
-    return np.dtype(list(fields), align=True)
+def _record(fields: str, **parts: np.dtype[np.void]) -> np.dtype[np.void]:
+    """A type by its fields, `name kind` or `name kind count` with commas between; `parts`: kinds that are records."""
+    words = [field.split() for field in fields.split(", ")]
+    return np.dtype([(name, parts.get(kind, kind), *map(int, count)) for name, kind, *count in words], align=True)
 
 
-MOTOR_COMMAND = _record(
-    ("mode", "u1"), ("q", "f4"), ("dq", "f4"), ("tau", "f4"), ("kp", "f4"), ("kd", "f4"), ("reserve", "u4")
-)
+MOTOR_COMMAND = _record("mode u1, q f4, dq f4, tau f4, kp f4, kd f4, reserve u4")
 """torque = tau + kp (q - position) + kd (dq - velocity), computed by the motor's own drive; mode 1 enables it."""
 LOW_COMMAND = _record(
-    ("mode_pr", "u1"),
-    ("mode_machine", "u1"),
-    ("motor_cmd", MOTOR_COMMAND, (MOTORS,)),
-    ("reserve", "u4", (4,)),
-    ("crc", "u4"),
+    f"mode_pr u1, mode_machine u1, motor_cmd motor {MOTORS}, reserve u4 4, crc u4", motor=MOTOR_COMMAND
 )
 """`mode_pr` 0: ankles and waist by pitch and roll; `mode_machine` repeats that of the state."""
-IMU_STATE = _record(
-    ("quaternion", "f4", (4,)),
-    ("gyroscope", "f4", (3,)),
-    ("accelerometer", "f4", (3,)),
-    ("rpy", "f4", (3,)),
-    ("temperature", "i2"),
-)
+IMU_STATE = _record("quaternion f4 4, gyroscope f4 3, accelerometer f4 3, rpy f4 3, temperature i2")
 """Inertial unit in the pelvis: wxyz, [rad/s], [m/s²], [rad], [°C]."""
 MOTOR_STATE = _record(
-    ("mode", "u1"),
-    ("q", "f4"),
-    ("dq", "f4"),
-    ("ddq", "f4"),
-    ("tau_est", "f4"),
-    ("temperature", "i2", (2,)),
-    ("vol", "f4"),
-    ("sensor", "u4", (2,)),
-    ("motorstate", "u4"),
-    ("reserve", "u4", (4,)),
+    "mode u1, q f4, dq f4, ddq f4, tau_est f4, temperature i2 2, vol f4, sensor u4 2, motorstate u4, reserve u4 4"
 )
 LOW_STATE = _record(
-    ("version", "u4", (2,)),
-    ("mode_pr", "u1"),
-    ("mode_machine", "u1"),
-    ("tick", "u4"),
-    ("imu_state", IMU_STATE),
-    ("motor_state", MOTOR_STATE, (MOTORS,)),
-    ("wireless_remote", "u1", (REMOTE,)),
-    ("reserve", "u4", (4,)),
-    ("crc", "u4"),
+    f"version u4 2, mode_pr u1, mode_machine u1, tick u4, imu_state imu, motor_state motor {MOTORS}, "
+    f"wireless_remote u1 {REMOTE}, reserve u4 4, crc u4",
+    imu=IMU_STATE,
+    motor=MOTOR_STATE,
 )
 """`tick` counts milliseconds; `mode_machine` is the model's number."""
 BATTERY_STATE = _record(
-    ("version_high", "u1"),
-    ("version_low", "u1"),
-    ("fn", "u1"),
-    ("cell_vol", "u2", (40,)),
-    ("bmsvoltage", "u4", (3,)),
-    ("current", "i4"),
-    ("soc", "u1"),
-    ("soh", "u1"),
-    ("temperature", "i2", (12,)),
-    ("cycle", "u2"),
-    ("manufacturer_date", "u2"),
-    ("bmsstate", "u4", (5,)),
-    ("reserve", "u4", (3,)),
+    "version_high u1, version_low u1, fn u1, cell_vol u2 40, bmsvoltage u4 3, current i4, soc u1, soh u1, "
+    "temperature i2 12, cycle u2, manufacturer_date u2, bmsstate u4 5, reserve u4 3"
 )
 """`soc`: charge [%]."""
 NAMES = {
@@ -100,7 +65,6 @@ HEADER = b"\x00\x01\x00\x00"
 
 
 def empty(kind: np.dtype[np.void]) -> Record:
-    """A message of zeros."""
     return np.zeros((), kind)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from iowbc.arrays import Array
-from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE
+from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE, nominal_command
 from iowbc.control.sensors import quantities
 from iowbc.deploy.contract import Contract
 from iowbc.errors import UsageError
@@ -57,13 +57,11 @@ class Ranges:
             self._low[place], self._high[place] = low, high
         self._high[OFFSET] = np.tile(np.add(known.common_offset, known.single_offset), 2)
         self._low[OFFSET] = -self._high[OFFSET]
-        self.standing = np.zeros(len(COMMAND))
-        self.standing[HEIGHT], self.standing[PITCH] = known.nominal_height, known.nominal_pitch
+        self.standing = nominal_command(known)
 
     def clipped(self, command: Array) -> Array:
         """The command within the ranges, (11,)."""
-        inside: Array = np.clip(command, self._low, self._high)
-        return inside
+        return np.clip(command, self._low, self._high)
 
 
 class Remote:
@@ -186,7 +184,6 @@ class Udp:
         return replace(last, request=request)
 
     def close(self) -> None:
-        """Gives the port free."""
         self._socket.close()
 
     def _given(self, given: Datagram, now: float) -> Wanted:
@@ -202,7 +199,7 @@ class Udp:
 
 
 @dataclass(frozen=True)
-class Seeing:
+class OperatorWithPoses:
     """An operator beside whom another source delivers the object's pose."""
 
     operator: Operator

@@ -11,10 +11,9 @@ from typing import Protocol
 import numpy as np
 
 from iowbc.onboard import messages
-from iowbc.onboard.bus import Bus
 from iowbc.onboard.checks import Listened
 from iowbc.onboard.log import LogWriter
-from iowbc.onboard.machine import FREQUENCY, Inputs, Machine, State
+from iowbc.onboard.machine import FREQUENCY, Machine, State, TurnInputs
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Operator
 
@@ -23,12 +22,31 @@ PATIENCE = 1.0
 """Time after which a robot in lock step counts as gone [s]."""
 DISCOVERY = 10.0
 """For how long the first state is waited for [s]: participants find each other within some seconds."""
-FAREWELL = 0.5
+FINAL_DAMPING = 0.5
 """For how long damping is commanded at the end [s]."""
 REALTIME_PRIORITY = 60
 """Above ordinary threads of the kernel's real-time class, below its own."""
 KEPT_TIMES = 1 << 20
 """Latest turns of which times are kept for the statistics: 35 minutes."""
+
+
+class Bus(Protocol):
+    """Publishes messages and takes those of other participants; topics follow from the kinds of messages."""
+
+    def publish(self, message: Record) -> None:
+        """Sends a message of any kind."""
+
+    def take(self, kind: np.dtype[np.void]) -> list[Record]:
+        """Messages of a kind from others since the last call, oldest first."""
+
+    def wait(self, kind: np.dtype[np.void], seconds: float) -> bool:
+        """Waits until there is something to take; False where nothing came in time."""
+
+    def high_level_mode(self, seconds: float) -> str | None:
+        """Name of the robot's own controller that is active, "" for none, None where the robot does not answer."""
+
+    def close(self) -> None:
+        """Leaves the bus."""
 
 
 class Clock(Protocol):
@@ -152,7 +170,7 @@ def drive(
             wanted = replace(wanted, request=State.DAMPING)
         batteries = bus.take(messages.BATTERY_STATE)
         charge = float(batteries[-1]["soc"]) if batteries else None
-        given = Inputs(now, states, wanted, others, charge)
+        given = TurnInputs(now, states, wanted, others, charge)
         command = machine.turn(given)
         bus.publish(command)
         for event in machine.events:
@@ -163,7 +181,7 @@ def drive(
             log.turn(given, command)
         kept[:, turns % KEPT_TIMES] = clock.late, time.perf_counter() - started
         turns += 1
-        if leaving is not None and now - leaving >= FAREWELL:
+        if leaving is not None and now - leaving >= FINAL_DAMPING:
             times = Times(*kept[:, :turns])
             if log is not None:
                 log.add("timing", now, text=str(times))

@@ -14,7 +14,7 @@ CLOCK_DRIFT = 2e-4
 
 
 @dataclass(frozen=True)
-class Posture:
+class MeasuredState:
     """A robot's state in the order of its joints."""
 
     position: Array
@@ -38,13 +38,13 @@ class Posture:
         return float(np.arccos(np.clip(-self.gravity[2], -1.0, 1.0)))
 
 
-def posture(state: Record, joints: int) -> Posture:
+def posture(state: Record, joints: int) -> MeasuredState:
     """The values of a state; numbers need not be finite."""
     motors, imu = state["motor_state"][:joints], state["imu_state"]
     quaternion = imu["quaternion"].astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         rotation = rotations.matrix(rotations.normalized(quaternion))
-    return Posture(
+    return MeasuredState(
         position=motors["q"].astype(np.float64),
         velocity=motors["dq"].astype(np.float64),
         torque=motors["tau_est"].astype(np.float64),
@@ -61,7 +61,7 @@ class Sensors:
     def __init__(self, joints: int) -> None:
         self._joints = joints
         self.state: Record | None = None
-        self.posture: Posture | None = None
+        self.posture: MeasuredState | None = None
         self.heading = 0.0
         self.at = -np.inf
         """When the newest state arrived [s]."""
@@ -98,7 +98,6 @@ class Sensors:
 
     @property
     def measured(self) -> Measured:
-        """The newest measurements as a row."""
         assert self.posture is not None
         now = self.posture
         return Measured(

@@ -25,13 +25,13 @@ class Distillation(Encoder):
     start: Literal["teacher", "anew"] = "teacher"
     """Beginning of the body behind the encoder. `teacher`: the teacher's own body; where that sees s_priv, it sees
     what a linear map reads from the latent, at first the mean of training. Nothing of the teacher has to be learnt
-    again, and all that is learnt is what the history tells. `anew`: from nothing, on the latent itself."""
+    again, and all that is learnt is what the history shows. `anew`: from nothing, on the latent itself."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers behind the encoder (paper Table I), where they start anew; else they are the teacher's."""
     activation: Literal["elu", "relu", "tanh"] = "elu"
     """Activation of the encoder, and of the hidden layers where they start anew."""
     learning_rate: float = Field(default=5e-4, gt=0)
-    """Adam's step size at the start; it falls to a tenth along a cosine."""
+    """Adam's learning rate at the start; it falls to a tenth along a cosine."""
     gradient_norm: float = Field(default=1.0, gt=0)
     """Largest norm of a gradient step."""
     batch: int = Field(default=1024, ge=1, le=10_000_000)
@@ -43,7 +43,7 @@ class Distillation(Encoder):
     teacher_share: float = Field(default=0.1, ge=0, le=1)
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
     withheld: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
-    """Parts of s_priv, by name, that the teacher is not told when it drives or answers: it takes each for its mean in
+    """Parts of s_priv, by name, that the teacher does not receive when it drives or answers: each is its mean in
     training. What no history shows, such as a motor's strength, the student cannot answer to as the teacher does; and a
     teacher that walks loses nothing without it."""
     observe_object: bool = Field(default=True, json_schema_extra=LATER)
@@ -56,7 +56,7 @@ class Distillation(Encoder):
     """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales the error."""
     auxiliary: float = Field(default=0.1, ge=0)
     """Weight of the mean squared error with which `auxiliary_of` is read from the latent, each number in its standard
-    deviations; 0 leaves it out. It makes the latent hold what the history tells."""
+    deviations; 0 leaves it out. It makes the latent hold what the history shows."""
     auxiliary_of: Literal["load", "privileged"] = Field(default="load", json_schema_extra=LATER)
     """Of what the auxiliary error is. `load`: of the object's mass and the base's velocity, by a reading of its own.
     `privileged`: of all s_priv, by the estimate that the body sees (with `start: teacher`), which imitation alone
@@ -70,7 +70,4 @@ class Distillation(Encoder):
         if self.batch > self.buffer:
             yield "", f"batch ({self.batch}) is larger than buffer ({self.buffer})"
         if self.auxiliary_of == "privileged" and self.start != "teacher":
-            yield (
-                "",
-                "auxiliary_of: a student estimates s_priv with `start: teacher` alone",
-            )
+            yield "", "auxiliary_of: a student estimates s_priv with `start: teacher` alone"

@@ -222,7 +222,7 @@ class Fit(Section):
     batch: int = Field(default=256, ge=1, le=2_000_000)
     """Samples in a gradient step."""
     learning_rate: Positive = 5e-3
-    """Adam's first step size; it falls to a hundredth along a cosine."""
+    """Adam's first learning rate; it falls to a hundredth along a cosine."""
     patience: int = Field(default=40, ge=1, le=1_000_000)
     """Epochs without a better validation loss before training ends."""
     task_weight: NonNegative = 4.0

@@ -7,7 +7,7 @@ import itertools
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -60,6 +60,7 @@ DEEPEST = 16
 """Hidden layers of the deepest network."""
 OWN_NAME = "[a-z][a-z0-9_]{0,31}"
 """Pattern of a name that a recipe gives to a scene or a term of its own."""
+OwnName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
 
 
 class Section(BaseModel):
@@ -123,11 +124,6 @@ class NamedEntries(Section):
     def own(self) -> tuple[str, ...]:
         """Names that the recipe adds."""
         return tuple(self.model_extra or ())
-
-    @classmethod
-    def own_type(cls) -> Any:
-        """Annotation of the entries that a recipe adds."""
-        return get_args(cls.__annotations__["__pydantic_extra__"])[1]
 
     def problems(self) -> Iterator[tuple[str, str]]:
         for name in self.own:

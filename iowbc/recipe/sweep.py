@@ -1,5 +1,6 @@
 """A sweep: a recipe or a study with every combination of a grid of values and of values drawn at random."""
 
+import contextlib
 import hashlib
 import itertools
 import json
@@ -105,7 +106,6 @@ class Point:
 
     @property
     def name(self) -> str:
-        """Name of its recipe."""
         return self.loaded.recipe.name
 
 
@@ -132,7 +132,7 @@ def load_sweep(
     """The points of a sweep, all of them valid recipes. Raises `RecipeError`.
 
     settings: `path=value` holds for all points; `path=a,b` and `path=0..4` vary it, and go before what the file says.
-    most: points at most. counted: is told their number before any is read.
+    most: points at most. counted: receives their number before any is read.
     """
     described = SweepFile() if file is None else _read_file(file)
     grid = {path: _expanded(values, f"{file}") for path, values in described.grid.items()}
@@ -141,8 +141,9 @@ def load_sweep(
         raise RecipeError([Problem(f"{file}:1:1", text)])
     fixed: list[str] = []
     for setting in settings:
-        path, equals, text = setting.partition("=")
-        values = _expanded(_items(text, f"--set {setting}"), f"--set {setting}") if equals else []
+        place, (path, equals, text) = f"--set {setting}", setting.partition("=")
+        listed = plain(read_value(f"[{text}]", place)) if equals else []  # so that brackets and quotes keep commas
+        values = _expanded(listed if isinstance(listed, list) else [], place)
         if len(values) > 1:
             grid[path.strip()] = values
         else:
@@ -174,7 +175,7 @@ def _points(word: str, fixed: Sequence[str], settings: Mapping[str, JsonValue]) 
 
 
 def _named(loaded: LoadedRecipe, settings: Mapping[str, JsonValue]) -> LoadedRecipe:
-    """The recipe under a name that tells its settings, the same in every sweep that has it."""
+    """The recipe under a name that contains its settings, the same in every sweep that has it."""
     if not settings:
         return loaded
     name = _slug([loaded.recipe.name, *(f"{_leaf(path)}-{written(value)}" for path, value in settings.items())])
@@ -196,17 +197,10 @@ def _slug(words: Sequence[str]) -> str:
 def written(value: JsonValue) -> str:
     """A value as `--set` takes it."""
     if isinstance(value, str):
-        try:
-            return value if plain(read_value(value, "")) == value else json.dumps(value)
-        except RecipeError:
-            return json.dumps(value)
+        with contextlib.suppress(RecipeError):
+            if plain(read_value(value, "")) == value:
+                return value
     return json.dumps(value)
-
-
-def _items(text: str, place: str) -> list[JsonValue]:
-    """The values of `a,b`; commas inside brackets, braces and quotes separate nothing."""
-    found = plain(read_value(f"[{text}]", place))
-    return list(found) if isinstance(found, list) else []
 
 
 def _expanded(values: Sequence[JsonValue], place: str) -> list[JsonValue]:
@@ -243,8 +237,7 @@ def _read_file(file: Path) -> SweepFile:
     try:
         return SweepFile.model_validate(plain(tree))
     except ValidationError as error:
-        problems = [_problem(tree, found["loc"], found["msg"]) for found in error.errors(include_url=False)]
-        raise RecipeError(problems) from None
+        raise RecipeError([_problem(tree, found["loc"], found["msg"]) for found in error.errors()]) from None
 
 
 def _problem(tree: Located, location: Sequence[int | str], message: str) -> Problem:

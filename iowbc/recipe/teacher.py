@@ -78,8 +78,8 @@ class HistoryNetwork(Encoder):
     length: int = Field(default=25, ge=2, le=1000)
     """Length of the observation history H_t (paper Table I)."""
     estimate: bool = Field(default=False, json_schema_extra=LATER)
-    """Lets the body see s_priv as the latent tells it, and not the latent, as a student does that is distilled with
-    `distill.start: teacher`."""
+    """Lets the body see an estimate of s_priv from the latent, and not the latent, as a student does that is distilled
+    with `distill.start: teacher`."""
     auxiliary: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
     """With `estimate`: weight of the mean squared error of the estimate of s_priv, each number in its standard
     deviations. Without it the estimate becomes whatever the reward makes of it."""
@@ -116,13 +116,13 @@ class Teacher(PPO):
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers of policy and value network (paper Table I)."""
     learning_rate: float = Field(default=2e-4, gt=0)
-    """Adam's step size at the start (paper Table I)."""
+    """Adam's learning rate at the start (paper Table I)."""
     desired_kl: float | None = Field(default=0.016, gt=0)
-    """KL divergence of the old policy from the new one that an update should have, in closed form: the step size falls
-    by a fifth beyond one and a half times as much, and rises by a fifth below two thirds. At 0.016 a sixth of the
-    samples is clipped; at 0.04 a third was, and training was slower. Empty keeps the step size constant."""
+    """KL divergence of the old policy from the new one that an update should have, in closed form: the learning rate
+    falls by a fifth beyond one and a half times as much, and rises by a fifth below two thirds. At 0.016 a sixth of the
+    samples is clipped; at 0.04 a third was, and training was slower. Empty keeps the learning rate constant."""
     learning_rate_range: Annotated[tuple[PositiveFloat, PositiveFloat], AfterValidator(in_order)] = (2e-5, 1e-3)
-    """Least and largest step size, where `desired_kl` moves it."""
+    """Least and largest learning rate, where `desired_kl` moves it."""
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
     smoothness: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
@@ -134,7 +134,7 @@ class Teacher(PPO):
     initial_std: float = Field(default=0.5, gt=0)
     """Initial standard deviation of the action, in units of the action (before the action scale); 0.3 learnt slower."""
     std_learning_rate: float = Field(default=1.5e-4, gt=0)
-    """Adam's step size of the standard deviation. At 5e-4 it was 0.30 after 2.3 million steps, before walking was
+    """Adam's learning rate of the standard deviation. At 5e-4 it was 0.30 after 2.3 million steps, before walking was
     learnt; with that of the networks it stayed, and its noise alone felled a third of the standing episodes."""
     std_half_life: int | None = Field(default=10_000_000, ge=1)
     """Environment steps in which the largest standard deviation halves, from the initial one down to `std_end`:
@@ -169,9 +169,9 @@ class Teacher(PPO):
     check: Check = Check()
     """A small fixed evaluation that keeps the best policy and brings a lost training back to it."""
     value_only: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
-    """Parts of s_priv, by name, that the value network is told and the policy is not. Of quantities that are drawn anew
-    in each of some ten thousand episodes a policy learns by heart what they were: told the means of 58 motor strengths
-    and encoder biases in their place, it survived more trials and kept closer to the command."""
+    """Parts of s_priv, by name, that the value network receives and the policy does not. Of quantities that are drawn
+    anew in each of some ten thousand episodes a policy learns by heart what they were: given the means of 58 motor
+    strengths and encoder biases in their place, it survived more trials and kept closer to the command."""
     history: HistoryNetwork | None = Field(default=None, json_schema_extra=LATER)
     """With it the policy sees H_t alone and not s_priv: it is the student's network, needs no distillation, and can be
     exported. The value network, which nobody deploys, sees the newest s_t and s_priv as ever. `hidden` and `activation`

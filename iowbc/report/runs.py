@@ -126,7 +126,8 @@ def _of_one_variant(first: Run, second: Run) -> bool:
     decided = [
         [_seedless(run.artifacts[stage].ingredients.get("recipe", {})) for stage in shared] for run in (first, second)
     ]
-    return EVAL in shared and all(decided[0]) and decided[0] == decided[1] and _label(first) == _label(second)
+    labels = [run.recipe.get(EVAL, {}).get("label") for run in (first, second)]
+    return EVAL in shared and all(decided[0]) and decided[0] == decided[1] and labels[0] == labels[1]
 
 
 def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
@@ -136,7 +137,3 @@ def _seedless(recipe: Mapping[str, Any]) -> dict[str, Any]:
         if f"{name}.seed" in SEEDS and isinstance(value, Mapping):
             found[name] = {key: item for key, item in value.items() if key != "seed"}
     return found
-
-
-def _label(run: Run) -> Any:
-    return run.recipe.get(EVAL, {}).get("label")

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 DPI = 150
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-"""Okabe and Ito's palette, told apart with any colour vision."""
+"""Okabe and Ito's palette, distinguishable with any colour vision."""
 
 
 def write_figure(figure: Figure, path: Path) -> None:

@@ -1,13 +1,12 @@
 """Admission of transport tasks: a task is one where two are needed, and where they need to heed each other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.skill.episodes import nominal, play_once
-from iowbc.skill.game import TransportGame
+from iowbc.skill.game import TransportGame, nominal, play_once
 from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
 from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
@@ -16,7 +15,7 @@ SOLVED, UNSOLVED = 0.8, 0.2
 """Success of the reference pair, at least, and of a lone robot, at most: four of five trials."""
 DRAGGED = 1.5
 """Partner force with a passive robot that succeeds, at least, in parts of the reference pair's: a controller that
-yields lets itself be led while it is told to stand, and only the force tells that it does not help."""
+yields lets itself be led while it is commanded to stand, and only the force shows that it does not help."""
 PAIRS: dict[str, tuple[str, Rule]] = {
     "reference": ("path", "lead"),
     "lone robot": (ABSENT, "lead"),
@@ -60,7 +59,6 @@ def admissions(
     trials: int,
     workers: int,
     tasks: Sequence[str] = (),
-    interrupted: Callable[[], bool] = lambda: False,
 ) -> list[Admission]:
     """Plays every task, or those named, with each scripted pair; `trials` of each, with the same seeds."""
     names = tuple(tasks) or specification.recipe.skill.tasks.names
@@ -71,7 +69,7 @@ def admissions(
         for seed in range(trials)
     ]
     with TransportGame(specification, student, n=len(plans), workers=workers, plans=plans) as game:
-        figures = play_once(game, nominal(game), interrupted)
+        figures = play_once(game, nominal(game))
 
     def means(name: str, own: Mask) -> dict[str, float]:
         rows: Array = figures[name][own].astype(np.float64).reshape(len(PAIRS), trials).mean(axis=1)

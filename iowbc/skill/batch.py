@@ -1,6 +1,7 @@
 """The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,25 +9,23 @@ from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.control.hand_forces import HandForces
 from iowbc.control.skill_observation import YAW, joined, of_object, robot_observation
-from iowbc.recipe.skill.task import TransportTask
+from iowbc.rollouts.blocks import block_size
 from iowbc.sim.shapes import measured as shape_of
 from iowbc.skill import observation as seen
-from iowbc.skill.draws import EpisodeDraws
+from iowbc.skill.agents import Human, NominalCommand, ObjectMotion, by_the_clock, pursue
 from iowbc.skill.figures import FIGURES, EpisodeFigures, internal_force
-from iowbc.skill.human import Human
 from iowbc.skill.lower_layer import LowerLayer
-from iowbc.skill.nominal import NominalCommand
 from iowbc.skill.path import Paths
-from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, Plan
-from iowbc.skill.pursuit import Wanted, by_the_clock, pursue
+from iowbc.skill.plan import CLOCK, KINDS, PERSON, RULES, EpisodeDraws
 from iowbc.skill.reward import GameEnding, ending, potential, reward
 from iowbc.skill.situation import Origin, Situation, situation, turned
-from iowbc.skill.student import Student
 from iowbc.task.episodes import Episode
-from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers
 
-FOREVER = 1e6
+if TYPE_CHECKING:
+    from iowbc.skill.setup import GameSetup
+
+NO_LIMIT = 1e6
 """Time limit of the lower layer's episodes [s]: the game ends them."""
 UNDISTURBED = {"impulse_scale": 0.0, "push_scale": 0.0}
 """The human is the disturbance."""
@@ -37,30 +36,17 @@ ROBOT_ACTIONS, HUMAN_ACTIONS = 11, 5
 class GameBatch:
     """n games. `reset` and `step` read the actions from the buffers and leave everything else there."""
 
-    def __init__(
-        self,
-        specification: Specification,
-        *,
-        tasks: Mapping[str, TransportTask],
-        games: Indices,
-        scenes: Sequence[str],
-        keys: Keys,
-        partners: Sequence[str],
-        plans: Sequence[Plan] | None,
-        block: int,
-        buffers: Buffers,
-    ) -> None:
-        """`games`: global numbers, (n,); `scenes`, `keys` and, where there are any, `plans` of each; `block`: see
-        `iowbc.rollouts.blocks`."""
-        recipe, self._skill = specification.recipe, specification.recipe.skill
-        self.n, self.buffers, self._games, self._keys = len(games), buffers, games, keys
-        self.lower = LowerLayer(
-            specification,
-            games,
-            [Episode(scene, int(key), FOREVER, UNDISTURBED) for scene, key in zip(scenes, keys, strict=True)],
-            block,
-        )
-        n, period, own = self.n, self.lower.period, list(tasks.values())
+    def __init__(self, setup: "GameSetup", first: int, last: int, buffers: Buffers) -> None:
+        """The games from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
+        recipe, self._skill = setup.specification.recipe, setup.skill
+        self.buffers, self._games, self._keys = buffers, np.arange(first, last), setup.keys(first, last)
+        scenes, plans = setup.scenes[first:last], None if setup.plans is None else setup.plans[first:last]
+        episodes = [
+            Episode(scene, int(key), NO_LIMIT, UNDISTURBED) for scene, key in zip(scenes, self._keys, strict=True)
+        ]
+        self.lower = LowerLayer(setup.specification, setup.student, self._games, episodes, block_size(setup.count))
+        self.n = n = last - first
+        period, own = self.lower.period, list(setup.tasks.values())
         self.substeps = round(1.0 / (self._skill.frequency * period))
         """Control steps of a decision."""
         worlds = [getattr(recipe.simulation.scenes, scene) for scene in scenes]
@@ -68,13 +54,13 @@ class GameBatch:
         self._corners = np.array([shape_of(world.object).high[:2] for world in worlds])[:, None] * CORNERS
         self.paths = Paths([task.path for task in own])
         self._limit = np.array([round(task.duration * self._skill.frequency) for task in own])
-        self.drawn = EpisodeDraws(own, list(tasks), scenes, partners, self._skill.goal_known, plans)
+        self.drawn = EpisodeDraws(setup.tasks, scenes, setup.partners, self._skill.goal_known, plans)
         self._nominal = NominalCommand(self._skill, recipe.task.commands, self._pushing)
         self._human = Human(self._skill, n, period)
         self._hands = HandForces(self.lower.robot, self.lower.guidance.references, n)
         self._figures = EpisodeFigures(n, (int(self._limit.max()) + 1) * self.substeps)
         self._sees_object = recipe.task.observation.observe_object and recipe.distill.observe_object
-        self.origin = Origin.blank(n)
+        self.origin = Origin(np.zeros((n, 3)), np.zeros(n))
         self._episode, self._decisions, self._touched = np.zeros((3, n), np.int64)
         self._total, self._potential = np.zeros((2, n))
         self._felt = np.zeros((n, self._skill.robot.history, 2, 3))
@@ -89,17 +75,10 @@ class GameBatch:
         self.watch: Callable[[], None] = lambda: None
         """Called after every control step."""
 
-    def take(self, student: Student) -> None:
-        """The student that controls from now on."""
-        self.lower.take(student)
-
-    def meet_agent(self, share: float) -> None:
-        """Part of the episodes drawn from now on whose human is that of the actions."""
-        self.drawn.agent_share = share
-
-    def reset(self, seeds: Keys | None = None) -> None:
+    def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
         """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
-        from them."""
+        from them. `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
+        self.drawn.agent_share = agent_share
         if seeds is not None:
             self._keys = random.environment_key(seeds, np.zeros(self.n, np.int64))
         self.lower.rewind(self._keys)
@@ -117,7 +96,6 @@ class GameBatch:
         self.conclude()
 
     def decide(self) -> None:
-        """Takes over the actions."""
         action = {name: self.buffers[f"action/{name}"].astype(np.float64).clip(-1.0, 1.0) for name in self._action}
         self._jerk = np.square(action["robot"] - self._action["robot"]).mean(axis=1)
         self._action = action
@@ -126,7 +104,6 @@ class GameBatch:
         self._costs[:] = 0.0
 
     def control(self) -> None:
-        """One control step."""
         lower, simulation = self.lower, self.lower.simulation
         person = self.drawn.kind == KINDS.index(PERSON)
         if person.any():
@@ -142,14 +119,14 @@ class GameBatch:
         self.watch()
 
     def conclude(self) -> None:
-        """Judges the decision."""
-        self._decisions += 1
-        self._feel()
-        self._judge(self._costs * self.lower.period, self._jerk)
-
-    def _judge(self, costs: Array, jerk: Array) -> None:
         """Reward and endings of the decision just made; begins anew where a game has ended."""
+        self._decisions += 1
         lower, buffers, held = self.lower, self.buffers, ~self._pushing
+        force, wrists = self._hands.read(lower.measured.projected_gravity)
+        self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
+        memory, guidance = lower.memory, lower.guidance
+        target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
+        self._wrist_error = wrists - target
         touched = self._in_wall()
         end = ending(
             self._skill,
@@ -160,7 +137,9 @@ class GameBatch:
             late=self._decisions >= self._limit[self.drawn.task],
         )
         before, self._potential = self._potential, potential(self._skill, self.now, held)
-        buffers["reward"][:] = reward(self._skill, self._potential - before, end, costs, jerk, touched)
+        buffers["reward"][:] = reward(
+            self._skill, self._potential - before, end, self._costs * lower.period, self._jerk, touched
+        )
         self._total += buffers["reward"]
         self._touched += touched
         buffers["terminated"][:], buffers["truncated"][:] = end.terminated, end.time_out
@@ -181,7 +160,8 @@ class GameBatch:
         lower.simulation.hold(self.drawn.draw(which, key), which)
         lower.wanted[which] = self._nominal.standing()[which]
         lower.start(which)
-        self.origin.set(which, lower.simulation, lower.moved)
+        self.origin.position[which] = lower.simulation.state.object_position[which]
+        self.origin.heading[which] = lower.moved.heading[which]
         covered = np.zeros(self.n) if len(which) == self.n else self.now.covered.copy()
         covered[which] = 0.0
         self.now = self._situation(covered)
@@ -209,8 +189,7 @@ class GameBatch:
         }
         unaware = (self.drawn.rule == RULES.index("follow"))[:, None]
         self.buffers["privileged_action"][:] = nominal.action_of(by_rule["lead"], by_rule["follow"]) * unaware
-        command: Array = np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
-        return command
+        return np.stack([by_rule[rule] for rule in RULES])[self.drawn.rule, np.arange(self.n)]
 
     def _intentions(self, action: Array) -> Array:
         """Intentions of the humans, (n, 5)."""
@@ -220,7 +199,7 @@ class GameBatch:
         acting = led + self._human.of_action(action, self.now)
         return np.where(self.drawn.acts[:, None], acting, scripted)
 
-    def _by_the_clock(self, pace: Array | float) -> Wanted:
+    def _by_the_clock(self, pace: Array | float) -> ObjectMotion:
         return by_the_clock(self._skill.pursuit, self.paths, self.now, self._decisions / self._skill.frequency, pace)
 
     def _costs_now(self) -> Array:
@@ -250,15 +229,7 @@ class GameBatch:
             touched |= np.abs(place.lateral) > self.paths.half_width(task, place.covered)
         return touched
 
-    def _feel(self) -> None:
-        """The robots' estimate of the forces on their hands."""
-        force, wrists = self._hands.read(self.lower.measured.projected_gravity)
-        self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
-        memory, references = self.lower.memory, self.lower.guidance.references
-        self._wrist_error = wrists - references.wrist_target(memory.posture, memory.command, self.lower.guidance.grasp)
-
     def _observe(self, time: str) -> None:
-        """Writes what agents and critic see."""
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
         path = seen.waypoints(self.paths, now, ahead, now.heading)
         thing = of_object(lower.measured, self._sees_object)

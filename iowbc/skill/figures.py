@@ -65,5 +65,4 @@ class EpisodeFigures:
 def internal_force(robot: Array, partner: Array) -> Array:
     """The part of two horizontal forces (n, 2) that cancels, ½ (|F_r| + |F_p| - |F_r + F_p|), (n,) [N]."""
     sizes = [np.linalg.norm(force, axis=1) for force in (robot, partner, robot + partner)]
-    cancelled: Array = 0.5 * (sizes[0] + sizes[1] - sizes[2])
-    return cancelled
+    return 0.5 * (sizes[0] + sizes[1] - sizes[2])

@@ -1,6 +1,5 @@
 """Films of games: force arrows, and the path and its walls on the ground."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +9,7 @@ from iowbc.evaluation.films import with_text, written_film
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.skill.batch import GameBatch
-from iowbc.skill.episodes import Actions, nominal, play_once
-from iowbc.skill.game import Observed, TransportGame
+from iowbc.skill.game import TransportGame, nominal, play_once
 from iowbc.skill.plan import Plan
 from iowbc.skill.situation import turned
 from iowbc.skill.student import Student
@@ -26,22 +24,11 @@ VIEW = -115.0
 """Direction of the view from the path's first heading, to the left of it [degrees]: from its left, past the handle."""
 
 
-def film_game(
-    specification: Specification,
-    student: Student,
-    plan: Plan,
-    path: Path,
-    video: Video,
-    act: Callable[[TransportGame], Callable[[Observed], Actions]] = nominal,
-    interrupted: Callable[[], bool] = lambda: False,
-) -> dict[str, Array]:
-    """Films the first episode of a planned game into an mp4 file, by default with nominal commands; its figures.
-
-    Raises NoRenderer where nothing can be drawn, Interrupted.
-    """
+def film_game(specification: Specification, student: Student, plan: Plan, path: Path, video: Video) -> dict[str, Array]:
+    """Films the first episode of a planned game with nominal commands into an mp4 file; its figures. Raises NoRenderer
+    where nothing can be drawn."""
     with TransportGame(specification, student, n=1, plans=(plan,)) as game, written_film(path, video.fps) as add:
         batch = game.batch
-        act_now = act(game)
         game.reset()
         simulation = batch.lower.simulation
         azimuth = float(np.degrees(batch.origin.heading[0])) + VIEW
@@ -60,16 +47,16 @@ def film_game(
                     frames += 1
 
             batch.watch = watch
-            return play_once(game, act_now, interrupted)
+            return play_once(game, nominal(game))
 
 
 def captions(batch: GameBatch, plan: Plan, seconds: float) -> list[str]:
     """Lines of text: task and human; time, way covered and the human's horizontal force."""
-    told = "both know the path" if plan.known else "only the human knows the path"
+    goal = "both know the path" if plan.known else "only the human knows the path"
     force = float(np.linalg.norm(batch.lower.simulation.state.partner_force[0, :2]))
     mass = float(batch.lower.simulation.drawn["object_mass"][0])
     way = f"{batch.now.covered[0]:.1f} of {batch.now.covered[0] + batch.now.left[0]:.1f} m"
-    return [f"{plan.task}, {mass:.0f} kg, human: {plan.partner}; {told}", f"{seconds:4.1f} s   {way}   {force:3.0f} N"]
+    return [f"{plan.task}, {mass:.0f} kg, human: {plan.partner}; {goal}", f"{seconds:4.1f} s   {way}   {force:3.0f} N"]
 
 
 def path_lines(batch: GameBatch, game: int) -> list[tuple[Array, tuple[float, ...]]]:
@@ -80,10 +67,6 @@ def path_lines(batch: GameBatch, game: int) -> list[tuple[Array, tuple[float, ..
         present = np.isfinite(wall[:, 0])
         pieces = np.split(np.arange(len(wall)), np.flatnonzero(np.diff(present)) + 1)
         lines += [(wall[piece][[*range(0, len(piece), EVERY), -1]], WALL) for piece in pieces if present[piece[0]]]
-    return [(_in_world(batch, game, line), colour) for line, colour in lines]
-
-
-def _in_world(batch: GameBatch, game: int, points: Array) -> Array:
-    origin = batch.origin
-    moved = turned(points, np.full(len(points), origin.heading[game])) + origin.position[game, :2]
-    return np.column_stack([moved, np.full(len(points), HEIGHT)])
+    heading, start = batch.origin.heading[game], batch.origin.position[game, :2]
+    moved = [(turned(line, np.full(len(line), heading)) + start, colour) for line, colour in lines]
+    return [(np.column_stack([line, np.full(len(line), HEIGHT)]), colour) for line, colour in moved]

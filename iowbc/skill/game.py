@@ -1,12 +1,13 @@
 """The Markov game of a robot and a human who transport an object: n games at once, over worker processes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from iowbc.arrays import Array, Keys, Mask
+from iowbc.errors import Interrupted
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.figures import FIGURES
 from iowbc.skill.observation import sizes
@@ -22,6 +23,9 @@ PATIENCE = 60.0
 COUNTED = ("success", "fallen", "dropped", "strayed", "diverged", "time_out", "known")
 
 
+Actions = Mapping[str, Array]
+
+
 @dataclass(frozen=True)
 class Observed:
     """What agents and critic see of n games."""
@@ -33,7 +37,7 @@ class Observed:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class GameOutcome:
     """What came of a decision of n games."""
 
     observed: Observed
@@ -72,7 +76,8 @@ class TransportGame:
         where a worker dies or hangs."""
         skill = specification.recipe.skill
         drawn = skill.partners.training if partners is None else partners
-        self.setup = GameSetup(specification, n, seed, tuple(drawn), None if plans is None else tuple(plans))
+        planned = None if plans is None else tuple(plans)
+        self.setup = GameSetup(specification, student, n, seed, tuple(drawn), planned)
         self.n, self.decision_rate = n, skill.frequency
         found = dict(sizes(skill))
         self.state_size = found.pop("state")
@@ -80,15 +85,13 @@ class TransportGame:
         self._workers: Workers = WorkerProcesses(self.setup, workers, PATIENCE) if workers else InProcess(self.setup)
         self._buffers = self._workers.buffers
         self.action_sizes = {agent: self._buffers[f"action/{agent}"].shape[1] for agent in self.agents}
-        self._call(Message.of(GameBatch.take, student))
 
     @property
     def batch(self) -> GameBatch:
         """The games themselves, where they are played in this process."""
         if not isinstance(self._workers, InProcess):
             raise AttributeError("the games live in worker processes; make the game with workers=0")
-        batch: GameBatch = self._workers.batch
-        return batch
+        return self._workers.batch
 
     @property
     def human_acts(self) -> Mask:
@@ -104,18 +107,15 @@ class TransportGame:
         """Begins the first episode of every game, the same one each time; with seeds (n,) uint64 that of the seeds.
 
         `agent_share`: part of the drawn episodes from here on whose human is that of the actions."""
-        self._call(Message.of(GameBatch.meet_agent, agent_share))
-        groups = self._workers.groups
-        own = [None if seeds is None else seeds[first:last] for first, last in groups]
-        self._workers.ask([Message.of(GameBatch.reset, part) for part in own])
-        self._workers.answers()
+        own = [None if seeds is None else seeds[first:last] for first, last in self._workers.groups]
+        self._ask([Message.of(GameBatch.reset, part, agent_share) for part in own])
         return self._observed("now")
 
-    def step(self, actions: Mapping[str, Array]) -> Outcome:
+    def step(self, actions: Mapping[str, Array]) -> GameOutcome:
         """One decision; actions by agent, (n, k) in [-1, 1]. Raises ValueError where one does not fit or is not
         finite."""
         self.act(actions)
-        self._call(Message.of(GameBatch.step))
+        self._ask([Message.of(GameBatch.step)] * len(self._workers.groups))
         return self.outcome()
 
     def act(self, actions: Mapping[str, Array]) -> None:
@@ -127,11 +127,11 @@ class TransportGame:
                 raise ValueError(f"actions of {agent} have {text}; expected finite ones of shape {buffer.shape}")
             buffer[:] = given
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> GameOutcome:
         """What came of the last decision."""
         buffers = self._buffers
         terminated, truncated = buffers["terminated"].copy(), buffers["truncated"].copy()
-        return Outcome(
+        return GameOutcome(
             observed=self._observed("now"),
             reward=buffers["reward"].copy(),
             terminated=terminated,
@@ -141,7 +141,6 @@ class TransportGame:
         )
 
     def close(self) -> None:
-        """Ends the workers."""
         self._workers.close()
 
     def _observed(self, time: str) -> Observed:
@@ -155,8 +154,8 @@ class TransportGame:
         values |= {name: np.array(known, object)[values[name].astype(np.int64)] for name, known in names.items()}
         return values | {name: values[name].astype(np.int64) for name in ("environment", "episode")}
 
-    def _call(self, message: Message) -> None:
-        self._workers.ask([message for _ in self._workers.groups])
+    def _ask(self, messages: Sequence[Message]) -> None:
+        self._workers.ask(messages)
         self._workers.answers()
 
     def __enter__(self) -> Self:
@@ -164,3 +163,26 @@ class TransportGame:
 
     def __exit__(self, *ended: object) -> None:
         self.close()
+
+
+def nominal(game: TransportGame) -> Callable[[Observed], Actions]:
+    """Zero actions: the robot's nominal command, and a human of the actions who stands."""
+    still = {agent: np.zeros((game.n, size), np.float32) for agent, size in game.action_sizes.items()}
+    return lambda observed: still
+
+
+def play_once(
+    game: TransportGame, act: Callable[[Observed], Actions], interrupted: Callable[[], bool] = lambda: False
+) -> dict[str, Array]:
+    """Figures of the first episode of every game, (n,) by name, in the order of the games. `act` gives the actions for
+    what is observed. Raises Interrupted once `interrupted()` is true."""
+    observed, decision = game.reset(), 0
+    rows: dict[int, dict[str, Array]] = {}
+    while len(rows) < game.n:
+        if interrupted():
+            raise Interrupted(f"stopped after {decision / game.decision_rate:.0f} s of {game.n} games")
+        outcome = game.step(act(observed))
+        observed, decision = outcome.observed, decision + 1
+        for place, row in enumerate(outcome.figures["environment"].tolist()):
+            rows.setdefault(row, {name: values[place] for name, values in outcome.figures.items()})
+    return {name: np.array([rows[row][name] for row in range(game.n)]) for name in rows[0]}

@@ -1,5 +1,6 @@
 """MAPPO and HAPPO on a game of two agents: decentralised policies, one value of the whole state."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,9 +16,9 @@ from iowbc.learning.policy import VALUE_GAIN
 from iowbc.learning.ppo import adapted, explained_variance
 from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.learning import SkillLearning
-from iowbc.skill.agent import Trained
 from iowbc.skill.game import Observed
 from iowbc.skill.markov_game import HUMAN, ROBOT, Game
+from iowbc.skill.trained import Trained, acted
 
 Array = NDArray[np.float32]
 
@@ -44,7 +45,6 @@ class SkillTraining:
         }
         seen = sizes[ROBOT] if settings.algorithm == "ppo" else game.state_size
         self.critic = Trained(seen, 1, settings, VALUE_GAIN, settings.value_learning_rate)
-        self._factor = torch.ones(0)
         self.imitated = self._nothing_imitated()
         """Observations and privileged actions of the robot while it imitates."""
 
@@ -54,7 +54,6 @@ class SkillTraining:
 
     @property
     def trained(self) -> dict[str, Trained]:
-        """All networks that learn, by name."""
         return {**self.agents, "critic": self.critic}
 
     @property
@@ -81,46 +80,39 @@ class SkillTraining:
         self.critic.normalization.discounted[:] = 0.0
         seeds = np.random.default_rng([self.seed, self.steps]).integers(2**63, size=game.n, dtype=np.uint64)
         observed = game.reset(seeds, self.agent_share)
-        inputs: dict[str, list[Array]] = {name: [] for name in self.trained}
-        acted: dict[str, list[Array]] = {name: [] for name in self.agents}
-        learnt: list[NDArray[np.bool_]] = []
-        privileged: list[Array] = []
-        rewards, endings = [], []
+        kept: dict[str, list[NDArray[Any]]] = defaultdict(list)
         cut: list[tuple[int, NDArray[np.int64], Array]] = []
         episodes: list[dict[str, NDArray[Any]]] = []
         for step in range(settings.rollout):
-            learnt.append(game.human_acts.copy())
-            privileged.append(game.privileged_actions)
+            now = {**observed.observations, "critic": self._judged(observed)}
+            now |= {"learnt": game.human_acts.copy(), "privileged": game.privileged_actions}
             actions = self._explored(observed)
-            for name in self.agents:
-                inputs[name].append(observed.observations[name])
-                acted[name].append(actions[name])
-            inputs["critic"].append(self._judged(observed))
             outcome = game.step({name: np.clip(action, -1.0, 1.0) for name, action in actions.items()})
-            rewards.append(self.critic.normalization.reward(outcome.reward, outcome.terminated | outcome.truncated))
-            endings.append(outcome.terminated | outcome.truncated)
+            ended = outcome.terminated | outcome.truncated
+            now |= {"reward": self.critic.normalization.reward(outcome.reward, ended), "ended": ended}
+            for name, values in (now | {f"{name}/action": action for name, action in actions.items()}).items():
+                kept[name].append(values)
             if (places := np.flatnonzero(outcome.truncated & ~outcome.terminated)).size:
                 cut.append((step, places, self._judged(outcome.final)[places]))
-            episodes.append({**outcome.figures, "learnt": learnt[-1][endings[-1]]})
+            episodes.append({**outcome.figures, "learnt": now["learnt"][ended]})
             observed = outcome.observed
-        rows = {name: np.stack(values) for name, values in inputs.items()}
+        rows = {name: np.stack(values) for name, values in kept.items()}
         if not self.steps:  # policies with an output of zero do not depend on it
             self._take_in(rows)
             self._move()
         prepared = {name: each.prepared(rows[name]) for name, each in self.trained.items()}
-        reward, ended_at = np.stack(rewards), np.stack(endings)
         for step, places, behind in cut:
-            reward[step, places] += settings.gamma * self._values(behind)
+            rows["reward"][step, places] += settings.gamma * self._values(behind)
         with torch.inference_mode():
             value = self.critic.network.body(prepared["critic"])[..., 0].numpy()
         last = self._values(self._judged(observed))
-        advantage = advantages(reward, ended_at, value, last, settings.gamma, settings.gae_lambda)
-        samples = {"advantage": torch.from_numpy(advantage), "target": torch.from_numpy(advantage + value)}
-        samples |= {"value": torch.from_numpy(value), "learnt": torch.from_numpy(np.stack(learnt))}
-        samples["robot/raw"] = torch.from_numpy(rows[ROBOT])
-        samples |= {"critic/input": prepared["critic"], "privileged": torch.from_numpy(np.stack(privileged))}
+        advantage = advantages(rows["reward"], rows["ended"], value, last, settings.gamma, settings.gae_lambda)
+        arrays = {"advantage": advantage, "target": advantage + value, "value": value, "robot/raw": rows[ROBOT]}
+        arrays |= {name: rows[name] for name in ("learnt", "privileged")}
+        samples = {name: torch.from_numpy(values) for name, values in arrays.items()}
+        samples["critic/input"] = prepared["critic"]
         for name, agent in self.agents.items():
-            action = torch.from_numpy(np.stack(acted[name]))
+            action = torch.from_numpy(rows[f"{name}/action"])
             with torch.inference_mode():
                 mean = agent.network.body(prepared[name])
                 density = log_density(action, mean, agent.log_std)
@@ -154,7 +146,6 @@ class SkillTraining:
             return np.asarray(self.critic.network(torch.from_numpy(seen))[:, 0].numpy())
 
     def _learn(self, samples: Mapping[str, Tensor]) -> dict[str, float]:
-        """Gradient steps on a rollout."""
         explained = {"train/explained_variance": explained_variance(samples["value"], samples["target"])}
         if self.steps <= self.settings.imitation_steps:
             found = {"imitation_error": self._imitate(samples), "value_loss": self._fit(samples)}
@@ -251,11 +242,8 @@ class SkillTraining:
         observed, found = self.game.reset(), []
         for _ in range(decisions):
             found.append(observed.observations[ROBOT])
-            with torch.inference_mode():
-                actions = {
-                    name: agent.network(torch.from_numpy(observed.observations[name])).clamp(-1.0, 1.0).numpy()
-                    for name, agent in self.agents.items()
-                }
+            seen, sizes = observed.observations, self.game.action_sizes
+            actions = {name: acted(agent.network, seen[name], sizes[name]) for name, agent in self.agents.items()}
             observed = self.game.step(actions).observed
         return np.concatenate(found)
 
@@ -269,7 +257,6 @@ class SkillTraining:
         return whole
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`, on a training made from the same recipe."""
         for name, each in self.trained.items():
             each.restore(under(name, arrays))
         self.steps = int(arrays["steps"][0])

@@ -23,7 +23,12 @@ class LowerLayer(Batch):
     """n environments that a student controls. Commands and partners are steered; episodes begin when asked for."""
 
     def __init__(
-        self, specification: Specification, environments: Indices, episodes: Sequence[Episode], block: int
+        self,
+        specification: Specification,
+        student: Student,
+        environments: Indices,
+        episodes: Sequence[Episode],
+        block: int,
     ) -> None:
         """`environments`: global numbers, (n,); `block`: see `iowbc.rollouts.blocks`."""
         specification = _with_strength(specification)
@@ -47,13 +52,9 @@ class LowerLayer(Batch):
         self.human = np.zeros((self.n, 4))
         """What humans want: velocity of the handle and yaw rate of the object in the frame of the start [m/s, rad/s]
         and height of the handle [m], (n, 4)."""
-        self._block = block
-        self._starts = np.ones(self.n, np.bool_)
-
-    def take(self, student: Student) -> None:
-        """The student that controls from now on."""
-        self._student = student.policy
+        self._student, self._block = student.policy, block
         self._history = History(self.n, student.history, student.observation)
+        self._starts = np.ones(self.n, np.bool_)
 
     def rewind(self, seeds: Keys) -> None:
         """Lets all that is random start anew from seeds (n,)."""
@@ -70,7 +71,6 @@ class LowerLayer(Batch):
             happened[which] = False
 
     def control(self) -> None:
-        """One control step of every environment."""
         rows = self.buffers["observation"][:, : self._history.frames.shape[2]]
         seen = self._history.push(rows, self._starts)
         self.buffers["action"][:] = in_blocks(self._student, self._block, seen)
@@ -81,7 +81,6 @@ class LowerLayer(Batch):
         """Nobody reads the signals of a trial."""
 
     def feed_partner(self, feed: Array) -> None:
-        """See `Batch`."""
         feed[:] = self.human
 
     def finish(self, judgement: Judgement) -> None:
@@ -94,7 +93,6 @@ class LowerLayer(Batch):
 
 
 def _with_strength(specification: Specification) -> Specification:
-    """The world with the human's strength."""
     recipe = specification.recipe
     partner = recipe.simulation.partner.model_copy(update={"strongest": recipe.skill.human.strongest})
     simulation = recipe.simulation.model_copy(update={"partner": partner})

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from iowbc.arrays import Array, Keys, Mask
-from iowbc.skill.game import Observed, Outcome
+from iowbc.skill.game import GameOutcome, Observed
 
 ROBOT, HUMAN = "robot", "human"
 
@@ -34,5 +34,5 @@ class Game(Protocol):
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> Observed:
         """Begin every game anew."""
 
-    def step(self, actions: Mapping[str, Array]) -> Outcome:
+    def step(self, actions: Mapping[str, Array]) -> GameOutcome:
         """One decision of both agents."""

@@ -44,11 +44,9 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
         }
 
     def observation_space(self, agent: str) -> spaces.Box:
-        """What an agent observes."""
         return self._spaces[agent][0]
 
     def action_space(self, agent: str) -> spaces.Box:
-        """What an agent does."""
         return self._spaces[agent][1]
 
     def reset(self, seed: int | None = None, options: Values | None = None) -> tuple[dict[str, Array], Values]:
@@ -63,7 +61,6 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
     def step(
         self, actions: dict[str, Array]
     ) -> tuple[dict[str, Array], dict[str, float], dict[str, bool], dict[str, bool], Values]:
-        """One decision."""
         out = self.game.step({agent: np.asarray(actions[agent])[None] for agent in self.possible_agents})
         self._seen = out.final
         figures = {name: values[0] for name, values in out.figures.items() if len(values)}
@@ -79,12 +76,9 @@ class TransportEnv(ParallelEnv):  # type: ignore[misc]
         return result
 
     def state(self) -> Array:
-        """What a centralised critic sees."""
-        state: Array = self._seen.state[0]
-        return state
+        return self._seen.state[0]
 
     def close(self) -> None:
-        """Ends the game."""
         self.game.close()
 
     def _rows(self) -> dict[str, Array]:

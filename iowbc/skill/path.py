@@ -16,7 +16,7 @@ and a path that comes near itself is not left for its other part."""
 
 
 @dataclass(frozen=True)
-class Place:
+class PlaceOnPath:
     """Objects on their paths."""
 
     covered: Array
@@ -38,7 +38,7 @@ class Paths:
         self.length = np.array([sum(stretch.length for stretch in path) for path in paths])
         """(paths,) [m]."""
 
-    def place(self, path: Indices, position: Array, around: Array) -> Place:
+    def place(self, path: Indices, position: Array, around: Array) -> PlaceOnPath:
         """Places of positions (n, 2) [m] near the way `around` (n,) [m] on paths (n,)."""
         centre = np.round(around / SPACING).astype(np.int64)
         near = (centre[:, None] + np.arange(-WINDOW, WINDOW + 1)).clip(0, self._last[path, None])
@@ -48,7 +48,7 @@ class Paths:
         index, away = near[rows, nearest], away[rows, nearest]
         cosine, sine = np.cos(self._heading[path, index]), np.sin(self._heading[path, index])
         covered = index * SPACING + (cosine * away[:, 0] + sine * away[:, 1]).clip(-SPACING, SPACING)
-        return Place(covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0])
+        return PlaceOnPath(covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0])
 
     def heading(self, path: Indices, covered: Array) -> Array:
         """The path's heading at a way along it, (n,) [rad]; beyond the end that of the end."""
@@ -61,8 +61,7 @@ class Paths:
     def half_width(self, path: Indices, covered: Array) -> Array:
         """Distance of the walls from the path, (n,) [m]; infinite where there are none."""
         index = np.round(covered / SPACING).astype(np.int64).clip(0, self._last[path])
-        width: Array = self._half_width[path, index]
-        return width
+        return self._half_width[path, index]
 
     def outline(self, path: int) -> tuple[Array, Array]:
         """Points of one path, (k, 2) [m], and of its walls on both sides, (2, k, 2), NaN where there are none."""
@@ -86,8 +85,7 @@ class Paths:
         at = (covered / SPACING).clip(0.0, last)
         low = np.minimum(at.astype(np.int64), last - 1)
         before, behind = values[path, low], values[path, low + 1]
-        read: Array = before + (at - low) * (behind - before)
-        return read
+        return before + (at - low) * (behind - before)
 
 
 def _points(path: Sequence[Stretch]) -> Array:

@@ -10,11 +10,11 @@ from iowbc.arrays import Keys
 from iowbc.errors import UsageError, require_known
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.skill.task import TransportTask
-from iowbc.rollouts.blocks import block_size
-from iowbc.skill.batch import GameBatch
+from iowbc.skill.batch import HUMAN_ACTIONS, ROBOT_ACTIONS, GameBatch
 from iowbc.skill.figures import FIGURES
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
+from iowbc.skill.student import Student
 from iowbc.task.scenes import scene_of
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
@@ -25,6 +25,8 @@ class GameSetup:
     """All games of a `TransportGame`."""
 
     specification: Specification
+    student: Student
+    """The controller below the games."""
     count: int
     """Number of games."""
     seed: int
@@ -45,12 +47,10 @@ class GameSetup:
 
     @property
     def skill(self) -> Skill:
-        """The recipe's section."""
         return self.specification.recipe.skill
 
     @cached_property
     def tasks(self) -> dict[str, TransportTask]:
-        """Transport tasks by name."""
         return {name: getattr(self.skill.tasks, name) for name in self.skill.tasks.names}
 
     @cached_property
@@ -76,27 +76,15 @@ class GameSetup:
         seen = {f"{time}/{name}": ((size,), "float32") for time in ("now", "final") for name, size in sizes(self.skill)}
         return {
             **seen,
-            "action/robot": ((11,), "float32"),
-            "action/human": ((5,), "float32"),
-            "privileged_action": ((11,), "float32"),
+            "action/robot": ((ROBOT_ACTIONS,), "float32"),
+            "action/human": ((HUMAN_ACTIONS,), "float32"),
+            "privileged_action": ((ROBOT_ACTIONS,), "float32"),
             "reward": ((), "float32"),
-            "terminated": ((), "bool"),
-            "truncated": ((), "bool"),
-            "human_acts": ((), "bool"),
+            **dict.fromkeys(("terminated", "truncated", "human_acts"), ((), "bool")),
             "figures": ((len(FIGURES),), "float64"),
             "counters": ((1,), "float64"),
         }
 
     def batch(self, first: int, last: int, buffers: Buffers) -> GameBatch:
-        """The games from `first` to `last`, the latter excluded; `buffers` hold their rows alone."""
-        return GameBatch(
-            self.specification,
-            tasks=self.tasks,
-            games=np.arange(first, last),
-            scenes=self.scenes[first:last],
-            keys=self.keys(first, last),
-            partners=self.partners,
-            plans=None if self.plans is None else self.plans[first:last],
-            block=block_size(self.count),
-            buffers=buffers,
-        )
+        """The games from `first` to `last`, the latter excluded."""
+        return GameBatch(self, first, last, buffers)

@@ -20,16 +20,6 @@ class Origin:
     heading: Array
     """(n,) [rad]."""
 
-    @classmethod
-    def blank(cls, n: int) -> "Origin":
-        """All zero."""
-        return cls(np.zeros((n, 3)), np.zeros(n))
-
-    def set(self, which: Indices, simulation: Simulation, moved: Motion) -> None:
-        """Puts the frames of some environments, (k,), where object and robot are."""
-        self.position[which] = simulation.state.object_position[which]
-        self.heading[which] = moved.heading[which]
-
     def turned(self, vectors: Array) -> Array:
         """World vectors (n, 3) or planar ones (n, 2) in these frames."""
         return turned(vectors, -self.heading)
@@ -77,8 +67,7 @@ def situation(
     """The games after a control step; `covered` (n,): way along the paths at an earlier time [m]."""
     state = simulation.state
     position = origin.turned(state.object_position - origin.position)
-    axes = [rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2]]
-    forward, up = axes
+    forward, up = (rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2])
     yaw = wrapped(np.arctan2(forward[:, 1], forward[:, 0]) - origin.heading)
     place = paths.place(path, position[:, :2], covered)
     return Situation(

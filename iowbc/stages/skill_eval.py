@@ -64,8 +64,7 @@ def run(job: Job) -> None:
     from iowbc.pipeline.store.runs import read_yaml
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
-    from iowbc.skill.evaluation.controllers import on_controller
-    from iowbc.skill.evaluation.games import Evaluation, cases
+    from iowbc.skill.evaluation.games import GameEvaluation, cases, on_controller
     from iowbc.skill.evaluation.tables import figure, headline, tables
     from iowbc.skill.game import TransportGame
     from iowbc.skill.student import load_student
@@ -81,7 +80,7 @@ def run(job: Job) -> None:
         folder, rg = job.inputs[f"{label}/distill"], job.inputs[f"{label}/rg-fit"]
         task, other = Recipe.model_validate(read_yaml(folder / RECIPE)).task, load_student(folder)
         lower[label] = on_controller(world, label, task, other, rg), other
-    evaluation = Evaluation(
+    evaluation = GameEvaluation(
         lambda label, plans: TransportGame(*lower[label], n=len(plans), workers=job.workers, seed=0, plans=plans),
         human,
         skill.eval.games,

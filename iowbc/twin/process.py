@@ -4,8 +4,7 @@ import time
 from collections.abc import Callable
 
 from iowbc.onboard import messages
-from iowbc.onboard.bus import Bus
-from iowbc.onboard.process import PATIENCE, PERIOD
+from iowbc.onboard.process import PATIENCE, PERIOD, Bus
 from iowbc.twin.robot import Twin
 
 BATTERY_PERIODS = 250

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from iowbc.arrays import Array
+from iowbc.control.command import nominal_command
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
@@ -69,10 +70,11 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
     started, drawn = simulation.worlds[0], simulation.drawn
     layout, physics = started.layout, recipe.simulation.physics
     timing = Timing(simulation.period, physics.timestep, 0)
+    own = started.fields.of(0)  # after its start, for those that differ between simulations
     described = {
         "kind": scene.kind,
         "xml": _plain(scene_spec(robot, physics, scene, timing, dressed=False)),
-        "fields": _fields(started),
+        "fields": {each: np.ravel(own.get(each, getattr(started.model, each))).tolist() for each in FIELDS},
         "start": started.qpos[0].tolist(),
         "period": simulation.period,
         "substeps": timing.substeps,
@@ -107,13 +109,8 @@ def _web_scene(world: Specification, robot: Robot, name: str) -> dict[str, Any]:
         "most": HEAVIEST * scene.object.mass,
         "inertia_per_mass": shape.principal.tolist(),
     }
-    hold = _hold(
-        started,
-        robot,
-        scene,
-        shape.about_axes,
-        {key: float(drawn[key][0]) for key in ("slip_force", "surface_friction")},
-    )
+    frictions = {key: float(drawn[key][0]) for key in ("slip_force", "surface_friction")}
+    hold = _hold(started, robot, scene, shape.about_axes, frictions)
     return described | {"object": thing, "hold": hold, "hands": hands, "wrists": wrists}
 
 
@@ -135,7 +132,7 @@ def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -
         control_frequency=recipe.task.control_frequency,
     )
     references = ReferenceLayer(robot, recipe.task.references, world.rg)
-    command = references.clamp(references.startable(nominal_command(recipe)[None]))
+    command = references.clamp(references.startable(nominal_command(recipe.task.commands)[None]))
     arms, posture = references.start(command, both_wrists(getattr(recipe.task.references.grasps, name))[None])
     joints = np.empty((1, len(robot.joints)))
     joints[:, robot.support], joints[:, robot.interaction] = posture, arms
@@ -145,24 +142,11 @@ def begun(world: Specification, robot: Robot, name: str, mass: float = np.nan) -
     return simulation
 
 
-def nominal_command(recipe: Recipe) -> Array:
-    """Standing still in the nominal posture, (11,)."""
-    commands = recipe.task.commands
-    return np.array([0.0, 0.0, 0.0, commands.nominal_height, commands.nominal_pitch, *[0.0] * 6])
-
-
 def _plain(spec: Any) -> str:
     """The MJCF, without the memory of motors and sensors, which the page has no delays for."""
     for part in (*spec.actuators, *spec.sensors):
         part.nsample = 0
-    text: str = spec.to_xml()
-    return text
-
-
-def _fields(world: World) -> dict[str, list[float]]:
-    """The model's numbers as the simulation has them after its start, those that differ between simulations too."""
-    own: Mapping[str, Array] = world.fields.of(0)
-    return {name: np.ravel(own[name] if name in own else getattr(world.model, name)).tolist() for name in FIELDS}
+    return spec.to_xml()
 
 
 def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mapping[str, float]) -> dict[str, Any]:
@@ -182,14 +166,10 @@ def _hold(world: World, robot: Robot, scene: Scene, inertia: Array, drawn: Mappi
         "handover": grasp.handover / world.timing.period,
         "squeeze": 0.0 if compliant else grasp.squeeze,
         "by_friction": grasp.by_friction if compliant else 0.0,
-        "strength": grasp.strength,
         "friction": drawn["surface_friction"],
         "slip_force": drawn["slip_force"],
-        "torsion": grasp.torsion,
         "about": float(inertia[1] + grasp.height**2),
-        "stability": grasp.stability,
-        "stiffness": grasp.stiffness,
-        "swing_damping": grasp.swing_damping,
+        **grasp.model_dump(include={"strength", "torsion", "stability", "stiffness", "swing_damping"}),
     }
 
 

@@ -11,7 +11,7 @@ import psutil
 import pytest
 import viser
 
-from iowbc.live.moment import SimulationWitness
+from iowbc.live.moment import SimulationRecorder
 from iowbc.live.remote_view import Asked, Picture, RemoteView, draw
 from iowbc.live.server import LocalServer, serving
 from iowbc.live.session import Session
@@ -19,34 +19,34 @@ from iowbc.sim.rendering.forces import Force
 
 
 @pytest.fixture
-def page(session: Session) -> Iterator[tuple[LocalServer, Connection, SimulationWitness]]:
+def page(session: Session) -> Iterator[tuple[LocalServer, Connection, SimulationRecorder]]:
     """A page that is drawn in a thread, the pipe on which it asks, and what it is shown."""
-    witness = SimulationWitness(session.environment.batch.simulation)
+    recorder = SimulationRecorder(session.environment.batch.simulation)
     ours, theirs = multiprocessing.Pipe()
 
     def drawing() -> None:
         with pytest.raises((EOFError, OSError)):
-            draw(server, theirs, session.environment.batch.robot, witness.model)
+            draw(server, theirs, session.environment.batch.robot, recorder.model)
 
     with serving(0) as server:
         thread = threading.Thread(target=drawing)
         thread.start()
-        yield server, ours, witness
+        yield server, ours, recorder
         ours.close()
         thread.join()
 
 
 def test_a_page_draws_what_it_is_sent_and_asks_for_more(
-    page: tuple[LocalServer, Connection, SimulationWitness],
+    page: tuple[LocalServer, Connection, SimulationRecorder],
 ) -> None:
-    server, requests, witness = page
+    server, requests, recorder = page
     asked: Asked = requests.recv()
     assert not asked.release
-    moment = witness.look(1.0)
+    moment = recorder.look(1.0)
     requests.send(Picture(moment, "held by band", True))
     requests.recv()
     frame = server.scene._handle_from_node_name["/world/bodies/pelvis"]
-    assert frame.position == pytest.approx(moment.bodies[witness.model.body("pelvis").id, :3], abs=1e-6)
+    assert frame.position == pytest.approx(moment.bodies[recorder.model.body("pelvis").id, :3], abs=1e-6)
     (button,) = (
         each for each in server.gui._gui_input_handle_from_uuid.values() if isinstance(each, viser.GuiButtonHandle)
     )

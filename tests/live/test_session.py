@@ -11,7 +11,7 @@ from standing_still import StandingStill
 from iowbc.evaluation.play import Source
 from iowbc.evaluation.play_request import PlayRequest
 from iowbc.live import session as driven
-from iowbc.live.session import BLOW, Session
+from iowbc.live.session import PUSH_DURATION, Session
 from iowbc.task.vector.vector_env import VectorEnv
 
 
@@ -51,12 +51,12 @@ def test_a_push_has_the_size_and_the_direction_that_were_asked_for(session: Sess
     heading = session.environment.batch.memory.heading_reference[0]
     given = []
     session.push(what, "left", 12.0)
-    for _ in range(round(BLOW / period) + 3):
+    for _ in range(round(PUSH_DURATION / period) + 3):
         session.step()
         force = simulation.state.push_force[0] if what == "robot" else simulation.impulse_force(0)
         given.append(force.copy())
     assert np.sum(given, axis=0) * period == pytest.approx([-12.0 * np.sin(heading), 12.0 * np.cos(heading), 0.0])
-    assert not np.any(given[round(BLOW / period) :])
+    assert not np.any(given[round(PUSH_DURATION / period) :])
 
 
 def test_a_push_moves_who_is_pushed(session: Session) -> None:

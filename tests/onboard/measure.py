@@ -22,7 +22,7 @@ from iowbc.onboard.dds import DdsBus
 from iowbc.onboard.log import LogWriter
 from iowbc.onboard.machine import Machine, State, Wanted
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import Operator, Ranges, Seeing, Udp
+from iowbc.onboard.operators import Operator, OperatorWithPoses, Ranges, Udp
 from iowbc.onboard.process import Clock, LockStep, MonotonicClock, drive, listen, prefer_this_process
 
 TASKS = {
@@ -111,7 +111,7 @@ def trial(
         bus = DdsBus("lo", domain)
         assert listen(bus, 1.0).states
         script = Script(ranges.standing, velocity, SETTLED + seconds, robot.terminate)
-        operator = Seeing(Sampled(script, lambda now: sample(now, robot.pid)), poses)
+        operator = OperatorWithPoses(Sampled(script, lambda now: sample(now, robot.pid)), poses)
         clock: Clock = MonotonicClock() if realtime else LockStep()
         times = drive(bus, machine, operator, clock, log=log, tell=tell, stopped=stopped)
         said, _ = robot.communicate(timeout=60)

@@ -7,8 +7,8 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
-from iowbc.onboard.limits import Limits
-from iowbc.onboard.machine import Inputs, Machine, State, Wanted
+from iowbc.onboard.limits import SafetyLimits
+from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges
 from iowbc.onboard.process import PERIOD
@@ -25,7 +25,7 @@ class Still:
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
-        self.machine = Machine(self.controller, "free", Limits(ramp=RAMP))
+        self.machine = Machine(self.controller, "free", SafetyLimits(ramp=RAMP))
         self.standing: Array = Ranges(self.controller.contract).standing
         self.posture = self.controller.settled_posture(self.standing)[0]
         self.begin = float(next(BEGINNINGS))
@@ -54,7 +54,7 @@ class Still:
         given = (self.state(),) if states is None else states
         now = self.now + other.get("late", 0.0)
         wanted = Wanted(self.standing, other.get("at", now), request, self.seen, now)
-        return self.machine.turn(Inputs(now, given, wanted, int(other.get("others", 0)), other.get("charge")))
+        return self.machine.turn(TurnInputs(now, given, wanted, int(other.get("others", 0)), other.get("charge")))
 
     def until(self, state: State) -> Record:
         """Goes through the states up to one of them; the last command."""

@@ -26,8 +26,7 @@ from iowbc.twin.robot import low_state
 pytest.importorskip("cyclonedds")
 pytest.importorskip("mcap")
 from iowbc.onboard.dds import DdsBus
-from iowbc.onboard.log import LogWriter, read_turns
-from iowbc.onboard.replay import export_digest, replay
+from iowbc.onboard.log import LogWriter, export_digest, read_turns, replay
 
 pytestmark = pytest.mark.integration
 STEPS = 100

@@ -11,7 +11,7 @@ from still import Still
 from iowbc.commands.robot import report_checks
 from iowbc.errors import UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.checks import Check, Listened, checks
+from iowbc.onboard.checks import CheckResult, Listened, checks
 from iowbc.onboard.limits import LIMITS
 from iowbc.onboard.messages import Record
 
@@ -82,7 +82,7 @@ def test_the_verdicts_are_seen_in_a_narrow_terminal_and_a_waived_failure_passes(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     long = "targets at most 0.70 rad from the default posture (right_shoulder_pitch_joint), and more"
-    found = [Check("states", False, "218 a second"), Check("policy", True, long)]
+    found = [CheckResult("states", False, "218 a second"), CheckResult("policy", True, long)]
     with pytest.raises(UsageError, match="states: failed"):
         report_checks(Console(width=60), found, ())
     assert "states FAILED 218 a second" in " ".join(capsys.readouterr().out.split())

@@ -15,7 +15,7 @@ from iowbc.errors import UsageError
 from iowbc.onboard import messages
 from iowbc.onboard.machine import State
 from iowbc.onboard.messages import Record
-from iowbc.onboard.operators import BUTTONS, Ranges, Remote, Seeing, Udp, object_poses, operator
+from iowbc.onboard.operators import BUTTONS, OperatorWithPoses, Ranges, Remote, Udp, object_poses, operator
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_damping_wins_over_requests_that_follow_it(source: Udp) -> None:
 
 
 def test_object_poses_of_another_source_leave_the_command_alone(ranges: Ranges, source: Udp) -> None:
-    both = Seeing(Remote(ranges), source)
+    both = OperatorWithPoses(Remote(ranges), source)
     pose = {"object_position": [0.3, 0.0, 0.1]}
     send(source, json.dumps({"velocity": [0.2, 0.0], "request": "run", "seen": pose}).encode())
     wanted = both.wanted(3.0, remote("X"))

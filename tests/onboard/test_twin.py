@@ -13,8 +13,8 @@ from iowbc.errors import UsageError
 from iowbc.evaluation.exported import exported_world
 from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
-from iowbc.onboard.limits import Limits
-from iowbc.onboard.machine import Inputs, Machine, State, Wanted
+from iowbc.onboard.limits import SafetyLimits
+from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges, object_poses
 from iowbc.onboard.process import PERIOD
@@ -102,7 +102,7 @@ def test_a_fixture_is_released_when_asked_and_a_band_lowers_the_robot_and_slacke
 
 def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot_sends(sighted: Path) -> None:
     controller = Controller.load(sighted)
-    machine, standing = Machine(controller, "lift", Limits(ramp=0.1)), Ranges(controller.contract).standing
+    machine, standing = Machine(controller, "lift", SafetyLimits(ramp=0.1)), Ranges(controller.contract).standing
     fixed = {"impulse_scale": 0.0, "push_scale": 0.0, "partner_share": 0.0, "object_mass": 4.0}
     posture = controller.settled_posture(standing)[0]
     simulation = exported_world(sighted).recipe.simulation
@@ -114,7 +114,7 @@ def test_a_policy_that_observes_the_object_carries_it_by_the_pose_that_the_robot
         now = turn * PERIOD
         pose = poses.wanted(now, None)
         wanted = Wanted(standing, now, requests.get(turn), pose.seen, pose.seen_at)
-        twin.command(machine.turn(Inputs(now, (twin.state,), wanted)))
+        twin.command(machine.turn(TurnInputs(now, (twin.state,), wanted)))
         twin.step()
         tracking.send(twin)
     tracking.close()

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Keys
-from iowbc.skill.game import Observed, Outcome
+from iowbc.skill.game import GameOutcome, Observed
 from iowbc.skill.markov_game import HUMAN, ROBOT
 
 PERIOD, FRICTION, DECISIONS = 0.2, 0.6, 25
@@ -61,7 +61,7 @@ class PullingGame:
         found = {name: np.stack(columns, axis=1).astype(np.float32) for name, columns in rows.items()}
         return Observed({name: found[name] for name in (ROBOT, HUMAN)}, found["state"])
 
-    def step(self, actions: Mapping[str, Array]) -> Outcome:
+    def step(self, actions: Mapping[str, Array]) -> GameOutcome:
         robot = actions[ROBOT][:, 0].astype(np.float64)
         human = np.where(self._human_acts, actions[HUMAN][:, 0], self._script())
         self.force = human
@@ -77,4 +77,4 @@ class PullingGame:
         figures = {"return": self.total[ended], "success": error[ended] < 0.2}
         self._begin(ended)
         none = np.zeros(self.n, np.bool_)
-        return Outcome(self.observed(), reward, none, ended, final, figures)
+        return GameOutcome(self.observed(), reward, none, ended, final, figures)

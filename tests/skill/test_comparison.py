@@ -11,7 +11,7 @@ import torch
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.results.table import markdown
-from iowbc.skill.evaluation.games import Case, Competitor, Evaluation, cases
+from iowbc.skill.evaluation.games import Competitor, GameCase, GameEvaluation, cases
 from iowbc.skill.evaluation.tables import COLUMNS, estimate, figure, headline, improvement, tables, worst_partner
 from iowbc.skill.plan import Plan
 
@@ -95,11 +95,13 @@ def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -
 
 def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     kinds = ("path", "agent")
-    planned = [Case(Plan("lift_straight", kind, False, mass=12.0, seed=3), number) for number, kind in enumerate(kinds)]
+    planned = [
+        GameCase(Plan("lift_straight", kind, False, mass=12.0, seed=3), number) for number, kind in enumerate(kinds)
+    ]
     stop = False
 
-    def evaluation() -> Evaluation:
-        return Evaluation(lambda controller, plans: make(len(plans), plans=plans), None, 1, tmp_path, lambda: stop)
+    def evaluation() -> GameEvaluation:
+        return GameEvaluation(lambda controller, plans: make(len(plans), plans=plans), None, 1, tmp_path, lambda: stop)
 
     torch.manual_seed(0)
     size = make(1).observation_sizes["robot"]

@@ -12,7 +12,7 @@ from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
-from iowbc.skill.evaluation.controllers import on_controller
+from iowbc.skill.evaluation.games import on_controller
 from iowbc.skill.game import TransportGame
 from iowbc.skill.plan import Plan
 from iowbc.skill.student import Student

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.errors import UsageError
-from iowbc.skill.game import Outcome, TransportGame
+from iowbc.skill.game import GameOutcome, TransportGame
 from iowbc.skill.plan import Plan
 
 Make = Callable[..., TransportGame]
@@ -18,12 +18,12 @@ def actions(game: TransportGame, step: int) -> dict[str, np.ndarray]:
     return {agent: rng.uniform(-1.0, 1.0, (game.n, size)) for agent, size in game.action_sizes.items()}
 
 
-def course(game: TransportGame, steps: int) -> list[Outcome]:
+def course(game: TransportGame, steps: int) -> list[GameOutcome]:
     game.reset()
     return [game.step(actions(game, step)) for step in range(steps)]
 
 
-def same(first: Outcome, second: Outcome) -> bool:
+def same(first: GameOutcome, second: GameOutcome) -> bool:
     pairs = [(getattr(first, name), getattr(second, name)) for name in ("reward", "terminated", "truncated")]
     for one, other in ((first.observed, second.observed), (first.final, second.final)):
         pairs += [(one.state, other.state), *zip(one.observations.values(), other.observations.values(), strict=True)]

@@ -12,6 +12,7 @@ import pytest
 from exported_policies import read_golden
 from numpy.typing import NDArray
 
+from iowbc.control.command import nominal_command
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import GOLDEN, exported_folder
@@ -19,7 +20,7 @@ from iowbc.evaluation.exported import exported_world
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.web.page import write_page
-from iowbc.web.scenes import begun, nominal_command
+from iowbc.web.scenes import begun
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -50,7 +51,7 @@ def page(cache: Path, exported: Path, tmp_path_factory: pytest.TempPathFactory) 
 @pytest.fixture(scope="module")
 def command(recipe: Recipe) -> NDArray[np.float64]:
     """Walks slowly and turns."""
-    return nominal_command(recipe) + np.array([0.2, 0.05, 0.1, *[0.0] * 8])
+    return nominal_command(recipe.task.commands) + np.array([0.2, 0.05, 0.1, *[0.0] * 8])
 
 
 def played(

@@ -1,7 +1,7 @@
 """Evaluation: the suites of trials, their world, and the films of them."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -10,7 +10,7 @@ from iowbc.recipe.evaluation.model_based import ModelBased
 from iowbc.recipe.evaluation.public import PublicController
 from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
 from iowbc.recipe.evaluation.suites import Compliance, HeavyCase, MassSweep, Probe, PushMap, Robustness, Stagnation
-from iowbc.recipe.section import COSMETIC, LATER, OWN_NAME, Section
+from iowbc.recipe.section import COSMETIC, LATER, OwnName, Section
 from iowbc.recipe.simulation.scene import Object, Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings
 
@@ -105,9 +105,6 @@ SIZES = {"narrow_box": box(0.2), "wide_box": box(0.45)}
 """Boxes beyond the training's 0.25 m."""
 
 
-SceneName = Annotated[str, Field(pattern=f"^{OWN_NAME}$")]
-
-
 class Evaluation(Section):
     """Trials of the trained policy."""
 
@@ -136,7 +133,7 @@ class Evaluation(Section):
     simulation: SimulationSettings | None = None
     """The world of all trials; empty is the training's. Pinned (`{}` to the default), variants that were trained
     in other worlds meet the same trials."""
-    scenes: dict[SceneName, TrialScene] = Field(default=SIZES)
+    scenes: dict[OwnName, TrialScene] = Field(default=SIZES)
     """Further scenes of the trials, by name: other objects, sizes and grasps for a policy that is trained already."""
     batch: int = Field(default=64, ge=1, le=10_000)
     """Trials played at once, over all workers. A policy computes in the shape of a whole batch, so that a trial is the

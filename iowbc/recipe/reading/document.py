@@ -76,7 +76,9 @@ def _read(text: str, place_of: PlaceOf, root: str) -> Located:
         node = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        reason = "a tab; indent with spaces" if mark and _is_tab(text, mark) else error.problem
+        lines = text.splitlines()
+        at_tab = mark and mark.line < len(lines) and lines[mark.line][mark.column : mark.column + 1] == "\t"
+        reason = "a tab; indent with spaces" if at_tab else error.problem
         raise RecipeError([Problem(place_of(mark) if mark else root, f"not valid YAML: {reason}")]) from None
     except yaml.YAMLError as error:
         raise RecipeError([Problem(root, f"not valid YAML: {error}")]) from None
@@ -99,12 +101,6 @@ def _limit_depth(text: str, place_of: PlaceOf) -> None:
                 raise RecipeError([Problem(place_of(event.start_mark), f"is nested more than {MAXIMUM_DEPTH} deep")])
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
-
-
-def _is_tab(text: str, mark: yaml.Mark) -> bool:
-    """True where a mark of PyYAML's stands at a tab."""
-    lines = text.splitlines()
-    return mark.line < len(lines) and lines[mark.line][mark.column : mark.column + 1] == "\t"
 
 
 class _Builder:

@@ -44,7 +44,7 @@ def with_files(tree: Located, folder: Path) -> Located:
 LARGEST_FILE = 1_000_000
 """Bytes of the largest recipe that is read."""
 LONGEST_PATH = 300
-"""Characters of a path that cannot be read which are told, the last ones."""
+"""Number of last characters of an unreadable path that an error shows."""
 LONGEST_CHAIN = 20
 """Recipes that extend one another, at most."""
 OWN_KEYS = ("name", "description")
@@ -85,16 +85,11 @@ def load_recipe(file: Path | str, overrides: Sequence[str] = ()) -> LoadedRecipe
     recipe = validate(tree)
     places = {".".join(path): leaf.place for path, leaf in leaves(tree)}
     loaded = LoadedRecipe(recipe, Path(file), tuple(overrides), places)
-    _require_known_place(loaded)
-    return loaded
-
-
-def _require_known_place(loaded: LoadedRecipe) -> None:
-    """Raises `RecipeError` where a file leads to a robot outside of the folders in which robots are looked for."""
-    robot, place = loaded.recipe.robot, loaded.place("robot")
+    robot, place = recipe.robot, loaded.place("robot")
     if Path(robot).name != robot and not place.startswith("--set "):
         text = f"key 'robot' = {shown(robot)}: a recipe names a folder under robots/; a path is for --set"
         raise RecipeError([Problem(place, text)])
+    return loaded
 
 
 def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
@@ -119,12 +114,9 @@ def _resolve(file: str, above: tuple[str, ...], place: str) -> Located:
         raise RecipeError([Problem(extends.place, "key 'extends': should be the name of one recipe file")])
     parent = file_meant_in(Path(file).parent, extends.value)
     base = _resolve(os.fspath(parent), (*above, file), extends.place)
-    inherited = {key: entry for key, entry in _mapping(base).items() if key not in OWN_KEYS}
+    assert isinstance(base.value, dict)
+    inherited = {key: entry for key, entry in base.value.items() if key not in OWN_KEYS}
     return merged(Located(inherited, base.place), own)
-
-
-def _mapping(tree: Located) -> dict[str, Located]:
-    return tree.value if isinstance(tree.value, dict) else {}
 
 
 def read_text(file: str, place: str) -> str:

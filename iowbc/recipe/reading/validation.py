@@ -1,4 +1,4 @@
-"""From a tree of values to a `Recipe`, with pydantic's errors told in the words of the file."""
+"""From a tree of values to a `Recipe`, with pydantic's errors in the words of the file."""
 
 import functools
 import re
@@ -80,7 +80,7 @@ def _of_its_own(path: Sequence[str]) -> Located:
 def _problems(tree: Located, errors: Sequence[ErrorDetails]) -> list[Problem]:
     """One problem a place and key: what the members of a union say about the same value is joined."""
     texts: dict[tuple[str, str], list[str]] = {}
-    for place, head, text in (told for error in errors[:PROBLEMS_TOLD] for told in _told(tree, error)):
+    for place, head, text in (found for error in errors[:PROBLEMS_TOLD] for found in _each_problem(tree, error)):
         texts.setdefault((place, head), [])
         if text not in texts[place, head]:
             texts[place, head].append(text)
@@ -95,8 +95,8 @@ def _position(place: str) -> tuple[str, int, int]:
     return (file, int(line), int(column)) if line.isdecimal() and column.isdecimal() else (place, 0, 0)
 
 
-def _told(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str, str]]:
-    """Place, `key 'x' = value`, and what is valid, for each thing that an error tells."""
+def _each_problem(tree: Located, error: ErrorDetails) -> Iterator[tuple[str, str, str]]:
+    """Place, `key 'x' = value`, and what is valid, for each problem of an error."""
     reason = error.get("ctx", {}).get("error")
     if isinstance(reason, Unfitting):
         for dotted, text in reason.problems:
@@ -190,20 +190,15 @@ def _inside(annotation: Any, name: str) -> Iterator[Any]:
         if name in model.model_fields:
             yield model.model_fields[name].annotation
         elif issubclass(model, NamedEntries):
-            yield model.own_type()
+            yield get_args(model.__annotations__["__pydantic_extra__"])[1]
     for collection in _alternatives(annotation):
         if collection not in models:
             yield from [argument for argument in get_args(collection) if argument is not Ellipsis][-1:]
 
 
-@functools.cache
-def _all_paths() -> list[tuple[str, ...]]:
-    return list(_known_paths(Recipe, ()))
-
-
 def _elsewhere(name: str) -> str:
     """`; did you mean 'section.name'?` where a misplaced key belongs to exactly one other section."""
-    places = [path for path in _all_paths() if path[-1] == name]
+    places = [path for path in _known_paths(Recipe, ()) if path[-1] == name]
     return f"; did you mean '{'.'.join(places[0])}'?" if len(places) == 1 else ""
 
 

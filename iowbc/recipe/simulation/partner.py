@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.randomization import Distribution
@@ -106,13 +106,6 @@ class PartnerSettings(Section):
     behaviours: Behaviours = Field(default=Behaviours(), json_schema_extra=LATER)
     """Behaviours that are drawn for the episodes."""
 
-    @field_validator("delay")
-    @classmethod
-    def _short(cls, delay: Distribution) -> Distribution:
-        if not all(0.0 <= value <= LONGEST_DELAY for value in (delay.low, delay.high, delay.nominal)):
-            raise ValueError(f"should be 0 to {LONGEST_DELAY:g} s")
-        return delay
-
     leader: Leader = Field(default=Leader(), json_schema_extra=LATER)
     """Motion of a leader."""
     stopping: Stopping = Field(default=Stopping(), json_schema_extra=LATER)
@@ -144,3 +137,7 @@ class PartnerSettings(Section):
     stability: float = Field(default=0.3, gt=0.0, le=1.0)
     """Bound on damping · period / mass and on stiffness · period² / mass, with the mass felt at the handle, above which
     a force that is held over a control period would make a light object oscillate."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        if not all(0.0 <= value <= LONGEST_DELAY for value in (self.delay.low, self.delay.high, self.delay.nominal)):
+            yield "delay", f"should be 0 to {LONGEST_DELAY:g} s"

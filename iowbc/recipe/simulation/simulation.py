@@ -57,7 +57,7 @@ class Physics(Section):
     """Line search iterations at most; as above."""
     body_contact: Literal["nothing", "object", "everything"] = "object"
     """Bodies that links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs
-    and torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` tells what each costs."""
+    and torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` shows what each costs."""
     leg_contact: bool = True
     """Lets the legs, feet included, touch each other; off, feet pass through each other and steps may cross."""
     contact_force: float = Field(default=1.0, gt=0.0)

@@ -1,8 +1,9 @@
 """Multi-agent PPO of the skill layer: a robot and a human, with one critic."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat
 
 from iowbc.recipe.ppo import PPO
 from iowbc.recipe.section import COSMETIC, DEEPEST, Width
@@ -36,20 +37,20 @@ class SkillLearning(PPO):
     imitation_gradient_steps: int = Field(default=200, ge=1, le=100_000)
     """Gradient steps of the imitation after each rollout."""
     imitation_rate: float = Field(default=1e-3, gt=0)
-    """Adam's step size of the imitation."""
+    """Adam's learning rate of the imitation."""
     hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
     """Hidden layers of the policies and of the value network."""
     normalization_clip: float = Field(default=5.0, gt=0)
     """Normalised inputs are clipped to this many standard deviations."""
     learning_rate: float = Field(default=6e-5, gt=0)
-    """Adam's step size of the policies at the start; at 3e-4 the first update after the imitation had a KL divergence
-    of 0.35."""
+    """Adam's learning rate of the policies at the start; at 3e-4 the first update after the imitation had a KL
+    divergence of 0.35."""
     value_learning_rate: float = Field(default=3e-4, gt=0)
-    """Adam's step size of the value."""
+    """Adam's learning rate of the value."""
     desired_kl: float | None = Field(default=0.012, gt=0)
-    """KL divergence that an update of a policy should have; moves its step size as in `teacher.desired_kl`."""
+    """KL divergence that an update of a policy should have; moves its learning rate as in `teacher.desired_kl`."""
     learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (1e-5, 1e-3)
-    """Least and largest step size, where `desired_kl` moves it."""
+    """Least and largest learning rate, where `desired_kl` moves it."""
     gamma: float = Field(default=0.98, gt=0, lt=1)
     """Discount factor of a decision; 0.98 looks ten seconds ahead at 5 Hz."""
     initial_std: float = Field(default=0.4, gt=0)
@@ -59,11 +60,9 @@ class SkillLearning(PPO):
     checkpoint_every: int = Field(default=5, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 
-    @model_validator(mode="after")
-    def _minibatches_divide(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         samples = self.games * self.rollout
         if samples > LARGEST_ROLLOUT:
-            raise ValueError(f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory")
-        if samples % self.minibatches:
-            raise ValueError(f"minibatches ({self.minibatches}) does not divide games x rollout ({samples})")
-        return self
+            yield "", f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory"
+        elif samples % self.minibatches:
+            yield "", f"minibatches ({self.minibatches}) does not divide games x rollout ({samples})"

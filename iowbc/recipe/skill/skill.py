@@ -1,8 +1,9 @@
 """The skill layer of a recipe: tasks, agents and reward of the Markov game."""
 
-from typing import Literal, Self
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import LATER, Section
 from iowbc.recipe.simulation.partner import BEHAVIOURS
@@ -135,13 +136,11 @@ class PartnerKinds(Section):
     held_out: tuple[PartnerKind, ...] = ("tugging", "lagging")
     """Humans that only the evaluation plays."""
 
-    @model_validator(mode="after")
-    def _held_out(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         if both := set(self.training) & set(self.held_out):
-            raise ValueError(f"{', '.join(sorted(both))}: both in training and held out; name it once")
+            yield "", f"{', '.join(sorted(both))}: both in training and held out; name it once"
         if not self.training:
-            raise ValueError(f"training: name at least one of {', '.join(BEHAVIOURS)}, agent")
-        return self
+            yield "", f"training: name at least one of {', '.join(BEHAVIOURS)}, agent"
 
 
 class Skill(Section):

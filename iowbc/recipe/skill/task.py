@@ -1,16 +1,14 @@
 """Transport tasks: an object, its load, and the path of its centre between walls."""
 
 import math
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from iowbc.recipe.section import NamedEntries, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 
 Range = tuple[float, float]
-
-RIGHT_ANGLE = math.pi / 2.0
 
 
 class Stretch(Section):
@@ -44,23 +42,16 @@ class TransportTask(Section):
     weight: float = Field(default=1.0, ge=0.0)
     """Frequency of the task among those of the same scene; only the proportions matter."""
 
-    @property
-    def length(self) -> float:
-        """Length of the path [m]."""
-        return sum(stretch.length for stretch in self.path)
-
-    @model_validator(mode="after")
-    def _ranges_ascend(self) -> Self:
+    def problems(self) -> Iterator[tuple[str, str]]:
         for name, (low, high) in (("mass", self.mass), ("share", self.share)):
             if not 0.0 <= low <= high:
-                raise ValueError(f"{name}: expected 0 <= low <= high, got {low:g} and {high:g}")
+                yield "", f"{name}: expected 0 <= low <= high, got {low:g} and {high:g}"
         if self.share[1] > 1.0:
-            raise ValueError(f"share: nobody bears more than all of it, got {self.share[1]:g}")
-        return self
+            yield "", f"share: nobody bears more than all of it, got {self.share[1]:g}"
 
 
 STRAIGHT = (Stretch(length=3.0),)
-LEFT_ARC = Stretch(length=3.0, turn=RIGHT_ANGLE, width=1.6)
+LEFT_ARC = Stretch(length=3.0, turn=math.pi / 2.0, width=1.6)
 CORRIDOR = (Stretch(length=1.0, width=1.6), LEFT_ARC, Stretch(length=1.0, width=1.6))
 DOORWAY = (
     Stretch(length=0.7),

@@ -1,12 +1,12 @@
 """Terms and weights of the reward."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.section import LATER, OWN_NAME, Section
+from iowbc.recipe.section import LATER, OwnName, Section
 
 
 class Kernel(Section):
@@ -151,7 +151,6 @@ class OwnTerm(OwnFunction):
 
     @property
     def idle(self) -> bool:
-        """Without a weight."""
         return self.weight == 0.0
 
 
@@ -192,9 +191,7 @@ class Reward(Section):
     """Added once when an episode ends in a fall or a drop, not scaled by the control period."""
     later: Later | None = Field(default=None, json_schema_extra=LATER)
     """Weights of a robot that walks; empty keeps them as they are."""
-    own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnTerm] = Field(
-        default_factory=dict, json_schema_extra=LATER
-    )
+    own: dict[OwnName, OwnTerm] = Field(default_factory=dict, json_schema_extra=LATER)
     """Terms of one's own, by a name for their curve; training alone executes them."""
 
     def problems(self) -> Iterator[tuple[str, str]]:

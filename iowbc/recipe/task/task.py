@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.section import LATER, OWN_NAME, NamedEntries, Section
+from iowbc.recipe.section import LATER, NamedEntries, OwnName, Section
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.curriculum import Curriculum
 from iowbc.recipe.task.joint_references import References
@@ -38,9 +38,7 @@ class Observation(Section):
     observe_object: bool = True
     """Puts into s_t the object's pose and rates in the base frame (eq. 5); otherwise teacher and student have
     proprioception alone. `distill.observe_object` is for the student."""
-    own: dict[Annotated[str, Field(pattern=f"^{OWN_NAME}$")], OwnPart] = Field(
-        default_factory=dict, json_schema_extra=LATER
-    )
+    own: dict[OwnName, OwnPart] = Field(default_factory=dict, json_schema_extra=LATER)
     """Parts of s_priv of one's own, by name; only what trains or plays a policy that sees s_priv executes them."""
 
 
@@ -58,7 +56,7 @@ class Termination(Section):
     lag: float | None = Field(default=None, gt=0.0)
     """An episode ends when robot and object are this far behind the command [m], forgotten with the time constant
     `lag_time`; empty never ends one. It costs like a fall, so that standing is no safe answer to a command to walk.
-    Nothing that the policy observes tells the lag; with 0.5 m walking was learnt later.
+    Nothing that the policy observes shows the lag; with 0.5 m walking was learnt later.
     Only where the command can be followed: not in a push, not above level 1 of locomotion, not in trials."""
     lag_time: float = Field(default=3.0, gt=0.0)
     """Time in which a lag is forgotten [s]: at 0.4 m/s a robot may stand in place for 1.6 s, and three fifths of the
@@ -89,7 +87,6 @@ class SceneShares(NamedEntries):
 
     @classmethod
     def only(cls, scene: str) -> Self:
-        """One scene alone."""
         return cls.model_validate(dict.fromkeys(cls.model_fields, 0.0) | {scene: 1.0})
 
     def problems(self) -> Iterator[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""The games of `skill-eval`: every skill and rival plays the same episodes."""
+"""The games of `skill-eval`: every skill and rival plays the same episodes, some on controllers of other recipes."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -6,17 +6,25 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-import torch
+from pydantic import ValidationError
 
 from iowbc.arrays import Array
+from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
 from iowbc.learning.networks import TeacherNetwork
+from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.skill.skill import Skill
-from iowbc.skill.episodes import play_once
-from iowbc.skill.game import Observed, TransportGame
+from iowbc.recipe.task.task import Task
+from iowbc.robot.description import load_robot
+from iowbc.skill.game import Observed, TransportGame, play_once
 from iowbc.skill.plan import AGENT, Plan, Rule
+from iowbc.skill.student import Student
+from iowbc.skill.trained import acted
+from iowbc.task.specification import Specification
+
+OF_CONTROLLER = ("control_frequency", "commands", "references", "action")
+"""Parts of `task` that belong to a controller; all others are of the games."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +33,7 @@ class Competitor:
 
     label: str
     training: str
-    """What tells trainings under one label apart."""
+    """Distinguishes trainings under one label."""
     rule: Rule | None
     robot: TeacherNetwork | None
     """The trained policy; None acts as the rule says."""
@@ -34,14 +42,14 @@ class Competitor:
 
 
 @dataclass(frozen=True)
-class Case:
+class GameCase:
     """An episode that every competitor plays."""
 
     plan: Plan
     episode: int
 
 
-def cases(skill: Skill, learnt_human: bool) -> list[Case]:
+def cases(skill: Skill, learnt_human: bool) -> list[GameCase]:
     """All episodes of an evaluation. `learnt_human`: whether there is one to play with."""
     asked, kinds = skill.eval, skill.partners
     partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
@@ -49,15 +57,15 @@ def cases(skill: Skill, learnt_human: bool) -> list[Case]:
     found = []
     for (name, task), known, partner in itertools.product(tasks.items(), asked.known, partners):
         if partner == "follower" and not known:
-            continue  # who follows tells nobody where to go
+            continue  # a human who follows shows nobody the goal
         low, high = task.mass
         masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
         for mass, episode in itertools.product(masses, range(asked.episodes)):
-            found.append(Case(Plan(name, partner, known, mass=mass, seed=asked.seed + episode), episode))
+            found.append(GameCase(Plan(name, partner, known, mass=mass, seed=asked.seed + episode), episode))
     return found
 
 
-class Evaluation:
+class GameEvaluation:
     """Plays competitors in batches of games; a batch that is finished is kept in `work`."""
 
     def __init__(
@@ -72,7 +80,7 @@ class Evaluation:
         competitor; `games`: in a batch."""
         self._make, self._human, self._games, self._work, self._interrupted = make, human, games, work, interrupted
 
-    def batches(self, competitor: Competitor, planned: Sequence[Case]) -> Iterator[pd.DataFrame]:
+    def batches(self, competitor: Competitor, planned: Sequence[GameCase]) -> Iterator[pd.DataFrame]:
         """Rows of the episodes, batch by batch, those of one length together.
 
         Raises Interrupted where the job is asked to stop; finished batches are kept.
@@ -88,11 +96,15 @@ class Evaluation:
                 partial.rename(path)
             yield pd.read_parquet(path)
 
-    def _played(self, competitor: Competitor, planned: Sequence[Case]) -> pd.DataFrame:
+    def _played(self, competitor: Competitor, planned: Sequence[GameCase]) -> pd.DataFrame:
         """The first episode of a game of each case."""
         plans = [replace(case.plan, rule=competitor.rule) for case in planned]
         with closing(self._make(competitor.controller, plans)) as game:
-            _require_fitting(competitor, game.observation_sizes["robot"])
+            size = game.observation_sizes["robot"]
+            if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
+                text = f"that skill observes {own} numbers, this game shows {size}"
+                advice = "train it with the same `skill` section and code"
+                raise StageFailed(f"skill.eval.others.{competitor.label}: {text}; {advice}")
             networks = {"robot": competitor.robot, "human": self._human}
 
             def act(observed: Observed) -> dict[str, Array]:
@@ -111,17 +123,25 @@ class Evaluation:
         )
 
 
-def _require_fitting(competitor: Competitor, size: int) -> None:
-    if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
-        raise StageFailed(
-            f"skill.eval.others.{competitor.label}: that skill observes {own} numbers, this game shows {size}; "
-            "train it with the same `skill` section and code"
-        )
+def on_controller(world: Specification, label: str, own: Task, student: Student, rg: Path | None) -> Specification:
+    """The games of a world with another controller. `label`: its name in `skill.eval.controllers`; `own`: the task for
+    which its `student` was trained; `rg`: folder of its reference generator.
 
-
-def acted(network: TeacherNetwork | None, observation: Array, size: int) -> Array:
-    """The mean action of a policy, (n, size), within its bounds; zero without one."""
-    if network is None:
-        return np.zeros((len(observation), size), np.float32)
-    with torch.inference_mode():
-        return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())
+    Raises StageFailed where the controller has no grasp for a scene of the games, or observes what they do not show.
+    """
+    where, recipe = f"skill.eval.controllers.{label}", world.recipe
+    shown = observation_layout(load_robot(world.robot), recipe.task.observation.observe_object).size
+    if student.observation > shown:
+        text = f"its student observes {student.observation} numbers, these games show {shown}"
+        raise StageFailed(f"{where}: {text}; set task.observation.observe_object in the recipe of the games")
+    task, scenes = own.model_dump(include=set(OF_CONTROLLER)), recipe.simulation.scenes.names
+    for kind in ("grasps", "loads"):  # those of scenes that only its own recipe has are of no use here
+        entries = task["references"][kind].items()
+        task["references"][kind] = {scene: entry for scene, entry in entries if scene in scenes}
+    try:
+        played = Recipe.model_validate(recipe.model_dump() | {"task": recipe.task.model_dump() | task})
+    except ValidationError as error:
+        reasons = "; ".join(problem["msg"] for problem in error.errors())
+        text = f"{where}: cannot act in these games: {reasons}; leave it out, or train one whose recipe has this"
+        raise StageFailed(text) from None
+    return replace(world, recipe=played, rg=rg)

@@ -45,10 +45,10 @@ def tables(games: pd.DataFrame, held_out: tuple[str, ...]) -> list[Table]:
         loads = games["task"] + games["mass"].map(" {:g} kg".format)
         by["skill_loads"] = (loads, "task and mass")
         by["skill_cells"] = (loads + ", " + by["skill_partners"][0], "task, mass and partner")
-    return [_table(name, games, group, told) for name, (group, told) in by.items()]
+    return [_table(name, games, group, kind) for name, (group, kind) in by.items()]
 
 
-def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", told: str) -> Table:
+def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", kind: str) -> Table:
     rows: list[tuple[Cell, ...]] = []
     numbers = []
     for title, within in games.groupby(group, sort=False):
@@ -81,7 +81,7 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", told: str) -
         "Falls / drops",
     )
     caption = (
-        f"Games by {told}: success, and interquartile means over all episodes, with 95 % intervals by bootstrap over "
+        f"Games by {kind}: success, and interquartile means over all episodes, with 95 % intervals by bootstrap over "
         "trainings and episodes. Partner force: 90th percentile of the horizontal force of the human within an "
         "episode; worst partner: the greatest such mean of one partner. P: probability that the first skill has the "
         "smaller partner force in the same episode. Every skill plays the same episodes, in simulation."
@@ -105,8 +105,7 @@ def by_training(games: pd.DataFrame, figure: str) -> Values:
     wide = games.assign(**{figure: games[figure].astype(np.float64)}).pivot(
         index="training", columns=UNIT, values=figure
     )
-    found: Values = wide.to_numpy(np.float64)
-    return found
+    return wide.to_numpy(np.float64)
 
 
 def worst_partner(games: pd.DataFrame) -> tuple[float, float, float]:

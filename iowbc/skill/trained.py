@@ -20,7 +20,7 @@ class Trained:
     """A network that learns, with the running statistics of its inputs and its optimiser."""
 
     def __init__(self, inputs: int, outputs: int, settings: SkillLearning, gain: float, rate: float) -> None:
-        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's step size."""
+        """`gain`: of the output layer's orthogonal weights; 0 gives zero at the start. `rate`: Adam's learning rate."""
         self.architecture: dict[str, Any] = {
             "inputs": inputs,
             "actions": outputs,
@@ -43,7 +43,6 @@ class Trained:
             return self.network.normalizer(torch.from_numpy(inputs))
 
     def descend(self, loss: Tensor) -> None:
-        """One step of the optimiser."""
         self.optimizer.param_groups[0]["lr"] = self.rate
         self.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
@@ -56,7 +55,6 @@ class Trained:
         return self.network
 
     def arrays(self) -> Arrays:
-        """Everything, for a checkpoint."""
         return {
             **prefixed("network", checkpoint.module_arrays(self.finished())),
             **prefixed("optimizer", checkpoint.optimizer_arrays(self.optimizer)),
@@ -65,10 +63,17 @@ class Trained:
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Inverse of `arrays`."""
         checkpoint.restore_module(self.network, under("network", arrays))
         with torch.no_grad():
             self.log_std.copy_(self.network.log_std)
         checkpoint.restore_optimizer(self.optimizer, under("optimizer", arrays))
         self.normalization.restore(under("normalization", arrays))
         self.rate = float(arrays["rate"][0])
+
+
+def acted(network: TeacherNetwork | None, observation: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """The mean action of a policy, (n, size), within its bounds; zero without one."""
+    if network is None:
+        return np.zeros((len(observation), size), np.float32)
+    with torch.inference_mode():
+        return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())

@@ -1,0 +1,134 @@
+"""What the agents of a game want: motion along the path, the robot's nominal command, the human's intention."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iowbc.arrays import Array, Mask
+from iowbc.control.command import HEIGHT, OFFSET, YAW_RATE
+from iowbc.control.skill_command import SkillCommand
+from iowbc.recipe.skill.skill import Pursuit, Skill
+from iowbc.recipe.task.commands import Commands
+from iowbc.robot.rotations import wrapped
+from iowbc.skill.path import Paths
+from iowbc.skill.situation import Situation, turned
+
+
+@dataclass(frozen=True)
+class ObjectMotion:
+    """Motion of the object, frame of the start."""
+
+    velocity: Array
+    """Horizontal, (n, 2) [m/s]."""
+    yaw_rate: Array
+    """Of the path at that speed, (n,) [rad/s]; without a correction of the yaw."""
+    heading: Array
+    """Of the path, (n,) [rad]."""
+    height: Array
+    """Of the path a little ahead, (n,) [m]."""
+
+
+def pursue(settings: Pursuit, paths: Paths, now: Situation) -> ObjectMotion:
+    """v = v_0 min(1, way left / slowing) t - k e n, with the tangent t, the distance e from the path, its normal n."""
+    speed = settings.speed * np.minimum(1.0, now.left / settings.slowing)
+    return _along(settings, paths, now, now.covered, speed, -settings.lateral * now.lateral)
+
+
+def by_the_clock(settings: Pursuit, paths: Paths, now: Situation, seconds: Array, pace: Array | float) -> ObjectMotion:
+    """The path at a pace (n,) times the nominal speed, whatever the object does; `seconds` (n,) since the start."""
+    covered = settings.speed * pace * seconds
+    speed = settings.speed * pace * (covered < paths.length[now.path])
+    return _along(settings, paths, now, covered, speed, np.zeros(len(seconds)))
+
+
+def _along(settings: Pursuit, paths: Paths, now: Situation, covered: Array, speed: Array, aside: Array) -> ObjectMotion:
+    heading = paths.heading(now.path, covered)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    return ObjectMotion(
+        velocity=np.stack([speed * cosine - aside * sine, speed * sine + aside * cosine], axis=1),
+        yaw_rate=paths.curvature(now.path, covered) * speed,
+        heading=heading,
+        height=paths.height(now.path, covered + settings.ahead),
+    )
+
+
+class NominalCommand(SkillCommand):
+    """Nominal commands of n games, (n, 11), of robots that know the path or follow."""
+
+    def __init__(self, skill: Skill, commands: Commands, pushing: Mask) -> None:
+        """`pushing`: games with a crate, (n,)."""
+        super().__init__(skill.robot, commands, pushing)
+        self._pursuit = skill.pursuit
+
+    def leading(self, wanted: ObjectMotion, now: Situation) -> Array:
+        """Commands that move the object as wanted: the base goes round the object's centre as it turns.
+
+        v_base = v_object - ω × (object - base), in the heading frame. The hands rise by the height of the path, and
+        once more by what the object lacks of it.
+        """
+        command = self.standing()
+        rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.heading)
+        command[:, :YAW_RATE] = turned(wanted.velocity, -now.heading)
+        arm = turned(now.position[:, :2] - now.base[:, :2], -now.heading)
+        command[:, 0] += rate * arm[:, 1]
+        command[:, 1] -= rate * arm[:, 0]
+        command[:, YAW_RATE] = rate
+        height, (low, high) = 2.0 * wanted.height - now.position[:, 2], self._commands.height
+        legs = (command[:, HEIGHT] + height * ~self._pushing).clip(low, high)  # as far as they go, then the arms
+        rest = command[:, HEIGHT] + height * ~self._pushing - legs
+        command[:, HEIGHT] = legs
+        command[:, OFFSET][:, 2::3] += rest[:, None]
+        return command
+
+
+class Human:
+    """Intentions of n humans: velocity of the handle (frame of the start), yaw rate, and height of the handle."""
+
+    def __init__(self, skill: Skill, n: int, period: float) -> None:
+        """`period`: of a control step [s]."""
+        self._settings, self._pursuit, self._period = skill.human, skill.pursuit, period
+        self._velocity, self._height = np.zeros((n, 4)), np.zeros((n, 2))
+        """Velocity in space and yaw rate; height led to by the velocity, and its offset."""
+        self._offset = np.zeros(n)
+
+    def start(self, which: Array) -> None:
+        """Forgets the past of some humans, (k,)."""
+        self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
+
+    def of_action(self, action: Array, now: Situation) -> Array:
+        """What actions add to the script's intentions, (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the
+        height [m]. `action` (n, 5) in [-1, 1]: velocity of the handle in the frame of the object's yaw, offset of its
+        height, yaw rate of the object."""
+        s = self._settings
+        scaled = action * np.array([s.velocity, s.velocity, s.vertical_velocity, s.height, s.yaw_rate])
+        return np.concatenate([turned(scaled[:, :3], now.yaw), scaled[:, 4:], scaled[:, 3:4]], axis=1)
+
+    def of_script(self, wanted: ObjectMotion, now: Situation) -> Array:
+        """Intentions (n, 5) that move the object as wanted: the handle goes round its centre as it turns."""
+        rate = wanted.yaw_rate + self._pursuit.yaw * wrapped(wanted.heading - now.yaw)
+        arm = now.handle - now.position
+        rise = (wanted.height - now.position[:, 2]) * self._pursuit.vertical
+        limit = self._settings.vertical_velocity
+        columns = [wanted.velocity[:, 0] - rate * arm[:, 1], wanted.velocity[:, 1] + rate * arm[:, 0]]
+        return np.stack([*columns, rise.clip(-limit, limit), rate, np.zeros(len(rate))], axis=1)
+
+    def intend(self, intentions: Array) -> None:
+        """Takes over intentions (n, 5) until the next decision."""
+        self._velocity, self._offset = intentions[:, :4], intentions[:, 4]
+
+    def reach(self, which: Mask, away: Array, now: Situation) -> None:
+        """Lets some humans, (n,), lead their springs to hands that are `away` (n, 3) [m] (frame of the start), no
+        faster than the human of the actions; they leave the object's yaw to the robot."""
+        s = self._settings
+        velocity, fastest = away / s.hand_time, self._pursuit.speed + s.velocity
+        velocity[:, :2] *= fastest / np.linalg.norm(velocity[:, :2], axis=1).clip(fastest)[:, None]
+        velocity[:, 2] = velocity[:, 2].clip(-s.vertical_velocity, s.vertical_velocity)
+        self._velocity[which] = np.column_stack([velocity, now.yaw_rate])[which]
+        self._offset[which] = 0.0
+
+    def advance(self) -> Array:
+        """What the partner of the simulation is fed in the control step to come, (n, 4): see `Partner.steered`."""
+        step = self._settings.vertical_velocity * self._period
+        self._height[:, 0] += self._velocity[:, 2] * self._period
+        self._height[:, 1] += (self._offset - self._height[:, 1]).clip(-step, step)
+        return np.stack([*self._velocity[:, [0, 1, 3]].T, self._height.sum(axis=1)], axis=1)
