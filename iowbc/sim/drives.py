@@ -56,7 +56,3 @@ class Drives:
         both = wanted[..., 0] + wanted[..., 1]
         scale = np.minimum(1.0, limit[..., 0] / np.maximum(both, 1e-9))
         effort[:, pairs] = limit - wanted[..., ::-1] * scale[..., None]
-
-    def arrays(self) -> dict[str, Array]:
-        """What the drives remember, by name."""
-        return {"effort": self.effort}

@@ -4,14 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices, as_slice
+from iowbc.arrays import TINY, Array, Indices, as_slice
 from iowbc.recipe.simulation.scene import Grasp, Object
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
 from iowbc.sim.model_index import Layout
 from iowbc.sim.shapes import measured
-
-TINY = 1e-9
 
 
 class Grip:

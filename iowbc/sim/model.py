@@ -51,7 +51,8 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
         option.cone, option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, scene.grasp.settling
     spec.memory = ARENA
     foot_points = [geom for geom in spec.geoms if geom.parent.name in robot.sole_bodies and geom.conaffinity]
-    legs = _legs(robot)
+    chains = [robot.tree.chain(sole, robot.base) for sole in robot.sole_bodies]
+    legs = {body.name: side for side, chain in enumerate(chains) for body in chain}
     for geom in list(spec.geoms):
         if geom in foot_points:
             geom.priority = 1
@@ -64,9 +65,8 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
     if not dressed:
         for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
             spec.delete(geom)
-    spec.worldbody.add_geom(
-        name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0
-    )
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name=GROUND, type=plane, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0)
     _add_motors(spec, robot, timing)
     if scene.object is not None:
         ground_bit = GROUND_BIT if scene.kind == "lift" else 0
@@ -142,12 +142,6 @@ def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
             forcerange=[-effort, effort],
             nsample=timing.kept_targets,
         )
-
-
-def _legs(robot: Robot) -> dict[str, int]:
-    """Links of the left leg (0) and of the right one (1), feet included."""
-    chains = [robot.tree.chain(sole, robot.base) for sole in robot.sole_bodies]
-    return {body.name: side for side, chain in enumerate(chains) for body in chain}
 
 
 def _touches(geom: Any, shape: bool, body_contact: str) -> tuple[int, int]:

@@ -7,7 +7,7 @@ real sums, products and roots, which round alike however many environments there
 
 import numpy as np
 
-from iowbc.arrays import Array, Indices
+from iowbc.arrays import TINY, Array, Indices
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
 from iowbc.recipe.simulation.scene import Scene
@@ -21,8 +21,6 @@ NOISE_WIDTH = 3
 """Columns of noise that the partner takes each step: two of its unsteady force, one of its share."""
 FEED = 4
 """What the partner hears of the command: v_x, v_y, yaw rate, height."""
-TINY = 1e-9
-"""Keeps a division by a length from dividing by zero."""
 SLOW = 0.1
 """Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
 HESITANT = 0.03

@@ -20,12 +20,8 @@ class Soles:
         physics step, (n, 2, 6) [N·m, N]; `past_force`: of the ground on each foot in the physics steps of the last
         control period, (n, 2, substeps, 3) [N]; `lightest`: vertical force of a foot in contact [N]."""
         self._layout, self._wrench, self._past_force, self._lightest = layout, wrench, past_force, lightest
-        self._spatial, self._subtree_com, self._sites = (
-            batch.bind("cvel"),
-            batch.bind("subtree_com"),
-            batch.bind("site_xpos"),
-        )
-        self._quaternion = batch.bind("xquat")
+        self._spatial, self._subtree_com = batch.bind("cvel"), batch.bind("subtree_com")
+        self._sites, self._quaternion = batch.bind("site_xpos"), batch.bind("xquat")
         self._corners = np.zeros((*robot.sole_polygon.shape[:2], 3))
         self._corners[..., :2] = robot.sole_polygon
         self._normals, self._distances = half_planes(robot.sole_polygon)

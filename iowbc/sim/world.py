@@ -139,7 +139,7 @@ class World:
 
     def _place_object(self, ids: Indices, drop: Array, yaw: Array, shift: Array, start: int) -> None:
         turn = rotations.from_euler(np.zeros_like(yaw), np.zeros_like(yaw), yaw)
-        hands = self._sites[ids][:, self.layout.grips]
+        hands = self.grips[ids]
         hands[..., 2] -= drop[:, None]
         if self.layout.palms is not None:
             hands = hands + self._palm_offset(ids)
@@ -165,9 +165,8 @@ class World:
     def _palm_offset(self, ids: Indices) -> Array:
         """From the grips to the centres of the palms, world frame, (k, 2, 3) [m]."""
         local = self.model.geom_pos[self.layout.palms]
-        return rotations.rotate(
-            self._body_quaternion[ids][:, self.layout.hands], np.broadcast_to(local, (len(ids), 2, 3))
-        )
+        turn = self._body_quaternion[ids][:, self.layout.hands]
+        return rotations.rotate(turn, np.broadcast_to(local, (len(ids), 2, 3)))
 
     def step(self, given: Period, diverged: Mask) -> None:
         """One control period. Marks in `diverged` the simulations that left the numbers and puts them back."""
@@ -328,16 +327,17 @@ class World:
 
     def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
         """Puts a simulation into what `record` kept."""
-        self.fields.set(index, recorded)
+        self.fields.restore(recorded, index)
         for name, array in self._memory.items():
             array[index] = recorded[name]
         self.batch.state[index] = recorded["state"]
         self.batch.forward(np.array([index]), stage=VELOCITY)
         self._mass_cache()
 
-    def hand_position(self, index: int) -> Array:
-        """Positions of the grips of one simulation, (2, 3) [m]."""
-        return self._sites[index, self.layout.grips].copy()
+    @property
+    def grips(self) -> Array:
+        """Positions of the grips, (n, 2, 3) [m]."""
+        return self._sites[:, self.layout.grips]
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""

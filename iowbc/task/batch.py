@@ -15,8 +15,6 @@ from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.rollout_policies import RolloutPolicy
-from iowbc.rollouts.trajectories import Trajectories, roll
 from iowbc.sim.simulation import Simulation
 from iowbc.task.endings import Ending
 from iowbc.task.episodes import Episode
@@ -180,10 +178,6 @@ class Batch:
         left, right = self.memory.command[:, OFFSET][:, 2::3].T
         feed[:, 3] = self.memory.command[:, HEIGHT] + 0.5 * (left + right)
 
-    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-        """Make a rollout of some control steps."""
-        return roll(self, rollout_policy, steps)
-
     def finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""
         memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
@@ -245,9 +239,6 @@ class Batch:
         layout.state.gather(sensed, seen[:, layout.observation], which)
         layout.extra.gather(truth, seen[:, layout.privileged], which)
         self.buffers["observation"][which] = seen
-
-    def __len__(self) -> int:
-        return self.n
 
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (n,) or (n, k)."""

@@ -66,15 +66,7 @@ class Episode:
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, read back by `from_json`."""
-        return {
-            "scene": self.scene,
-            "seed": self.seed,
-            "duration": self.duration,
-            "fixed": dict(self.fixed),
-            "script": None if self.script is None else self.script.as_json(),
-            "push": None if self.push is None else asdict(self.push),
-            "pull": None if self.pull is None else asdict(self.pull),
-        }
+        return asdict(self) | {"script": None if self.script is None else self.script.as_json()}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "Episode":

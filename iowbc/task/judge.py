@@ -9,12 +9,13 @@ from iowbc.arrays import Array, Indices, Mask
 from iowbc.control import gait
 from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.rotations import wrapped
 from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import LOCOMOTION, OWN_RANGES
 from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
 from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion, low_pass, motion
-from iowbc.task.progress import follow, heading_error
+from iowbc.task.progress import follow
 from iowbc.task.rewards.reward import RewardFunction, Scored
 from iowbc.task.rewards.table import Step
 from iowbc.task.yielding import Admittance, excess_force
@@ -79,7 +80,7 @@ class Judge:
         self._filter(memory, moved)
         if not self._admittance.idle:
             self._feel(memory, moved, np.where(memory.infeasible, 0.0, resistance * (1.0 - state.partner_share)))
-        error = heading_error(moved, memory)
+        error = wrapped(moved.heading - memory.heading_reference)
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
         follow(memory, target, error, disturbed, self._task.termination, self._period)
         pushed = state.has_object & ~self._holding

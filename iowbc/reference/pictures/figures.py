@@ -64,7 +64,7 @@ def crosscheck_figure(check: MethodComparison, limit: float) -> Figure:
     figure, (axes,) = _figure(1, 1, 5.0, 3.4)
     said = (limit, "limit of the 90th percentile")
     histogram(axes, check.difference, "largest joint difference [rad]", said, everything=True)
-    axes.set_title(f"static labels against optimal control, {check.count} samples")
+    axes.set_title(f"static labels against optimal control, {len(check.difference)} samples")
     return figure
 
 
