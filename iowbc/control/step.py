@@ -24,28 +24,19 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class State:
-    """What the control loop remembers of n robots from one step to the next."""
+    """What the control loop remembers of n robots from one step to the next: a row each, of the shapes in
+    `ControlStep.shapes`; units, frames and meaning in `STATE`."""
 
     command: Array
-    """C in force, (n, 11)."""
     arms: Array
-    """θ_I_ref, (n, arm joints) [rad]."""
     posture: Array
-    """θ_S_ref without the gait prior, (n, support joints) [rad]."""
     heading_reference: Array
-    """Measured heading at the start plus the integrated commanded yaw rate, (n, 1) [rad]."""
     phase: Array
-    """Gait phase in [0, 1), (n, 1)."""
     stepping: Array
-    """1 while the gait clock runs, else 0, (n, 1)."""
     foothold: Array
-    """Forward offset of each foot from its nominal place in the stride, (n, 2) [m]."""
     begun: Array
-    """0 in a state that `settle` made, 1 afterwards, (n, 1)."""
     action: Array
-    """The action that the motors follow, (n, support joints)."""
     history: Array
-    """H_t, oldest first, (n, K, size of s_t)."""
 
 
 STATE: Mapping[str, tuple[str, str, str]] = {

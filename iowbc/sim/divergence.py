@@ -46,7 +46,7 @@ def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing)
     """Whether the recorded period diverges again; it does, with the same physics and robot."""
     scene, arrays = getattr(recipe.scenes, divergence.scene), divergence.arrays
     world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
-    world.recall(0, arrays)
+    world.restore({name: values[None] for name, values in arrays.items()})
     diverged = np.zeros(1, bool)
     world.step(Period.alone(arrays), diverged)
     return bool(diverged[0])

@@ -108,11 +108,10 @@ class ModelFields:
         """The fields of one simulation."""
         return {name: field[index] for name, field in self._fields.items()}
 
-    def restore(self, values: Mapping[str, Any], which: int | slice = slice(None)) -> None:
-        """Inverse of `snapshot`, or of `of` for one simulation. Values of earlier versions lack the object's mass: it
-        was that of the body."""
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Inverse of `snapshot`. Values of earlier versions lack the object's mass: it was that of the body."""
         thing = self._layout.object
         values = {"object_mass": 0.0 if thing is None else values["body_mass"][..., thing], **values}
         for name, field in self._fields.items():
-            field[which] = values[name]
+            field[...] = values[name]
         self._derive(np.arange(len(self.body_mass)))

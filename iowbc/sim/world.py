@@ -325,15 +325,6 @@ class World:
         hands -= self._applied[:, thing, :3]
         state.link_object_force[place] = np.sqrt(np.vecdot(hands, hands))
 
-    def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
-        """Puts a simulation into what `record` kept."""
-        self.fields.restore(recorded, index)
-        for name, array in self._memory.items():
-            array[index] = recorded[name]
-        self.batch.state[index] = recorded["state"]
-        self.batch.forward(np.array([index]), stage=VELOCITY)
-        self._mass_cache()
-
     @property
     def grips(self) -> Array:
         """Positions of the grips, (n, 2, 3) [m]."""
@@ -345,13 +336,12 @@ class World:
         return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`; the simulations then take bit for bit the same course."""
+        """Inverse of `snapshot`, or of `record` for all; the simulations then take bit for bit the same course."""
         self.fields.restore(values)
         for name, array in self._memory.items():
             array[...] = values[name]
         self.batch.state[...] = values["state"]
-        self._warning_counts[...] = values["warnings"]
-        self._warnings[...] = values["warnings"]
+        self._warning_counts[...] = self._warnings[...] = values.get("warnings", 0)
         self.batch.forward(stage=VELOCITY)
         self._mass_cache()
 

@@ -77,9 +77,7 @@ class Judge:
         `resistance`: of a crate's wheels, (n,) [N].
         """
         moved = self.motion(state)
-        self._filter(memory, moved)
-        if not self._admittance.idle:
-            self._feel(memory, moved, np.where(memory.infeasible, 0.0, resistance * (1.0 - state.partner_share)))
+        self._filter(memory, moved, resistance * (1.0 - state.partner_share))
         error = wrapped(moved.heading - memory.heading_reference)
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
         follow(memory, target, error, disturbed, self._task.termination, self._period)
@@ -114,17 +112,16 @@ class Judge:
         scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
         return Judgement(moved, ending, scored, memory.command.copy(), error)
 
-    def _filter(self, memory: Memory, moved: Motion) -> None:
+    def _filter(self, memory: Memory, moved: Motion, resistance: Array) -> None:
+        """Velocities, and the force on the hands beyond the robot's share of a crate's `resistance` (n,) [N]."""
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
         self._velocity[:, YAW_RATE] = moved.yaw_rate
         time_constant = self._task.reward.sync.filter_time
         memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
-
-    def _feel(self, memory: Memory, moved: Motion, needed: Array) -> None:
-        """Filters the force on the hands beyond what they need to overcome along the command, (n,) [N]."""
-        force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
-        time_constant = self._task.reward.sync.filter_time
-        memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
+        if not self._admittance.idle:
+            needed = np.where(memory.infeasible, 0.0, resistance)
+            force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
+            memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(
         self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array, pushed: Mask
