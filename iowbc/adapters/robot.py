@@ -38,7 +38,6 @@ def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = F
 
 @functools.cache
 def _folder(source: Path, description: str) -> Path:
-    """A copy of a robot's folder with another description."""
     made = Path(tempfile.mkdtemp(prefix="iowbc-robot-"))
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     shutil.copytree(source, made, dirs_exist_ok=True)

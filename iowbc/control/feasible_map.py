@@ -55,7 +55,6 @@ class FeasibleMap(Constants):
         return (clamped_height == height) & (clamped_pitch == pitch)
 
     def save(self, path: Path) -> None:
-        """Writes plain arrays."""
         np.savez(path, allow_pickle=False, pitch=self.pitch, low=self.low, high=self.high)
 
     @classmethod

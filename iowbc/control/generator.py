@@ -23,7 +23,6 @@ class ReferenceNetwork(Constants):
     inputs: tuple[str, ...]
     """Names: the arm joints, `pelvis_height` or `com_height`, `torso_pitch`; see `input_names`."""
     outputs: tuple[str, ...]
-    """Names of the support joints."""
     layers: tuple[tuple[Array, Array], ...]
     """Weight (out, in) and bias (out,) of each layer, float32."""
     input_mean: Array
@@ -53,7 +52,6 @@ class ReferenceNetwork(Constants):
         return output.clip(self.lower, self.upper)
 
     def save(self, folder: Path) -> None:
-        """Writes `rg.safetensors` and `rg.json`."""
         tensors = {f"layer.{i}.weight": w for i, (w, _) in enumerate(self.layers)}
         tensors |= {f"layer.{i}.bias": b for i, (_, b) in enumerate(self.layers)}
         tensors |= {name: getattr(self, name) for name in NUMBERS}

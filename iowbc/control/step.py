@@ -55,7 +55,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
 
 
 @dataclass(frozen=True)
-class Step:
+class StepResult:
     """What a control step finds."""
 
     target: Array
@@ -109,7 +109,7 @@ class ControlStep(Constants):
         blank = zero[:, None] + self._blank
         return State(command, arms, posture, heading, zero, zero, 0.0 * grasp[:, :, 0], zero, 0.0 * posture, blank)
 
-    def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> Step:
+    def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
 
         The first step after `settle` leaves command, references and gait clock as they are, and fills the history.
@@ -144,7 +144,7 @@ class ControlStep(Constants):
         turned = state.heading_reference + command[:, YAW_RATE, None] * self._period
         clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
         after = State(command, arms, posture, turned, phase[:, None], clock, foothold, one, action, history)
-        return Step(self._joints(support + self.scale * action, held), action, support, after)
+        return StepResult(self._joints(support + self.scale * action, held), action, support, after)
 
     def _joints(self, support: Array, arms: Array) -> Array:
         """Values of both branches in MJCF order, (n, joints)."""
@@ -163,5 +163,4 @@ class ControlStep(Constants):
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Numbers in each part of the state."""
         return {name: int(np.prod(self.shapes[name])) for name in (field.name for field in fields(State))}

@@ -230,7 +230,6 @@ def _is_pitch(hinge: Hinge) -> bool:
 
 
 def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...], source: Path) -> Indices:
-    """Places of hinges among the support joints."""
     names = [joints[index] for index in support]
     missing = [hinge.name for hinge in hinges if hinge.name not in names]
     if missing:

@@ -35,7 +35,6 @@ class Divergence:
 
     @classmethod
     def load(cls, file: Path) -> Self:
-        """Reads what `save` wrote."""
         with np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files if name != "about"}
             about = json.loads(str(stored["about"]))

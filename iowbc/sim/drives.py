@@ -22,7 +22,6 @@ class Drives:
         self._range = np.zeros((n, len(robot.joints), 2))
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
-        """Strengths of new episodes."""
         pairs, strength = self._robot.linkages, drawn["motor_strength"][which]
         self.effort[which] = self._robot.effort * strength
         together = drawn["linkage_effort"][which] * strength[:, pairs].mean(axis=2)

@@ -153,7 +153,6 @@ class Draws:
 
 
 def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]]:
-    """Distribution and width of each quantity that is drawn."""
     randomization, partner = recipe.randomization, recipe.partner
     links = len(robot.tree.bodies)
     widths = {"object_com_offset": 3, "link_mass_scale": links, "link_inertia_scale": links}

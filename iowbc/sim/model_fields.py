@@ -7,7 +7,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 from iowbc.sim.shapes import measured
 from iowbc.sim.timing import Timing
 
@@ -24,7 +24,7 @@ WHEELS = ("tendon_frictionloss", "tendon_damping", "wrap_prm")
 class ModelFields:
     """The parameters of a batch's models that differ between its simulations; writes what was drawn."""
 
-    def __init__(self, batch: Any, layout: Layout, scene: Scene, timing: Timing) -> None:
+    def __init__(self, batch: Any, layout: ModelIndex, scene: Scene, timing: Timing) -> None:
         self._layout, self._scene, self._timing = layout, scene, timing
         names = FIELDS + WHEELS * (scene.kind == "push")
         self._fields = {name: batch.expand(name) for name in names}
@@ -105,7 +105,6 @@ class ModelFields:
         return {name: field.copy() for name, field in self._fields.items()}
 
     def of(self, index: int) -> dict[str, Array]:
-        """The fields of one simulation."""
         return {name: field[index] for name, field in self._fields.items()}
 
     def restore(self, values: Mapping[str, Any]) -> None:

@@ -147,7 +147,6 @@ def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
 
 
 def _add_ring(body: Any, thing: Object, bits: dict[str, int]) -> None:
-    """A ring of capsules around the x axis."""
     size = measured(thing).size
     outer = 0.25 * (size[1] + size[2])
     thickness = 0.5 * outer * (1.0 - HOLE)

@@ -122,7 +122,6 @@ class Partner:
         self._derive()
 
     def _behave(self, which: Indices, drawn: dict[str, Array]) -> None:
-        """Takes over what was drawn of the behaviours of some environments."""
         behaviour, delay = drawn["partner_behaviour"][which], drawn["partner_delay"][which]
         leads, lags = behaviour == LEADER, behaviour == LAGGING
         self._behaviour[which] = behaviour
@@ -319,7 +318,6 @@ class Partner:
         return self._aim.copy()
 
     def arrays(self) -> dict[str, Array]:
-        """The partners' memory, by name."""
         own = {name: getattr(self, f"_{name}") for name in REMEMBERED}
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
 

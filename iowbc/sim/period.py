@@ -31,7 +31,6 @@ class Period:
         return type(self)(**{name: values[place] for name, values in vars(self).items()})
 
     def of(self, row: int) -> dict[str, Array]:
-        """Those of one environment, by name."""
         return {name: values[row] for name, values in vars(self).items()}
 
     @classmethod

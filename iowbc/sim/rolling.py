@@ -14,7 +14,7 @@ from iowbc.arrays import TINY, Array
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 
 TORQUE_FIRST = [3, 4, 5, 0, 1, 2]
 """Order of MuJoCo's spatial forces."""
@@ -23,7 +23,7 @@ TORQUE_FIRST = [3, 4, 5, 0, 1, 2]
 class Rolling:
     """Wheels of n crates."""
 
-    def __init__(self, batch: Any, layout: Layout, fields: ModelFields, scene: Scene) -> None:
+    def __init__(self, batch: Any, layout: ModelIndex, fields: ModelFields, scene: Scene) -> None:
         if layout.object is None or layout.object_velocity is None:
             raise ValueError("a crate is needed to roll")
         self._thing, self._speeds, self._rolling = layout.object, layout.object_velocity, fields.rolling

@@ -140,7 +140,6 @@ class Sensing:
         self._object_line.restored()
 
     def arrays(self) -> dict[str, Array]:
-        """The sensors' memory, by name."""
         own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
         own |= {"drift": self._drift, "drifted": self._drifted}
         own |= {"bias": self._bias, "deviation": self._deviation, "rows": self.rows, "sensed": self._robot}

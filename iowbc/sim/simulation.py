@@ -197,7 +197,6 @@ class Simulation:
         self._deliver()
 
     def step(self) -> None:
-        """One control period."""
         state, drawn = self.state, self.drawn
         wrench, diverged = state.external_force, state.diverged
         self.partner.wrench(self.feed, self._noise[:, self._sensing.noise_width :], state, wrench)

@@ -7,14 +7,14 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 
 
 class Soles:
     """Motion and contact of the left and right sole in n simulations of one scene."""
 
     def __init__(
-        self, robot: Robot, batch: Any, layout: Layout, wrench: Array, past_force: Array, lightest: float
+        self, robot: Robot, batch: Any, layout: ModelIndex, wrench: Array, past_force: Array, lightest: float
     ) -> None:
         """`wrench`: torque about the robot's centre of mass and force on each foot from what it touches in the last
         physics step, (n, 2, 6) [N·m, N]; `past_force`: of the ground on each foot in the physics steps of the last

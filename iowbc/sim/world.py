@@ -16,7 +16,7 @@ from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.grip import Grip, Squeeze
 from iowbc.sim.model import compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
+from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, ModelIndex
 from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
@@ -55,7 +55,7 @@ class World:
         self.model = compile_scene(robot, physics, scene, timing)
         if physics.pd == "explicit":
             require_stable(self.model, robot, timing)
-        self.layout = Layout.of(self.model, robot)
+        self.layout = ModelIndex.of(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1)
         self.fields = ModelFields(self.batch, self.layout, scene, timing)
         self._flags = self.batch.expand("opt.disableflags")
@@ -181,7 +181,6 @@ class World:
         self._check(diverged)
 
     def _advance(self, given: Period, diverged: Mask) -> None:
-        """Takes the physics steps."""
         try:
             self.batch.step(nstep=self.timing.substeps)
         except SimulationError as error:
@@ -368,7 +367,7 @@ def _past(history: Array, place: slice, substeps: int) -> Array:
     return kept[..., 2 + substeps :].reshape(len(history), 2, substeps, 3)
 
 
-def _places(layout: Layout, bodies: int) -> Indices:
+def _places(layout: ModelIndex, bodies: int) -> Indices:
     """Bodies whose forces are kept, in order; the object, where there is one, is the last."""
     every = np.arange(bodies)
     thing = every[:0] if layout.object is None else every[[layout.object]]

@@ -17,11 +17,11 @@ from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
 from iowbc.task.endings import Ending
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.episodes import Episode
 from iowbc.task.guidance import Guidance
 from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
-from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
@@ -66,7 +66,7 @@ class Batch:
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
-        self.memory = Memory.blank(n, len(self.robot.interaction), len(self.robot.support))
+        self.memory = EpisodeState.blank(n, len(self.robot.interaction), len(self.robot.support))
         self._schedule = schedule = Schedule(
             task, self.memory, environments=environments, seed=seed, trials=episodes, period=period
         )
@@ -114,7 +114,6 @@ class Batch:
 
     @property
     def measured(self) -> Measured:
-        """The measurements delivered last."""
         return self.simulation.measured
 
     def targets(self, action: Array) -> Array:

@@ -13,7 +13,7 @@ from iowbc.robot.rotations import wrapped
 from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import LOCOMOTION, OWN_RANGES
 from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
-from iowbc.task.memory import Memory
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.motion import Motion, low_pass, motion
 from iowbc.task.progress import follow
 from iowbc.task.rewards.reward import RewardFunction, Scored
@@ -58,13 +58,12 @@ class Judge:
         self._velocity = np.zeros((len(holding), 3))
 
     def motion(self, state: SimulationState) -> Motion:
-        """The motion in a simulation state."""
         return motion(state, self._height)
 
     def judge(
         self,
         state: SimulationState,
-        memory: Memory,
+        memory: EpisodeState,
         action: Array,
         *,
         place: Array,
@@ -112,7 +111,7 @@ class Judge:
         scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
         return Judgement(moved, ending, scored, memory.command.copy(), error)
 
-    def _filter(self, memory: Memory, moved: Motion, resistance: Array) -> None:
+    def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:
         """Velocities, and the force on the hands beyond the robot's share of a crate's `resistance` (n,) [N]."""
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
         self._velocity[:, YAW_RATE] = moved.yaw_rate
@@ -124,7 +123,13 @@ class Judge:
             memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(
-        self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array, pushed: Mask
+        self,
+        state: SimulationState,
+        memory: EpisodeState,
+        moved: Motion,
+        place: Array,
+        error: Array,
+        pushed: Mask,
     ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
         followable = ~pushed & (memory.played[:, LOCOMOTION] <= OWN_RANGES) & self._training
@@ -132,7 +137,7 @@ class Judge:
         return Ending(
             fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
             dropped=(dropped(moved, place, self._holding, state.grasped, termination) | left) & ~diverged,
-            lagging=lagging(memory.lag, heading_error, followable, termination) & ~diverged,
+            lagging=lagging(memory.lag, error, followable, termination) & ~diverged,
             time_limit=memory.steps >= memory.limit,
             diverged=diverged,
         )

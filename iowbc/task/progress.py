@@ -7,12 +7,12 @@ from iowbc.control.command import VELOCITY, YAW_RATE
 from iowbc.recipe.task.task import Termination
 from iowbc.task.curriculum import Course
 from iowbc.task.endings import Ending
-from iowbc.task.memory import Memory
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.rewards.terms import progress
 
 
 def follow(
-    memory: Memory, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
+    memory: EpisodeState, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
 ) -> None:
     """Takes the step just made, of `period` [s], into the sums; `target`: velocity asked for, heading frame, (n, 2)
     [m/s]; `error`: of the heading, (n,) [rad]."""
@@ -27,7 +27,7 @@ def follow(
     memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
 
 
-def course(memory: Memory, ending: Ending, period: float, blame: float) -> Course:
+def course(memory: EpisodeState, ending: Ending, period: float, blame: float) -> Course:
     """How the episodes went that end in this step; `blame`: time after a disturbance within which it counts [s]."""
     steps = np.maximum(memory.steps, 1)
     moved = memory.commanded > TINY

@@ -31,7 +31,6 @@ class LabelTask:
     """Description of a labeller, from which a worker process makes it."""
 
     robot: Path
-    """The robot's folder."""
     recipe: ReferenceGenerator
     seed: int
     method: Literal["static", "ocp"]

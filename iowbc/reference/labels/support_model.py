@@ -40,7 +40,6 @@ class SupportModel:
 
     @property
     def torso_joint(self) -> int:
-        """Index of the joint that moves the torso."""
         return int(self.model.frames[self.torso].parentJoint)
 
     def lock(self, sample: Sample) -> None:

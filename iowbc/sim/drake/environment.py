@@ -12,7 +12,7 @@ from iowbc.arrays import Array, Mask
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.robot import rotations
 from iowbc.sim.drake.plant import Plant
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Forces:
     """On the object in the last step from all it touches but the hands, (3,) [N]."""
 
 
-class Environment:
+class DrakeEnvironment:
     """A plant with its state and inputs."""
 
-    def __init__(self, model: Any, settings: Drake, layout: Layout, *, implicit: bool, yaw_arm: float) -> None:
+    def __init__(self, model: Any, settings: Drake, layout: ModelIndex, *, implicit: bool, yaw_arm: float) -> None:
         """`implicit`: the damping of the joint control is solved for in each step; `yaw_arm`: see
         `iowbc.recipe.simulation.scene.Scene` [m]."""
         self._model, self._implicit = model, implicit
@@ -87,7 +87,6 @@ class Environment:
         self.tree.SetVelocities(self.context, turned[self._from_speed])
 
     def state(self) -> tuple[Array, Array]:
-        """Inverse of `set_state`."""
         position, speed = np.empty(len(self._from_position)), np.empty(len(self._from_speed))
         position[self._from_position] = self.tree.GetPositions(self.context)
         speed[self._from_speed] = self.tree.GetVelocities(self.context)

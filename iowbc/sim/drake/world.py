@@ -10,7 +10,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.drake.environment import Environment
+from iowbc.sim.drake.environment import DrakeEnvironment
 from iowbc.sim.period import Period
 from iowbc.sim.soles import Soles
 from iowbc.sim.timing import Timing
@@ -27,7 +27,7 @@ class DrakeWorld(World):
         super().__init__(robot, physics, scene, rows, timing)
         self._settings = settings
         self._steps = Timing(timing.period, settings.timestep, timing.longest_latency)
-        self._environments: list[Environment] = []
+        self._environments: list[DrakeEnvironment] = []
         n = len(rows)
         self._lag = np.zeros(n, np.intp)
         """Physics steps by which the motors follow their targets late, (n,)."""
@@ -43,7 +43,7 @@ class DrakeWorld(World):
         """Makes the plants of some environments from their models."""
         self._environments += [None] * (len(self.rows) - len(self._environments))  # type: ignore[list-item]
         for index in ids:
-            self._environments[index] = Environment(
+            self._environments[index] = DrakeEnvironment(
                 self.batch.get_model(index),
                 self._settings,
                 self.layout,
@@ -52,14 +52,12 @@ class DrakeWorld(World):
             )
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
-        """See `World`."""
         super().reset(ids, joint_position, pitch, yaw, drawn)
         self._lag[ids] = np.round(drawn["action_latency"] * self._steps.substeps)
         self._targets[ids] = self.control[ids, None]
         self._build(ids)
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """See `World`."""
         super().restore(values)
         self._build(np.arange(len(self.rows)))
 
@@ -71,7 +69,7 @@ class DrakeWorld(World):
             if not diverged[index]:
                 diverged[index] = not self._step_one(index, environment, given)
 
-    def _step_one(self, index: int, environment: Environment, given: Period) -> bool:
+    def _step_one(self, index: int, environment: DrakeEnvironment, given: Period) -> bool:
         """Whether Drake found a solution in each step of the period."""
         last, applied, held = (
             self._targets.shape[1] - self._lag[index],

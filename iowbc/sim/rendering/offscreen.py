@@ -50,7 +50,6 @@ class Offscreen:
         return self._image[::-1].copy()
 
     def close(self) -> None:
-        """Frees the graphics memory."""
         self._pictures.free()
         self._finalizer()
 

@@ -186,7 +186,6 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         self._reset_seeds()
 
     def close(self) -> None:
-        """Ends the worker processes."""
         self.workers.close()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:

@@ -67,7 +67,6 @@ def main() -> None:
 
 
 def _serve(connection: Connection, memory: int) -> None:
-    """Answers messages."""
     try:
         from iowbc.task.vector.shared import attach_shared
 
