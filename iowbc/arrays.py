@@ -16,8 +16,6 @@ Mask = NDArray[np.bool_]
 """True for those that are meant."""
 Keys = NDArray[np.uint64]
 """Keys of counter-based random numbers."""
-TINY = 1e-9
-"""Keeps a division by a length, force or share from dividing by zero."""
 
 
 def as_slice(indices: Indices) -> slice | Indices:

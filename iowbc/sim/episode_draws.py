@@ -5,13 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from iowbc import counter_random as random
-from iowbc.arrays import TINY, Array, Indices, Keys
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.simulation.holding import BY_AXIS, SWITCHES
 from iowbc.recipe.simulation.partner import PartnerSettings
 from iowbc.recipe.simulation.randomization import Distribution
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.robot.rotations import TINY
 from iowbc.sim.shapes import measured
 
 PUSH_SHARE = "partner_share/push"

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.arrays import TINY, Array, Indices, as_slice
+from iowbc.arrays import Array, Indices, as_slice
 from iowbc.recipe.simulation.scene import Grasp, Object
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
+from iowbc.robot.rotations import TINY
 from iowbc.sim.model_index import ModelIndex
 from iowbc.sim.shapes import measured
 

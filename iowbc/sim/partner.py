@@ -7,12 +7,13 @@ real sums, products and roots, which round alike however many environments there
 
 import numpy as np
 
-from iowbc.arrays import TINY, Array, Indices
+from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
+from iowbc.robot.rotations import TINY
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.shapes import measured
 from iowbc.sim.state import SimulationState

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.arrays import TINY, Array
+from iowbc.arrays import Array
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
+from iowbc.robot.rotations import TINY
 from iowbc.sim.model_fields import ModelFields
 from iowbc.sim.model_index import ModelIndex
 

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc import counter_random as random
-from iowbc.arrays import TINY, Array, Indices, Keys
+from iowbc.arrays import Array, Indices, Keys
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.robot.rotations import TINY
 from iowbc.sim import partner
 from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.divergence import Divergence

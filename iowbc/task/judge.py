@@ -123,13 +123,7 @@ class Judge:
             memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(
-        self,
-        state: SimulationState,
-        memory: EpisodeState,
-        moved: Motion,
-        place: Array,
-        error: Array,
-        pushed: Mask,
+        self, state: SimulationState, memory: EpisodeState, moved: Motion, place: Array, error: Array, pushed: Mask
     ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
         followable = ~pushed & (memory.played[:, LOCOMOTION] <= OWN_RANGES) & self._training

@@ -5,8 +5,9 @@ from typing import Literal
 
 import numpy as np
 
-from iowbc.arrays import TINY, Array
+from iowbc.arrays import Array
 from iowbc.robot import rotations
+from iowbc.robot.rotations import TINY
 from iowbc.sim.state import SimulationState
 
 

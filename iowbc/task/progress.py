@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from iowbc.arrays import TINY, Array, Mask
+from iowbc.arrays import Array, Mask
 from iowbc.control.command import VELOCITY, YAW_RATE
 from iowbc.recipe.task.task import Termination
+from iowbc.robot.rotations import TINY
 from iowbc.task.curriculum import Course
 from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
