@@ -128,7 +128,6 @@ def require_fitting(adapter: Adapter, robot: Robot, frequency: float, where: str
 
 
 def _naming(adapter: Adapter, robot: Robot, moves_arms: bool) -> list[str]:
-    """Problems of the names of joints."""
     found = []
     for field, names, known in (("joints", adapter.joints, robot.joints), ("acted", adapter.acted, adapter.joints)):
         unknown = [name for name in names if name not in known]

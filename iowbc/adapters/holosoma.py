@@ -12,6 +12,7 @@ from iowbc.adapters.adapter import Adapter, Seen, scaled
 from iowbc.adapters.networks import metadata, network
 from iowbc.arrays import Array
 from iowbc.errors import StageFailed
+from iowbc.robot.rotations import wrapped
 
 DEFAULT = {
     "hip_pitch": -0.312,
@@ -65,7 +66,7 @@ def adapter(policy: Path) -> Adapter:
 def feet_phase(seen: Seen) -> Array:
     """Phases of the left and right foot, (n, 2) [rad]: half a period apart in walking, both π in standing."""
     phase = 2.0 * np.pi * seen.walked / GAIT_PERIOD + np.array([0.0, np.pi])
-    return np.where(seen.walking[:, None], (phase + np.pi) % (2.0 * np.pi) - np.pi, np.pi)
+    return np.where(seen.walking[:, None], wrapped(phase), np.pi)
 
 
 def _default(joint: str) -> float:

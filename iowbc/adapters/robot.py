@@ -11,7 +11,7 @@ import yaml
 
 from iowbc.adapters.adapter import Adapter
 from iowbc.errors import StageFailed
-from iowbc.robot.description import DESCRIPTION, Robot, kind_of
+from iowbc.robot.description import DESCRIPTION, Robot, kind_of, side_sign
 
 
 def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = False) -> Path:
@@ -25,10 +25,9 @@ def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = F
     for index in [*robot.support, *(robot.interaction if moves_arms else ())]:
         name = robot.joints[index]
         place, row = adapter.joints.index(name), rows[kind_of(name)]
-        sign = -1.0 if row.get("mirrored", False) and name.startswith("right_") else 1.0
         own = {"kp": adapter.kp[place], "kd": adapter.kd[place]}
         if index in robot.support:
-            own["default"] = sign * adapter.default[place]
+            own["default"] = side_sign(row, name) * adapter.default[place]
         known = row.setdefault("own", own)
         if any(not np.isclose(known[key], own[key]) for key in own):
             raise StageFailed(f"{where}: {name} differs from the other side in kp, kd or default; both should be alike")
@@ -39,7 +38,6 @@ def robot_of(adapter: Adapter, robot: Robot, where: str, *, moves_arms: bool = F
 
 @functools.cache
 def _folder(source: Path, description: str) -> Path:
-    """A copy of a robot's folder with another description."""
     made = Path(tempfile.mkdtemp(prefix="iowbc-robot-"))
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     shutil.copytree(source, made, dirs_exist_ok=True)

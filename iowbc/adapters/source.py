@@ -17,7 +17,6 @@ from iowbc.task.own_function import load_function
 SHIPPED = {"holosoma": holosoma.adapter, "deploy": deploy.adapter}
 PLACE = "eval.public"
 CONTRACT = "it takes the controller's pathlib.Path and returns an iowbc.adapters.adapter.Adapter"
-FUNCTION = "adapter"
 
 
 def load_adapter(controller: PublicController) -> Adapter:
@@ -32,7 +31,7 @@ def load_adapter(controller: PublicController) -> Adapter:
         raise StageFailed(f"{PLACE}.policy: {policy}: {text}; correct {PLACE}.sha256 if this is the file you mean")
     if controller.module is None:
         return SHIPPED[controller.adapter](policy)
-    own = load_function(f"{PLACE}.module", OwnFunction(module=controller.module, function=FUNCTION), CONTRACT)
+    own = load_function(f"{PLACE}.module", OwnFunction(module=controller.module, function="adapter"), CONTRACT)
     try:
         made = own.function(policy)
     except StageFailed:

@@ -24,7 +24,6 @@ class Stopwatch:
         self.spent: dict[str, float] = {}
 
     def watch(self, owner: Any, name: str, label: str) -> None:
-        """Times every call of a method from now on."""
         method: Callable[..., Any] = getattr(owner, name)
         self.spent.setdefault(label, 0.0)
 

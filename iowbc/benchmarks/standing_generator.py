@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iowbc.control.feasible_map import FeasibleMap
+from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.generator import ReferenceNetwork, input_names
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.recipe.recipe import Recipe
@@ -38,8 +38,7 @@ def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenera
         lower=robot.lower[support].astype(np.float32),
         upper=robot.upper[support].astype(np.float32),
     ).save(folder)
-    upright, height = np.array([-1e-6, 1e-6]), np.full(2, robot.default_height)
-    FeasibleMap(upright, height, height).save(folder / "feasible.npz")
+    FeasibleMap.single(robot.default_height).save(folder / FEASIBLE)
 
 
 @contextmanager

@@ -55,7 +55,6 @@ class FeasibleMap(Constants):
         return (clamped_height == height) & (clamped_pitch == pitch)
 
     def save(self, path: Path) -> None:
-        """Writes plain arrays."""
         np.savez(path, allow_pickle=False, pitch=self.pitch, low=self.low, high=self.high)
 
     @classmethod
@@ -107,7 +106,7 @@ def build_map(
     open_rows = _runs(low <= high)
     if not open_rows:
         raise ValueError(f"the feasible set is empty under rg.feasible.bound_slope {slope} m/rad; raise it")
-    begin, end = max(open_rows, key=_length)
+    begin, end = max(open_rows, key=lambda run: run[1] - run[0])
     return FeasibleMap(pitch[begin : end + 1], low[begin : end + 1], high[begin : end + 1])
 
 
@@ -115,7 +114,7 @@ def _grow(run: Run, rows: list[list[Run]], place: float) -> list[Run]:
     """Follows a run through neighbouring rows for as long as one overlaps, keeping near to a place."""
     followed: list[Run] = []
     for row in rows:
-        touching = [other for other in row if _overlap(run, other) > 0]
+        touching = [other for other in row if min(run[1], other[1]) >= max(run[0], other[0])]
         if not touching:
             break
         run = min(touching, key=lambda other: _distance(other, place))
@@ -130,13 +129,5 @@ def _runs(row: NDArray[np.bool_]) -> list[Run]:
     return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
 
-def _length(run: Run) -> int:
-    return run[1] - run[0] + 1
-
-
 def _distance(run: Run, place: float) -> float:
     return max(run[0] - place, place - run[1], 0.0)
-
-
-def _overlap(a: Run, b: Run) -> int:
-    return min(a[1], b[1]) - max(a[0], b[0]) + 1

@@ -12,6 +12,8 @@ from iowbc.robot.description import Robot
 
 WEIGHTS, ARCHITECTURE = "rg.safetensors", "rg.json"
 FORMAT = 1
+NUMBERS = ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper")
+"""Arrays of a network beside its layers."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,6 @@ class ReferenceNetwork(Constants):
     inputs: tuple[str, ...]
     """Names: the arm joints, `pelvis_height` or `com_height`, `torso_pitch`; see `input_names`."""
     outputs: tuple[str, ...]
-    """Names of the support joints."""
     layers: tuple[tuple[Array, Array], ...]
     """Weight (out, in) and bias (out,) of each layer, float32."""
     input_mean: Array
@@ -51,11 +52,9 @@ class ReferenceNetwork(Constants):
         return output.clip(self.lower, self.upper)
 
     def save(self, folder: Path) -> None:
-        """Writes `rg.safetensors` and `rg.json`."""
         tensors = {f"layer.{i}.weight": w for i, (w, _) in enumerate(self.layers)}
         tensors |= {f"layer.{i}.bias": b for i, (_, b) in enumerate(self.layers)}
-        for name in ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper"):
-            tensors[name] = getattr(self, name)
+        tensors |= {name: getattr(self, name) for name in NUMBERS}
         save_file({k: np.ascontiguousarray(v, dtype=np.float32) for k, v in tensors.items()}, folder / WEIGHTS)
         architecture = {
             "format": FORMAT,
@@ -89,10 +88,7 @@ class ReferenceNetwork(Constants):
             raise ValueError(f"{folder / WEIGHTS}: shapes do not fit {source}; make it anew with `--force rg-fit`")
         if not all(np.isfinite(values).all() for values in tensors.values()):
             raise ValueError(f"{folder / WEIGHTS}: values that are not finite; make it anew with `--force rg-fit`")
-        rest = {
-            name: tensors[name] for name in ("input_mean", "input_std", "output_mean", "output_std", "lower", "upper")
-        }
-        return cls(inputs=inputs, outputs=outputs, layers=layers, **rest)
+        return cls(inputs=inputs, outputs=outputs, layers=layers, **{name: tensors[name] for name in NUMBERS})
 
 
 def input_names(robot: Robot, height: str) -> tuple[str, ...]:

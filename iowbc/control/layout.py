@@ -41,12 +41,10 @@ class Layout(Generic[Source]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parts, in order."""
         return tuple(part.name for part in self.parts)
 
     @cached_property
     def mirrors(self) -> tuple[MirrorMap, ...]:
-        """Mirror of each part."""
         return tuple(part.kind(self.robot) for part in self.parts)
 
     @cached_property
@@ -56,12 +54,10 @@ class Layout(Generic[Source]):
 
     @cached_property
     def size(self) -> int:
-        """Length of a row."""
         return sum(map(len, self.mirrors))
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Place of each part in a row."""
         sizes = [len(mirror) for mirror in self.mirrors]
         ends = np.cumsum(sizes).tolist()
         return {name: slice(end - size, end) for name, size, end in zip(self.names, sizes, ends, strict=True)}

@@ -104,7 +104,6 @@ def _axis(hinge: Hinge) -> str:
 
 
 def direction(angle: Array) -> tuple[Array, Array]:
-    """Cosine and sine."""
     xp = namespace(angle)
     return xp.cos(angle), xp.sin(angle)
 

@@ -85,5 +85,4 @@ ObservationLayout = Layout[Sensed]
 
 
 def observation_layout(robot: Robot, observe_object: bool) -> ObservationLayout:
-    """Layout of s_t."""
     return Layout(PROPRIOCEPTION + OBJECT if observe_object else PROPRIOCEPTION, robot)

@@ -12,6 +12,7 @@ from iowbc.control import gait
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.chain import Frames
 from iowbc.control.command import HEIGHT, OFFSET, PITCH
+from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.foothold import FootPlacement
 from iowbc.control.gravity import ArmGravity
 from iowbc.control.sensors import Measured
@@ -35,14 +36,11 @@ class ReferenceLayer(Constants):
         self.arms = ArmKinematics(robot, references.arms)
         self.network, self.feasible = None, None
         if rg is not None:
-            from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
             from iowbc.control.generator import ReferenceNetwork
 
             self.network = ReferenceNetwork.load(rg) if references.use_rg else None
             self.feasible = FeasibleMap.load(rg / FEASIBLE).up_to(references.largest_pitch)
         if references.upright:
-            from iowbc.control.feasible_map import FeasibleMap
-
             self.feasible = FeasibleMap.single(robot.default_height)
         self._start, self._ahead = references.arms, references.lean * np.eye(3)[0]
         self._gravity = ArmGravity(robot) if references.arms.gravity else None
@@ -123,19 +121,15 @@ class ReferenceLayer(Constants):
         command: Array,
         dt: float,
     ) -> tuple[Array, Mask, Array]:
-        """Gait phase (n,), whether the clock runs (n,), and footholds (n, 2) [m] one control period later."""
-        moving = self.wants_steps(measured, support, command)
+        """Gait phase (n,), whether the clock runs (n,), and footholds (n, 2) [m] one control period later; it runs
+        for a commanded velocity, or to catch a fall."""
+        moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
+        if recovery is not None:
+            moving = moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
         phase, stepping = gait.advance(phase, stepping, moving, self._settings, dt)
         if self._placement is not None:
             foothold = self._placement(foothold, measured, command, phase, 1.0 * stepping, dt)
         return phase, stepping, foothold
-
-    def wants_steps(self, measured: Measured, support: Array, command: Array) -> Mask:
-        """True where the gait clock has a reason to run, (n,): a commanded velocity, or a fall to be caught."""
-        moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
-        if recovery is None:
-            return moving
-        return moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

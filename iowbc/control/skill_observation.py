@@ -14,8 +14,6 @@ TIME = 10.0
 """The same for times and ways left [s, m]."""
 SENSED = 44
 """Size of what the robot observes beside the estimated forces."""
-
-
 WAYPOINTS, OBJECT = 9, 10
 """Sizes of the parts of a known path and of the object."""
 YAW = 3
@@ -38,26 +36,24 @@ def robot_observation(
     (n,): whether there is a crate, and whether the path is known; `path` (n, 9): its next waypoints; `felt`
     (n, history, 2, 3): estimated forces on the hands, the newest last [N].
     """
-    parts = sensed(command, measured, wrist_error, thing)
-    parts |= {"pushing": pushing, "known": known, "waypoints": path * known[:, None]}
-    return joined(parts | {"forces": felt.reshape(len(felt), -1) / FORCE})
+    parts = {
+        "command": command,
+        "gravity": measured.projected_gravity,
+        "rates": measured.base_angular_velocity,
+        "wrist_error": 10.0 * wrist_error.reshape(-1, 6),
+        "object": thing,
+        "pushing": pushing,
+        "known": known,
+        "waypoints": path * known[:, None],
+        "forces": felt.reshape(len(felt), -1) / FORCE,
+    }
+    return joined(parts)
 
 
 def joined(parts: Mapping[str, Array]) -> Array:
     """Parts (n, k) or (n,) side by side, (n, sum of k) float32."""
     columns = [values if values.ndim == 2 else values[:, None] for values in parts.values()]
     return np.concatenate(columns, axis=1).astype(np.float32)
-
-
-def sensed(command: Array, measured: Measured, wrist_error: Array, thing: Array) -> dict[str, Array]:
-    """Measurements of the robot, heading frame: `command` (n, 11), `wrist_error` (n, 2, 3) [m], `thing` (n, OBJECT)."""
-    return {
-        "command": command,
-        "gravity": measured.projected_gravity,
-        "rates": measured.base_angular_velocity,
-        "wrist_error": 10.0 * wrist_error.reshape(-1, 6),
-        "object": thing,
-    }
 
 
 def of_object(measured: Measured, sees_object: bool) -> Array:

@@ -24,28 +24,19 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class State:
-    """What the control loop remembers of n robots from one step to the next."""
+    """What the control loop remembers of n robots from one step to the next: a row each, of the shapes in
+    `ControlStep.shapes`; units, frames and meaning in `STATE`."""
 
     command: Array
-    """C in force, (n, 11)."""
     arms: Array
-    """θ_I_ref, (n, arm joints) [rad]."""
     posture: Array
-    """θ_S_ref without the gait prior, (n, support joints) [rad]."""
     heading_reference: Array
-    """Measured heading at the start plus the integrated commanded yaw rate, (n, 1) [rad]."""
     phase: Array
-    """Gait phase in [0, 1), (n, 1)."""
     stepping: Array
-    """1 while the gait clock runs, else 0, (n, 1)."""
     foothold: Array
-    """Forward offset of each foot from its nominal place in the stride, (n, 2) [m]."""
     begun: Array
-    """0 in a state that `settle` made, 1 afterwards, (n, 1)."""
     action: Array
-    """The action that the motors follow, (n, support joints)."""
     history: Array
-    """H_t, oldest first, (n, K, size of s_t)."""
 
 
 STATE: Mapping[str, tuple[str, str, str]] = {
@@ -64,7 +55,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
 
 
 @dataclass(frozen=True)
-class Step:
+class StepResult:
     """What a control step finds."""
 
     target: Array
@@ -118,7 +109,7 @@ class ControlStep(Constants):
         blank = zero[:, None] + self._blank
         return State(command, arms, posture, heading, zero, zero, 0.0 * grasp[:, :, 0], zero, 0.0 * posture, blank)
 
-    def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> Step:
+    def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
 
         The first step after `settle` leaves command, references and gait clock as they are, and fills the history.
@@ -153,7 +144,7 @@ class ControlStep(Constants):
         turned = state.heading_reference + command[:, YAW_RATE, None] * self._period
         clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
         after = State(command, arms, posture, turned, phase[:, None], clock, foothold, one, action, history)
-        return Step(self._joints(support + self.scale * action, held), action, support, after)
+        return StepResult(self._joints(support + self.scale * action, held), action, support, after)
 
     def _joints(self, support: Array, arms: Array) -> Array:
         """Values of both branches in MJCF order, (n, joints)."""
@@ -172,5 +163,4 @@ class ControlStep(Constants):
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Numbers in each part of the state."""
         return {name: int(np.prod(self.shapes[name])) for name in (field.name for field in fields(State))}

@@ -142,7 +142,7 @@ def _described(folder: Path, source: Path, entries: Mapping[str, Any]) -> Robot:
     unused = set(entries["joints"]) - {kind_of(name) for name in joints}
     if unused:
         raise ValueError(f"{source}: joints: no joint of {mjcf.name} is of kind {', '.join(sorted(unused))}")
-    default = np.array([_default(row, name) for row, name in zip(rows, joints, strict=True)])
+    default = np.array([side_sign(row, name) * float(row["default"]) for row, name in zip(rows, joints, strict=True)])
     lower = np.array([hinge.lower for hinge in hinges])
     upper = np.array([hinge.upper for hinge in hinges])
     for index, name in enumerate(joints):
@@ -212,9 +212,9 @@ def _row(rows: Mapping[str, Mapping[str, Any]], joint: str, source: Path) -> Map
     return row
 
 
-def _default(row: Mapping[str, Any], joint: str) -> float:
-    sign = -1.0 if row.get("mirrored", False) and joint.startswith("right_") else 1.0
-    return sign * float(row["default"])
+def side_sign(row: Mapping[str, Any], joint: str) -> float:
+    """Sign of a joint's default position against the one in its row."""
+    return -1.0 if row.get("mirrored", False) and joint.startswith("right_") else 1.0
 
 
 def _support(names: list[str], joints: tuple[str, ...], source: Path) -> Indices:
@@ -230,7 +230,6 @@ def _is_pitch(hinge: Hinge) -> bool:
 
 
 def _places(hinges: Sequence[Hinge], support: Indices, joints: tuple[str, ...], source: Path) -> Indices:
-    """Places of hinges among the support joints."""
     names = [joints[index] for index in support]
     missing = [hinge.name for hinge in hinges if hinge.name not in names]
     if missing:

@@ -66,9 +66,13 @@ def side_by_side(maps: Sequence[MirrorMap]) -> MirrorMap:
 
 
 def joint_mirror(robot: Robot) -> MirrorMap:
-    """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints)."""
+    """Mirror of all joint positions, velocities or torques, in MJCF order, shape (..., joints).
+
+    A hinge is an axial vector: reflection keeps a rotation about y and reverses one about x or z.
+    """
     permutation = np.array([robot.joints.index(_other_side(name)) for name in robot.joints])
-    return MirrorMap(permutation, np.array([_sign(hinge.axis) for hinge in robot.tree.hinges()]))
+    leading = [int(np.argmax(np.abs(hinge.axis))) for hinge in robot.tree.hinges()]
+    return MirrorMap(permutation, AXIAL_SIGN[leading])
 
 
 def joint_magnitude(robot: Robot) -> MirrorMap:
@@ -99,9 +103,3 @@ def _other_side(name: str) -> str:
     if name.startswith("right_"):
         return "left_" + name.removeprefix("right_")
     return name
-
-
-def _sign(axis: Array) -> float:
-    """A hinge is an axial vector: reflection keeps a rotation about y and reverses one about x or z."""
-    leading = int(np.argmax(np.abs(axis)))
-    return float(AXIAL_SIGN[leading])

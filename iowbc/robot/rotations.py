@@ -4,6 +4,8 @@ import numpy as np
 
 from iowbc.arrays import Array
 
+TINY = 1e-9
+"""Keeps a division by a length, force or share from dividing by zero."""
 NEXT = np.array([1, 2, 0])
 """Places of the components that follow x, y and z in turn."""
 

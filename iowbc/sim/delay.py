@@ -67,5 +67,4 @@ class DelayLine:
         self._point(np.arange(len(self._whole)))
 
     def arrays(self) -> dict[str, Array]:
-        """The line's memory, by name."""
         return {"values": self._values, "newest": self._newest, "whole": self._whole, "part": self._part}

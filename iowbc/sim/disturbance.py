@@ -73,5 +73,4 @@ class Disturbance:
         return np.stack([across * np.cos(turn), across * np.sin(turn), rise], axis=1)
 
     def arrays(self) -> dict[str, Array]:
-        """The clocks, by name."""
         return {"next": self._next, "until": self._until, "count": self._count, "force": self.force}

@@ -35,7 +35,6 @@ class Divergence:
 
     @classmethod
     def load(cls, file: Path) -> Self:
-        """Reads what `save` wrote."""
         with np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files if name != "about"}
             about = json.loads(str(stored["about"]))
@@ -46,7 +45,7 @@ def replay(robot: Robot, recipe: Recipe, divergence: Divergence, timing: Timing)
     """Whether the recorded period diverges again; it does, with the same physics and robot."""
     scene, arrays = getattr(recipe.scenes, divergence.scene), divergence.arrays
     world = World(robot, recipe.physics, scene, np.zeros(1, np.int64), timing)
-    world.recall(0, arrays)
+    world.restore({name: values[None] for name, values in arrays.items()})
     diverged = np.zeros(1, bool)
     world.step(Period.alone(arrays), diverged)
     return bool(diverged[0])

@@ -22,7 +22,6 @@ class Drives:
         self._range = np.zeros((n, len(robot.joints), 2))
 
     def reset(self, which: Indices, drawn: dict[str, Array]) -> None:
-        """Strengths of new episodes."""
         pairs, strength = self._robot.linkages, drawn["motor_strength"][which]
         self.effort[which] = self._robot.effort * strength
         together = drawn["linkage_effort"][which] * strength[:, pairs].mean(axis=2)
@@ -56,7 +55,3 @@ class Drives:
         both = wanted[..., 0] + wanted[..., 1]
         scale = np.minimum(1.0, limit[..., 0] / np.maximum(both, 1e-9))
         effort[:, pairs] = limit - wanted[..., ::-1] * scale[..., None]
-
-    def arrays(self) -> dict[str, Array]:
-        """What the drives remember, by name."""
-        return {"effort": self.effort}

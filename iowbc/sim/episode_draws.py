@@ -12,22 +12,18 @@ from iowbc.recipe.simulation.randomization import Distribution
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.robot.rotations import TINY
 from iowbc.sim.shapes import measured
 
 PUSH_SHARE = "partner_share/push"
 """Column of the partner's share in a push scene; there it takes the place of `partner_share`."""
 
-
-TINY = 1e-9
-"""Keeps a partner that bears all from dividing by zero."""
 WITH_OBJECT = (
     *("object_mass_scale", "inertia_scale", "object_com_offset", "surface_friction", "object_latency"),
     *("partner_share", "partner_stiffness", "partner_damping", "partner_delay", "partner_pace", "partner_noise"),
     "partner_share_drift",
 )
 """Quantities that are zero in a scene without an object."""
-WITH_WHEELS = ("object_ground_friction",)
-"""Quantities that are zero but in a push."""
 
 
 class DrawTable:
@@ -78,7 +74,7 @@ class Draws:
         for name, place in self._table.columns.items():
             if name in WITH_OBJECT:
                 self._present[~self._with_object, place] = 0.0
-            elif name in WITH_WHEELS:
+            elif name == "object_ground_friction":
                 self._present[~self._pushing, place] = 0.0
         self._rows = np.tile(self._table.nominal, (n, 1))
         self._habits = DrawTable(_habits(recipe.partner))
@@ -101,11 +97,6 @@ class Draws:
         self._far = np.array([measured(scene.object).high[0] if scene.object else 0.0 for scene in scenes])
         self._near = self._far * [scene.grasp.near_end * (scene.kind == "lift") for scene in scenes]
         self._lightest = recipe.randomization.object_mass_scale.low
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All quantities."""
-        return tuple(self.values)
 
     def draw(self, which: Indices, key: Keys, fixed: Mapping[str, Array]) -> None:
         """Draws anew for some environments, from the keys of their episodes; `fixed` (n,) holds values, NaN draws."""
@@ -163,7 +154,6 @@ class Draws:
 
 
 def _entries(recipe: Recipe, robot: Robot) -> dict[str, tuple[Distribution, int]]:
-    """Distribution and width of each quantity that is drawn."""
     randomization, partner = recipe.randomization, recipe.partner
     links = len(robot.tree.bodies)
     widths = {"object_com_offset": 3, "link_mass_scale": links, "link_inertia_scale": links}

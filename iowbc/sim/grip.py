@@ -8,10 +8,9 @@ from iowbc.arrays import Array, Indices, as_slice
 from iowbc.recipe.simulation.scene import Grasp, Object
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.model_index import Layout
+from iowbc.robot.rotations import TINY
+from iowbc.sim.model_index import ModelIndex
 from iowbc.sim.shapes import measured
-
-TINY = 1e-9
 
 
 class Grip:
@@ -20,7 +19,7 @@ class Grip:
     The angle is the integral of the rate at which the object turns against the hands, cut where the palms slip.
     """
 
-    def __init__(self, batch: Any, layout: Layout, thing: Object, grasp: Grasp, period: float) -> None:
+    def __init__(self, batch: Any, layout: ModelIndex, thing: Object, grasp: Grasp, period: float) -> None:
         self._layout, self._grasp, self._period = layout, grasp, period
         self._sites, self._spatial = batch.bind("site_xpos"), batch.bind("cvel")
         self._about = measured(thing).about_axes[1] + grasp.height**2
@@ -54,7 +53,6 @@ class Grip:
         return axis * -size[:, None]
 
     def arrays(self) -> dict[str, Array]:
-        """The grip's memory, by name."""
         return {"grip_angle": self.angle, "grip_rate": self.rate}
 
 

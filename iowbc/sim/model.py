@@ -51,7 +51,8 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
         option.cone, option.noslip_iterations = mujoco.mjtCone.mjCONE_ELLIPTIC, scene.grasp.settling
     spec.memory = ARENA
     foot_points = [geom for geom in spec.geoms if geom.parent.name in robot.sole_bodies and geom.conaffinity]
-    legs = _legs(robot)
+    chains = [robot.tree.chain(sole, robot.base) for sole in robot.sole_bodies]
+    legs = {body.name: side for side, chain in enumerate(chains) for body in chain}
     for geom in list(spec.geoms):
         if geom in foot_points:
             geom.priority = 1
@@ -64,9 +65,8 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
     if not dressed:
         for geom in [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]:
             spec.delete(geom)
-    spec.worldbody.add_geom(
-        name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0
-    )
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name=GROUND, type=plane, size=[0, 0, 1], contype=GROUND_BIT, conaffinity=0)
     _add_motors(spec, robot, timing)
     if scene.object is not None:
         ground_bit = GROUND_BIT if scene.kind == "lift" else 0
@@ -84,7 +84,17 @@ def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, 
 def compile_scene(robot: Robot, physics: Physics, scene: Scene, timing: Timing) -> Any:
     """The model that is stepped. Its first sensor makes MuJoCo compute `cfrc_ext`, which holds all contact forces."""
     spec = scene_spec(robot, physics, scene, timing, dressed=False)
-    _add_ground_forces(spec, robot, timing)
+    for body in robot.sole_bodies:  # the force between each foot and the ground, world frame, over a control period
+        spec.add_sensor(
+            name=body,
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=body,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname=GROUND,
+            intprm=[FORCE, NET_FORCE, 1],
+            nsample=timing.substeps,
+        )
     return spec.compile()
 
 
@@ -103,25 +113,11 @@ def require_stable(model: Any, robot: Robot, timing: Timing) -> None:
     rate = robot.kd * inverse[np.arange(count), 6 + np.arange(count)]
     worst = int(np.argmax(rate))
     if rate[worst] * timing.timestep > 1.0:
+        stable = timing.period / np.ceil(timing.period * rate[worst] - 1e-9)  # divides the control period
         raise ValueError(
             f"simulation.physics.pd: explicit at a step of {timing.timestep:g} s makes {robot.joints[worst]} buzz: "
             f"kd dt / I is {rate[worst] * timing.timestep:.2f}, it must not pass 1; choose "
-            f"simulation.physics.timestep: {timing.longest_stable_step(rate[worst]):g} or shorter"
-        )
-
-
-def _add_ground_forces(spec: Any, robot: Robot, timing: Timing) -> None:
-    """A sensor of the force between each foot and the ground, world frame, which keeps those of a control period."""
-    for body in robot.sole_bodies:
-        spec.add_sensor(
-            name=body,
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_BODY,
-            objname=body,
-            reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname=GROUND,
-            intprm=[FORCE, NET_FORCE, 1],
-            nsample=timing.substeps,
+            f"simulation.physics.timestep: {stable:g} or shorter"
         )
 
 
@@ -142,12 +138,6 @@ def _add_motors(spec: Any, robot: Robot, timing: Timing) -> None:
             forcerange=[-effort, effort],
             nsample=timing.kept_targets,
         )
-
-
-def _legs(robot: Robot) -> dict[str, int]:
-    """Links of the left leg (0) and of the right one (1), feet included."""
-    chains = [robot.tree.chain(sole, robot.base) for sole in robot.sole_bodies]
-    return {body.name: side for side, chain in enumerate(chains) for body in chain}
 
 
 def _touches(geom: Any, shape: bool, body_contact: str) -> tuple[int, int]:

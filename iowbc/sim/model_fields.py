@@ -7,7 +7,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Indices
 from iowbc.recipe.simulation.scene import Scene
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 from iowbc.sim.shapes import measured
 from iowbc.sim.timing import Timing
 
@@ -24,28 +24,25 @@ WHEELS = ("tendon_frictionloss", "tendon_damping", "wrap_prm")
 class ModelFields:
     """The parameters of a batch's models that differ between its simulations; writes what was drawn."""
 
-    def __init__(self, batch: Any, layout: Layout, scene: Scene, timing: Timing) -> None:
+    def __init__(self, batch: Any, layout: ModelIndex, scene: Scene, timing: Timing) -> None:
         self._layout, self._scene, self._timing = layout, scene, timing
         names = FIELDS + WHEELS * (scene.kind == "push")
         self._fields = {name: batch.expand(name) for name in names}
         self._nominal = {name: field[0].copy() for name, field in self._fields.items()}
-        self._fields["object_mass"] = np.zeros(len(self.body_mass))
+        self.body_mass: Array = self._fields["body_mass"]
+        """Inertia in translation, (n, bodies) [kg]."""
+        self.object_mass = self._fields["object_mass"] = np.zeros(len(self.body_mass))
+        """Mass that gravity acts on, (n,) [kg]; a light object moves with more (`body_mass`)."""
+        self.torque_range: Array = self._fields["actuator_forcerange"]
+        """Least and greatest torque of each motor, (n, joints, 2) [N·m]; to be written."""
+        self.rolling = [self._fields[name] for name in names if name in WHEELS]
+        """Of a crate's wheels in three directions, to be written: dry friction [N] and damping [N·s/m], (n, 3), and the
+        directions, x, y and yaw of each, (n, 9)."""
         self._least_inertia = scene.object.smallest_inertia if scene.object is not None else 0.0
         self._object_inertia = measured(scene.object).principal if scene.object is not None else np.zeros(3)
         batch.set_const()
         self._batch = batch
         self._yielding = batch.expand("tendon_invweight0") if scene.kind == "push" else None
-
-    @property
-    def body_mass(self) -> Array:
-        """Inertia in translation, (n, bodies) [kg]."""
-        return self._fields["body_mass"]
-
-    @property
-    def object_mass(self) -> Array:
-        """Mass that gravity acts on, (n,) [kg]; a light object moves with more (`body_mass`)."""
-        mass: Array = self._fields["object_mass"]
-        return mass
 
     def write(self, ids: Indices, drawn: Mapping[str, Array]) -> None:
         """Sets the models of simulations `ids`, which rise, from rows of drawn values in the same order."""
@@ -86,21 +83,6 @@ class ModelFields:
             fields["geom_friction"][ids[:, None], self._layout.palms, 0] = friction
             fields["geom_friction"][ids[:, None], self._layout.palms, 1] = self._scene.grasp.torsion * friction
 
-    @property
-    def rolling(self) -> tuple[Array, Array]:
-        """Dry friction [N] and damping [N·s/m] of a crate's wheels in each direction, (n, 3); to be written."""
-        return self._fields["tendon_frictionloss"], self._fields["tendon_damping"]
-
-    @property
-    def rolling_directions(self) -> Array:
-        """Those directions, x, y and yaw of each, (n, 9); to be written."""
-        return self._fields["wrap_prm"]
-
-    @property
-    def torque_range(self) -> Array:
-        """Least and greatest torque of each motor, (n, joints, 2) [N·m]; to be written."""
-        return self._fields["actuator_forcerange"]
-
     def place_grips(self, ids: Indices, places: Array) -> None:
         """Where on the object the grips are connected, (k, 2, 3), object frame [m]."""
         self._fields["site_pos"][ids[:, None], self._layout.object_grips] = places
@@ -123,24 +105,12 @@ class ModelFields:
         return {name: field.copy() for name, field in self._fields.items()}
 
     def of(self, index: int) -> dict[str, Array]:
-        """The fields of one simulation."""
         return {name: field[index] for name, field in self._fields.items()}
 
-    def set(self, index: int, values: Mapping[str, Array]) -> None:
-        """Inverse of `of`."""
-        values = self._weighed(values)
-        for name, field in self._fields.items():
-            field[index] = values[name]
-        self._derive(np.arange(len(self.body_mass)))
-
-    def restore(self, values: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`."""
-        values = self._weighed(values)
+    def restore(self, values: Mapping[str, Any]) -> None:
+        """Inverse of `snapshot`. Values of earlier versions lack the object's mass: it was that of the body."""
+        thing = self._layout.object
+        values = {"object_mass": 0.0 if thing is None else values["body_mass"][..., thing], **values}
         for name, field in self._fields.items():
             field[...] = values[name]
         self._derive(np.arange(len(self.body_mass)))
-
-    def _weighed(self, values: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The values with the object's mass, which those of earlier versions lack: it was that of the body."""
-        thing = self._layout.object
-        return {"object_mass": 0.0 if thing is None else values["body_mass"][..., thing], **values}

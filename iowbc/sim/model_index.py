@@ -14,7 +14,7 @@ BASE_ANGULAR = slice(3, 6)
 
 
 @dataclass(frozen=True)
-class Layout:
+class ModelIndex:
     """Indices into the arrays of a model and of its data. The robot comes first, then the object."""
 
     joints: slice
@@ -61,7 +61,7 @@ class Layout:
     """Geom with which the object touches palms."""
 
     @classmethod
-    def of(cls, model: Any, robot: Robot) -> "Layout":
+    def of(cls, model: Any, robot: Robot) -> "ModelIndex":
         """Finds everything by name; checks that the joints are in the robot's order."""
         names = [model.joint(index).name for index in range(model.njnt)]
         count = len(robot.joints)

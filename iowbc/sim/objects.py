@@ -39,11 +39,11 @@ def add_object(
     thing = scene.object
     if thing is None:
         raise ValueError("a scene without an object has none to add")
-    body = spec.worldbody.add_body(name="object", pos=[0.0, 0.0, resting_height(scene)])
+    shape = measured(thing)
+    body = spec.worldbody.add_body(name="object", pos=[0.0, 0.0, CLEARANCE - shape.low[2]])
     body.explicitinertial = True
     body.mass = thing.mass
     body.ipos = OFF_CENTRE
-    shape = measured(thing)
     body.inertia, body.iquat = shape.principal * thing.mass, shape.turn
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
     bits = {"contype": OBJECT_BIT if by_contact or touched else 0, "conaffinity": ground_bit}
@@ -68,11 +68,6 @@ def add_object(
         _add_palms(spec, scene)
     else:
         _add_grips(spec, body, scene)
-
-
-def resting_height(scene: Scene) -> float:
-    """Height of a crate's centre above the ground [m]."""
-    return CLEARANCE - measured(scene.object).low[2] if scene.object is not None else 0.0
 
 
 def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
@@ -152,7 +147,6 @@ def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
 
 
 def _add_ring(body: Any, thing: Object, bits: dict[str, int]) -> None:
-    """A ring of capsules around the x axis."""
     size = measured(thing).size
     outer = 0.25 * (size[1] + size[2])
     thickness = 0.5 * outer * (1.0 - HOLE)

@@ -13,6 +13,7 @@ from iowbc.recipe.simulation.partner import PartnerSettings as Recipe
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY
+from iowbc.robot.rotations import TINY
 from iowbc.sim.delay import DelayLine
 from iowbc.sim.shapes import measured
 from iowbc.sim.state import SimulationState
@@ -21,8 +22,6 @@ NOISE_WIDTH = 3
 """Columns of noise that the partner takes each step: two of its unsteady force, one of its share."""
 FEED = 4
 """What the partner hears of the command: v_x, v_y, yaw rate, height."""
-TINY = 1e-9
-"""Keeps a division by a length from dividing by zero."""
 SLOW = 0.1
 """Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
 HESITANT = 0.03
@@ -124,7 +123,6 @@ class Partner:
         self._derive()
 
     def _behave(self, which: Indices, drawn: dict[str, Array]) -> None:
-        """Takes over what was drawn of the behaviours of some environments."""
         behaviour, delay = drawn["partner_behaviour"][which], drawn["partner_delay"][which]
         leads, lags = behaviour == LEADER, behaviour == LAGGING
         self._behaviour[which] = behaviour
@@ -321,7 +319,6 @@ class Partner:
         return self._aim.copy()
 
     def arrays(self) -> dict[str, Array]:
-        """The partners' memory, by name."""
         own = {name: getattr(self, f"_{name}") for name in REMEMBERED}
         return own | {f"line/{name}": values for name, values in self._line.arrays().items()}
 

@@ -28,19 +28,10 @@ class Period:
 
     def rows(self, place: slice | Indices) -> Self:
         """The inputs of some environments."""
-        return type(self)(
-            target=self.target[place],
-            effort=self.effort[place],
-            wrench=self.wrench[place],
-            push=self.push[place],
-            resistance=self.resistance[place],
-            squeeze=self.squeeze[place],
-            slip_force=self.slip_force[place],
-        )
+        return type(self)(**{name: values[place] for name, values in vars(self).items()})
 
     def of(self, row: int) -> dict[str, Array]:
-        """Those of one environment, by name."""
-        return {field.name: getattr(self, field.name)[row] for field in fields(self)}
+        return {name: values[row] for name, values in vars(self).items()}
 
     @classmethod
     def alone(cls, arrays: Mapping[str, Array]) -> Self:

@@ -13,10 +13,10 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.robot import rotations
+from iowbc.robot.rotations import TINY
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 
-TINY = 1e-9
 TORQUE_FIRST = [3, 4, 5, 0, 1, 2]
 """Order of MuJoCo's spatial forces."""
 
@@ -24,10 +24,10 @@ TORQUE_FIRST = [3, 4, 5, 0, 1, 2]
 class Rolling:
     """Wheels of n crates."""
 
-    def __init__(self, batch: Any, layout: Layout, fields: ModelFields, scene: Scene) -> None:
+    def __init__(self, batch: Any, layout: ModelIndex, fields: ModelFields, scene: Scene) -> None:
         if layout.object is None or layout.object_velocity is None:
             raise ValueError("a crate is needed to roll")
-        self._thing, self._speeds, self._fields = layout.object, layout.object_velocity, fields
+        self._thing, self._speeds, self._rolling = layout.object, layout.object_velocity, fields.rolling
         self._arm, self._slow = scene.yaw_arm, scene.creep
         self._velocity, self._external = batch.bind("qvel"), batch.bind("cfrc_ext")
         self._place, self._centre = batch.bind("xpos"), batch.bind("xipos")
@@ -46,7 +46,7 @@ class Rolling:
         ahead /= np.maximum(length, TINY)[:, None]
         ahead[length < TINY] = (1.0, 0.0, 0.0)
         self._direct(ahead)
-        dry, damping = self._fields.rolling
+        dry, damping, _ = self._rolling
         dry[:, 0] = resistance
         dry[:, 1:] = np.where(slides, 0.0, resistance)[:, None]
         damping[:, 1:] = np.where(slides, resistance / np.maximum(speed, self._slow), 0.0)[:, None]
@@ -72,4 +72,4 @@ class Rolling:
         across = rotations.cross(other, ahead)
         across /= np.sqrt(np.vecdot(across, across))[:, None]
         frame = np.stack([ahead, across, rotations.cross(ahead, across)], axis=1)
-        self._fields.rolling_directions[:] = (frame * self._scale).reshape(len(ahead), -1)
+        self._rolling[2][:] = (frame * self._scale).reshape(len(ahead), -1)

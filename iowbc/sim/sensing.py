@@ -38,6 +38,8 @@ class Sensing:
     def __init__(self, recipe: Recipe, joints: int, has_object: Mask, longest_latency: int, period: float) -> None:
         n, self._period = len(has_object), period
         self._columns = columns = Columns(joints)
+        self.noise_width = columns.width
+        """Columns of noise that sensing takes each step."""
         self._see_object, self._all_see = bool(has_object.any()), bool(has_object.all())
         self._world = np.zeros((n, 3, 3))
         width = columns.robot.stop
@@ -62,11 +64,6 @@ class Sensing:
             object_linear_velocity=seen[:, SPEED],
             object_angular_velocity=seen[:, TURNING],
         )
-
-    @property
-    def noise_width(self) -> int:
-        """Columns of noise that sensing takes each step."""
-        return self._columns.width
 
     def reset(self, which: Indices, drawn: dict[str, Array], state: SimulationState) -> None:
         """Fills the past of some environments with their present."""
@@ -117,7 +114,7 @@ class Sensing:
         rotation = state.base_rotation
         heading = robot[:, columns.heading.start]
         turned = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]) + self._drifted - heading
-        heading += (turned + np.pi) % (2.0 * np.pi) - np.pi
+        heading += rotations.wrapped(turned)
         if not self._see_object:
             return
         world, turning = self._world, state.base_angular_velocity
@@ -139,11 +136,10 @@ class Sensing:
 
     def restored(self) -> None:
         """To be called after the memory was written from outside."""
-        for line in (self._robot_line, self._object_line):
-            line.restored()
+        self._robot_line.restored()
+        self._object_line.restored()
 
     def arrays(self) -> dict[str, Array]:
-        """The sensors' memory, by name."""
         own = {"mounting": self._mounting, "gyro_bias": self._gyro_bias}
         own |= {"drift": self._drift, "drifted": self._drifted}
         own |= {"bias": self._bias, "deviation": self._deviation, "rows": self.rows, "sensed": self._robot}

@@ -19,7 +19,6 @@ HOLE = 0.55
 """Inner radius of a tyre as a part of its outer one."""
 HULL = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
 """A mesh weighs as its convex hull does: that is what touches, and it is closed whatever the file says."""
-UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Shape:
     """Principal moments of inertia for unit mass, (3,) [m²]."""
     about_axes: Array
     """Moments of inertia about the frame's axes for unit mass, (3,) [m²]."""
-    turn: Array = field(default_factory=UNTURNED.copy)
+    turn: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
     """Quaternion of the principal axes in the frame, (4,)."""
     vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """Of a mesh, (n, 3) [m]."""

@@ -14,6 +14,7 @@ from iowbc.recipe.evaluation.engine import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
+from iowbc.robot.rotations import TINY
 from iowbc.sim import partner
 from iowbc.sim.disturbance import Disturbance
 from iowbc.sim.divergence import Divergence
@@ -26,18 +27,9 @@ from iowbc.sim.state import SimulationState
 from iowbc.sim.timing import Timing
 from iowbc.sim.world import EVERY, World, make_world
 
-TINY = 1e-9
-"""Keeps a division by the friction of an absent object from dividing by zero."""
-
 STARTS_AT_ZERO = (
-    "joint_acceleration",
-    "slipped",
-    "partner_force",
-    "partner_velocity",
-    "partner_energy",
-    "partner_share",
-    "external_force",
-    "push_force",
+    *("joint_acceleration", "slipped", "partner_force", "partner_velocity", "partner_energy", "partner_share"),
+    *("external_force", "push_force"),
 )
 """Parts of the state that an episode begins without."""
 
@@ -148,9 +140,9 @@ class Simulation:
     def hold(self, fixed: Mapping[str, Array], which: Indices | slice = EVERY) -> None:
         """Holds quantities of some environments at values (k,) from the next reset on; NaN draws. Keeps what is held
         and not named here."""
-        unknown = [name for name in fixed if name not in self._draws.names]
+        unknown = [name for name in fixed if name not in self.drawn]
         if unknown:
-            raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self._draws.names))}")
+            raise KeyError(f"no randomised quantities {unknown}; there are: {', '.join(sorted(self.drawn))}")
         for name, values in fixed.items():
             self.fixed.setdefault(name, np.full(self.n, np.nan))[which] = values
 
@@ -206,7 +198,6 @@ class Simulation:
         self._deliver()
 
     def step(self) -> None:
-        """One control period."""
         state, drawn = self.state, self.drawn
         wrench, diverged = state.external_force, state.diverged
         self.partner.wrench(self.feed, self._noise[:, self._sensing.noise_width :], state, wrench)
@@ -299,17 +290,17 @@ class Simulation:
         """Every array that the future depends on, besides the worlds'."""
         own: dict[str, Array] = {"episode": self.episode, "clock": self.clock, "episode_key": self._episode_key}
         own |= {"target": self.target, "feed": self.feed, "robot_mass": self._robot_mass, "borne": self._borne}
+        own["noise"] = self._noise
         parts: dict[str, dict[str, Array]] = {
             "state": vars(self.state),
             "drawn": self.drawn,
             "partner": self.partner.arrays(),
             "sensing": self._sensing.arrays(),
-            "drives": self._drives.arrays(),
+            "drives": {"effort": self.motor_effort},
             "impulses": self._impulses.arrays(),
             "pushes": self._pushes.arrays(),
             "fixed": self.fixed,
         }
-        own["noise"] = self._noise
         return own | {f"{part}/{name}": values for part, arrays in parts.items() for name, values in arrays.items()}
 
     def snapshot(self) -> dict[str, Array]:
@@ -332,8 +323,8 @@ class Simulation:
         for index, world in enumerate(self.worlds):
             start = f"world{index}/"
             world.restore({k.removeprefix(start): v for k, v in saved.items() if k.startswith(start)})
-        for part in (self.partner, self._sensing):
-            part.restored()
+        self.partner.restored()
+        self._sensing.restored()
 
     def world_of(self, env: int) -> tuple[World, int]:
         """The world of an environment, and its index there."""
@@ -355,7 +346,7 @@ class Simulation:
     def hand_position(self, env: int) -> Array:
         """Positions of the grips, (2, 3) [m]."""
         world, index = self.world_of(env)
-        return world.hand_position(index)
+        return world.grips[index].copy()
 
 
 def _ignore(message: str) -> None:

@@ -7,25 +7,21 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.model_index import Layout
+from iowbc.sim.model_index import ModelIndex
 
 
 class Soles:
     """Motion and contact of the left and right sole in n simulations of one scene."""
 
     def __init__(
-        self, robot: Robot, batch: Any, layout: Layout, wrench: Array, past_force: Array, lightest: float
+        self, robot: Robot, batch: Any, layout: ModelIndex, wrench: Array, past_force: Array, lightest: float
     ) -> None:
         """`wrench`: torque about the robot's centre of mass and force on each foot from what it touches in the last
         physics step, (n, 2, 6) [N·m, N]; `past_force`: of the ground on each foot in the physics steps of the last
         control period, (n, 2, substeps, 3) [N]; `lightest`: vertical force of a foot in contact [N]."""
         self._layout, self._wrench, self._past_force, self._lightest = layout, wrench, past_force, lightest
-        self._spatial, self._subtree_com, self._sites = (
-            batch.bind("cvel"),
-            batch.bind("subtree_com"),
-            batch.bind("site_xpos"),
-        )
-        self._quaternion = batch.bind("xquat")
+        self._spatial, self._subtree_com = batch.bind("cvel"), batch.bind("subtree_com")
+        self._sites, self._quaternion = batch.bind("site_xpos"), batch.bind("xquat")
         self._corners = np.zeros((*robot.sole_polygon.shape[:2], 3))
         self._corners[..., :2] = robot.sole_polygon
         self._normals, self._distances = half_planes(robot.sole_polygon)

@@ -36,7 +36,3 @@ class Timing:
             )
         steps = np.round(latency * self.substeps)
         return np.where(steps > 0.0, (steps - 0.5) * self.timestep, 0.0)
-
-    def longest_stable_step(self, rate: float) -> float:
-        """Longest physics step that divides the control period and is below 1 / `rate` [s]."""
-        return float(self.period / np.ceil(self.period * rate - 1e-9))

@@ -16,7 +16,7 @@ from iowbc.robot.description import GRAVITY, Robot
 from iowbc.sim.grip import Grip, Squeeze
 from iowbc.sim.model import compile_scene, require_stable
 from iowbc.sim.model_fields import ModelFields
-from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, Layout
+from iowbc.sim.model_index import BASE_ANGULAR, BASE_LINEAR, ModelIndex
 from iowbc.sim.period import Period
 from iowbc.sim.rolling import Rolling
 from iowbc.sim.shapes import measured
@@ -55,7 +55,7 @@ class World:
         self.model = compile_scene(robot, physics, scene, timing)
         if physics.pd == "explicit":
             require_stable(self.model, robot, timing)
-        self.layout = Layout.of(self.model, robot)
+        self.layout = ModelIndex.of(self.model, robot)
         self.batch = Batch(self.model, len(rows), nthread=1)
         self.fields = ModelFields(self.batch, self.layout, scene, timing)
         self._flags = self.batch.expand("opt.disableflags")
@@ -139,7 +139,7 @@ class World:
 
     def _place_object(self, ids: Indices, drop: Array, yaw: Array, shift: Array, start: int) -> None:
         turn = rotations.from_euler(np.zeros_like(yaw), np.zeros_like(yaw), yaw)
-        hands = self._sites[ids][:, self.layout.grips]
+        hands = self.grips[ids]
         hands[..., 2] -= drop[:, None]
         if self.layout.palms is not None:
             hands = hands + self._palm_offset(ids)
@@ -165,9 +165,8 @@ class World:
     def _palm_offset(self, ids: Indices) -> Array:
         """From the grips to the centres of the palms, world frame, (k, 2, 3) [m]."""
         local = self.model.geom_pos[self.layout.palms]
-        return rotations.rotate(
-            self._body_quaternion[ids][:, self.layout.hands], np.broadcast_to(local, (len(ids), 2, 3))
-        )
+        turn = self._body_quaternion[ids][:, self.layout.hands]
+        return rotations.rotate(turn, np.broadcast_to(local, (len(ids), 2, 3)))
 
     def step(self, given: Period, diverged: Mask) -> None:
         """One control period. Marks in `diverged` the simulations that left the numbers and puts them back."""
@@ -182,7 +181,6 @@ class World:
         self._check(diverged)
 
     def _advance(self, given: Period, diverged: Mask) -> None:
-        """Takes the physics steps."""
         try:
             self.batch.step(nstep=self.timing.substeps)
         except SimulationError as error:
@@ -326,18 +324,10 @@ class World:
         hands -= self._applied[:, thing, :3]
         state.link_object_force[place] = np.sqrt(np.vecdot(hands, hands))
 
-    def recall(self, index: int, recorded: Mapping[str, Array]) -> None:
-        """Puts a simulation into what `record` kept."""
-        self.fields.set(index, recorded)
-        for name, array in self._memory.items():
-            array[index] = recorded[name]
-        self.batch.state[index] = recorded["state"]
-        self.batch.forward(np.array([index]), stage=VELOCITY)
-        self._mass_cache()
-
-    def hand_position(self, index: int) -> Array:
-        """Positions of the grips of one simulation, (2, 3) [m]."""
-        return self._sites[index, self.layout.grips].copy()
+    @property
+    def grips(self) -> Array:
+        """Positions of the grips, (n, 2, 3) [m]."""
+        return self._sites[:, self.layout.grips]
 
     def snapshot(self) -> dict[str, Array]:
         """Everything that the next step depends on."""
@@ -345,13 +335,12 @@ class World:
         return own | {"state": self.batch.state.copy(), "warnings": self._warnings.copy()} | self.fields.snapshot()
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """Inverse of `snapshot`; the simulations then take bit for bit the same course."""
+        """Inverse of `snapshot`, or of `record` for all; the simulations then take bit for bit the same course."""
         self.fields.restore(values)
         for name, array in self._memory.items():
             array[...] = values[name]
         self.batch.state[...] = values["state"]
-        self._warning_counts[...] = values["warnings"]
-        self._warnings[...] = values["warnings"]
+        self._warning_counts[...] = self._warnings[...] = values.get("warnings", 0)
         self.batch.forward(stage=VELOCITY)
         self._mass_cache()
 
@@ -378,7 +367,7 @@ def _past(history: Array, place: slice, substeps: int) -> Array:
     return kept[..., 2 + substeps :].reshape(len(history), 2, substeps, 3)
 
 
-def _places(layout: Layout, bodies: int) -> Indices:
+def _places(layout: ModelIndex, bodies: int) -> Indices:
     """Bodies whose forces are kept, in order; the object, where there is one, is the last."""
     every = np.arange(bodies)
     thing = every[:0] if layout.object is None else every[[layout.object]]

@@ -99,7 +99,7 @@ def run(job: Job) -> None:
     if check is not None and check.metrics["crosscheck_p90"] > recipe.crosscheck.p90_limit:
         raise StageFailed(
             f"static labels differ from optimal control by {check.metrics['crosscheck_p90']:.4f} rad "
-            f"(p90 of {check.count} samples, the limit is {recipe.crosscheck.p90_limit} rad). "
+            f"(p90 of {len(check.difference)} samples, the limit is {recipe.crosscheck.p90_limit} rad). "
             f"Worst: {'; '.join(check.worst)}. Check the weights in rg.problem, or label with `rg.method: ocp`"
         )
 

@@ -15,15 +15,13 @@ from iowbc.control.observation import Sensed
 from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
-from iowbc.rollouts.rollout_policies import RolloutPolicy
-from iowbc.rollouts.trajectories import Trajectories, roll
 from iowbc.sim.simulation import Simulation
 from iowbc.task.endings import Ending
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.episodes import Episode
 from iowbc.task.guidance import Guidance
 from iowbc.task.judge import Judge, Judgement
 from iowbc.task.layout import full_layout
-from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.planned_pushes import PlannedPulls, PlannedPushes
 from iowbc.task.privileged import Truth
@@ -68,7 +66,7 @@ class Batch:
         self._joint_reference = np.tile(self.robot.default_position, (n, 1))
         self.scenes = np.array(scenes)
         """Name of each environment's scene, (n,)."""
-        self.memory = Memory.blank(n, len(self.robot.interaction), len(self.robot.support))
+        self.memory = EpisodeState.blank(n, len(self.robot.interaction), len(self.robot.support))
         self._schedule = schedule = Schedule(
             task, self.memory, environments=environments, seed=seed, trials=episodes, period=period
         )
@@ -116,7 +114,6 @@ class Batch:
 
     @property
     def measured(self) -> Measured:
-        """The measurements delivered last."""
         return self.simulation.measured
 
     def targets(self, action: Array) -> Array:
@@ -180,10 +177,6 @@ class Batch:
         left, right = self.memory.command[:, OFFSET][:, 2::3].T
         feed[:, 3] = self.memory.command[:, HEIGHT] + 0.5 * (left + right)
 
-    def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
-        """Make a rollout of some control steps."""
-        return roll(self, rollout_policy, steps)
-
     def finish(self, judgement: Judgement) -> None:
         """Writes the results of the step, and begins anew where an episode has ended."""
         memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
@@ -245,9 +238,6 @@ class Batch:
         layout.state.gather(sensed, seen[:, layout.observation], which)
         layout.extra.gather(truth, seen[:, layout.privileged], which)
         self.buffers["observation"][which] = seen
-
-    def __len__(self) -> int:
-        return self.n
 
     def drawn(self) -> dict[str, Array]:
         """Everything that was drawn for the current episodes, by name, (n,) or (n, k)."""

@@ -22,7 +22,6 @@ class Ending:
 
     @classmethod
     def none(cls, n: int) -> Self:
-        """Nothing ends."""
         return cls(*np.zeros((5, n), np.bool_))
 
     @property

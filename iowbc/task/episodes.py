@@ -44,7 +44,6 @@ class Episode:
     """A trial. Everything random in it follows from its seed, so that every policy meets the same trial."""
 
     scene: str
-    """Name of the scene."""
     seed: int
     """Seed of all that is drawn in the episode."""
     duration: float
@@ -65,20 +64,10 @@ class Episode:
             raise ValueError(f"an episode's seed is not negative, got {self.seed}")
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values, read back by `from_json`."""
-        return {
-            "scene": self.scene,
-            "seed": self.seed,
-            "duration": self.duration,
-            "fixed": dict(self.fixed),
-            "script": None if self.script is None else self.script.as_json(),
-            "push": None if self.push is None else asdict(self.push),
-            "pull": None if self.pull is None else asdict(self.pull),
-        }
+        return asdict(self) | {"script": None if self.script is None else self.script.as_json()}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> "Episode":
-        """Inverse of `as_json`."""
         push, pull = values["push"], values.get("pull")
         script = None if values["script"] is None else CommandScript.from_json(values["script"])
         return cls(

@@ -14,7 +14,7 @@ from iowbc.control.sensors import Measured
 from iowbc.robot.description import Robot
 from iowbc.task.commands.commander import Commander
 from iowbc.task.commands.script import CommandScript
-from iowbc.task.memory import Memory
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.specification import Specification
 
 
@@ -48,7 +48,7 @@ class Guidance:
         self._support, self._arms = as_slice(robot.support), as_slice(robot.interaction)
         self._joints, self._scale = len(robot.joints), action_scale(robot, task.action)
 
-    def start(self, which: Indices, memory: Memory, key: Keys) -> tuple[Array, Array]:
+    def start(self, which: Indices, memory: EpisodeState, key: Keys) -> tuple[Array, Array]:
         """Begins new episodes with keys (k,): joints (k, joints) and pitch of the base (k,) to start in [rad]."""
         self.commander.start(which, memory, key)
         command = memory.command[which]
@@ -62,7 +62,7 @@ class Guidance:
         joints[:, self._support], joints[:, self._arms] = posture, arms
         return joints, self.references.start_pitch(posture, command)
 
-    def advance(self, memory: Memory, key: Keys, measured: Measured) -> None:
+    def advance(self, memory: EpisodeState, key: Keys, measured: Measured) -> None:
         """Command, references and gait clock of the step to come; keys of the episodes, (n,)."""
         period = self._period
         height = memory.command[:, HEIGHT].copy()
@@ -79,11 +79,11 @@ class Guidance:
         memory.phase[:], memory.stepping[:], memory.foothold[:] = phase, stepping, foothold
         memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, foothold)
 
-    def turn(self, memory: Memory) -> None:
+    def turn(self, memory: EpisodeState) -> None:
         """Turns the heading reference by the yaw rate that was commanded in the step just made."""
         memory.heading_reference += memory.command[:, YAW_RATE] * self._period
 
-    def targets(self, memory: Memory, action: Array) -> Array:
+    def targets(self, memory: EpisodeState, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]: θ_S_ref + scale·a, θ_I_ref.
 
         The action is within its bounds.
@@ -96,7 +96,7 @@ class Guidance:
         )
         return target
 
-    def object_place(self, memory: Memory) -> Array:
+    def object_place(self, memory: EpisodeState) -> Array:
         """Where a held object belongs, from the base, heading frame, (n, 3) [m]: it follows the wrist targets."""
         wrists = self.references.wrists(memory.command, self.grasp)
         return 0.5 * (wrists[:, 0] + wrists[:, 1]) + memory.object_place

@@ -9,12 +9,13 @@ from iowbc.arrays import Array, Indices, Mask
 from iowbc.control import gait
 from iowbc.control.command import PITCH, YAW_RATE
 from iowbc.recipe.recipe import Recipe
+from iowbc.robot.rotations import wrapped
 from iowbc.sim.state import SimulationState
 from iowbc.task.curriculum import LOCOMOTION, OWN_RANGES
 from iowbc.task.endings import Ending, dropped, fallen, lagging, lost
-from iowbc.task.memory import Memory
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.motion import Motion, low_pass, motion
-from iowbc.task.progress import follow, heading_error
+from iowbc.task.progress import follow
 from iowbc.task.rewards.reward import RewardFunction, Scored
 from iowbc.task.rewards.table import Step
 from iowbc.task.yielding import Admittance, excess_force
@@ -57,13 +58,12 @@ class Judge:
         self._velocity = np.zeros((len(holding), 3))
 
     def motion(self, state: SimulationState) -> Motion:
-        """The motion in a simulation state."""
         return motion(state, self._height)
 
     def judge(
         self,
         state: SimulationState,
-        memory: Memory,
+        memory: EpisodeState,
         action: Array,
         *,
         place: Array,
@@ -76,10 +76,8 @@ class Judge:
         `resistance`: of a crate's wheels, (n,) [N].
         """
         moved = self.motion(state)
-        self._filter(memory, moved)
-        if not self._admittance.idle:
-            self._feel(memory, moved, np.where(memory.infeasible, 0.0, resistance * (1.0 - state.partner_share)))
-        error = heading_error(moved, memory)
+        self._filter(memory, moved, resistance * (1.0 - state.partner_share))
+        error = wrapped(moved.heading - memory.heading_reference)
         target = self._admittance.velocity(memory.command[:, :YAW_RATE], memory.excess_force)
         follow(memory, target, error, disturbed, self._task.termination, self._period)
         pushed = state.has_object & ~self._holding
@@ -113,20 +111,19 @@ class Judge:
         scored = self._reward(step, ending.diverged, memory.played[:, LOCOMOTION])
         return Judgement(moved, ending, scored, memory.command.copy(), error)
 
-    def _filter(self, memory: Memory, moved: Motion) -> None:
+    def _filter(self, memory: EpisodeState, moved: Motion, resistance: Array) -> None:
+        """Velocities, and the force on the hands beyond the robot's share of a crate's `resistance` (n,) [N]."""
         self._velocity[:, :YAW_RATE] = moved.system_velocity[:, :YAW_RATE]
         self._velocity[:, YAW_RATE] = moved.yaw_rate
         time_constant = self._task.reward.sync.filter_time
         memory.filtered_velocity[:] = low_pass(memory.filtered_velocity, self._velocity, time_constant, self._period)
-
-    def _feel(self, memory: Memory, moved: Motion, needed: Array) -> None:
-        """Filters the force on the hands beyond what they need to overcome along the command, (n,) [N]."""
-        force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
-        time_constant = self._task.reward.sync.filter_time
-        memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
+        if not self._admittance.idle:
+            needed = np.where(memory.infeasible, 0.0, resistance)
+            force = excess_force(moved.hand_force, memory.command[:, :YAW_RATE], needed)
+            memory.excess_force[:] = low_pass(memory.excess_force, force, time_constant, self._period)
 
     def _ending(
-        self, state: SimulationState, memory: Memory, moved: Motion, place: Array, heading_error: Array, pushed: Mask
+        self, state: SimulationState, memory: EpisodeState, moved: Motion, place: Array, error: Array, pushed: Mask
     ) -> Ending:
         termination, diverged = self._task.termination, state.diverged.copy()
         followable = ~pushed & (memory.played[:, LOCOMOTION] <= OWN_RANGES) & self._training
@@ -134,7 +131,7 @@ class Judge:
         return Ending(
             fallen=fallen(moved, memory.command[:, PITCH], termination) & ~diverged,
             dropped=(dropped(moved, place, self._holding, state.grasped, termination) | left) & ~diverged,
-            lagging=lagging(memory.lag, heading_error, followable, termination) & ~diverged,
+            lagging=lagging(memory.lag, error, followable, termination) & ~diverged,
             time_limit=memory.steps >= memory.limit,
             diverged=diverged,
         )

@@ -35,7 +35,6 @@ class FullLayout:
 
     @cached_property
     def size(self) -> int:
-        """Length of the row."""
         return self.state.size + self.extra.size
 
     @cached_property
@@ -44,7 +43,6 @@ class FullLayout:
         return side_by_side((self.state.mirror, self.extra.mirror))
 
     def describe(self) -> dict[str, list[dict[str, Any]]]:
-        """Both parts, for JSON."""
         return {"observation": self.state.describe(), "privileged": self.extra.describe()}
 
     @cached_property

@@ -7,10 +7,8 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.robot import rotations
+from iowbc.robot.rotations import TINY
 from iowbc.sim.state import SimulationState
-
-UPRIGHT = 1e-9
-"""Keeps a base that points straight up or down from dividing by zero."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") 
 def to_heading(rotation: Array, vectors: Array) -> None:
     """Turns world vectors (n, k, 3) in place into the heading frame of bases with these rotations (n, 3, 3)."""
     forward = rotation[:, :2, 0]
-    cosine, sine = (forward / np.maximum(np.hypot(forward[:, 0], forward[:, 1]), UPRIGHT)[:, None]).T[..., None]
+    cosine, sine = (forward / np.maximum(np.hypot(forward[:, 0], forward[:, 1]), TINY)[:, None]).T[..., None]
     x, y = vectors[..., 0], vectors[..., 1]
     ahead = cosine * x
     ahead += sine * y

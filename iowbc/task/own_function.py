@@ -15,7 +15,7 @@ from iowbc.recipe.beside import ModuleFile, OwnFunction
 
 Source = TypeVar("Source")
 """What a function takes."""
-Shape = tuple[int | None, ...]
+ArrayShape = tuple[int | None, ...]
 """Of an array; None where any length will do."""
 LARGEST = float(np.finfo(np.float32).max)
 """Observations and rewards are float32, in which more is infinite."""
@@ -32,7 +32,7 @@ class Held(Generic[Source]):
     file: ModuleFile
     function: Callable[[Source], Any]
 
-    def __call__(self, source: Source, *shapes: Shape, excused: Mask | None = None) -> Array:
+    def __call__(self, source: Source, *shapes: ArrayShape, excused: Mask | None = None) -> Array:
         """Its values, of one of the shapes, (n, ...). `excused`: rows that need not be finite, (n,).
 
         Raises StageFailed where it raises, or returns something else.
@@ -74,7 +74,7 @@ def load_function(path: str, own: OwnFunction, contract: str) -> Held[Any]:
     return Held(f"{where}, function {own.function}", contract, own.module, function)
 
 
-def _fits(found: tuple[int, ...], shape: Shape) -> bool:
+def _fits(found: tuple[int, ...], shape: ArrayShape) -> bool:
     return len(found) == len(shape) and all(wanted in (None, size) for size, wanted in zip(found, shape, strict=True))
 
 

@@ -23,7 +23,6 @@ class OwnValue:
     """The values of a part."""
 
     path: str
-    """In the recipe."""
     said: OwnPart
 
     @cached_property

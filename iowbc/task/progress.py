@@ -5,23 +5,15 @@ import numpy as np
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import VELOCITY, YAW_RATE
 from iowbc.recipe.task.task import Termination
+from iowbc.robot.rotations import TINY
 from iowbc.task.curriculum import Course
 from iowbc.task.endings import Ending
-from iowbc.task.memory import Memory
-from iowbc.task.motion import Motion
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.rewards.terms import progress
-
-LEAST = 1e-9
-"""Keeps an episode that commanded nothing from dividing by zero [m]."""
-
-
-def heading_error(moved: Motion, memory: Memory) -> Array:
-    """Heading less its reference, in [-π, π), (n,) [rad]."""
-    return np.mod(moved.heading - memory.heading_reference + np.pi, 2.0 * np.pi) - np.pi
 
 
 def follow(
-    memory: Memory, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
+    memory: EpisodeState, target: Array, error: Array, disturbed: Mask, termination: Termination, period: float
 ) -> None:
     """Takes the step just made, of `period` [s], into the sums; `target`: velocity asked for, heading frame, (n, 2)
     [m/s]; `error`: of the heading, (n,) [rad]."""
@@ -36,16 +28,16 @@ def follow(
     memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
 
 
-def course(memory: Memory, ending: Ending, period: float, blame: float) -> Course:
+def course(memory: EpisodeState, ending: Ending, period: float, blame: float) -> Course:
     """How the episodes went that end in this step; `blame`: time after a disturbance within which it counts [s]."""
     steps = np.maximum(memory.steps, 1)
-    moved = memory.commanded > LEAST
+    moved = memory.commanded > TINY
     return Course(
         survived=ending.truncated,
         progress_in_time=memory.steps / memory.limit,
         posture=memory.tracking.min(axis=1) / steps,
         walked=memory.walked * period,
-        covered=np.where(moved, memory.covered / np.maximum(memory.commanded, LEAST), 1.0),
+        covered=np.where(moved, memory.covered / np.maximum(memory.commanded, TINY), 1.0),
         heading=memory.heading_error / steps,
         infeasible=memory.infeasible.copy(),
         stepping=memory.stepping.copy(),

@@ -11,8 +11,8 @@ from iowbc.arrays import Array, Indices, Keys, Mask
 from iowbc.recipe.task.task import Task
 from iowbc.task.curriculum import difficulty, initial_levels, next_levels, played_levels
 from iowbc.task.endings import Ending
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.episodes import Episode
-from iowbc.task.memory import Memory
 from iowbc.task.progress import course
 
 
@@ -22,7 +22,7 @@ class Schedule:
     def __init__(
         self,
         task: Task,
-        memory: Memory,
+        memory: EpisodeState,
         *,
         environments: NDArray[np.int64],
         seed: int,

@@ -14,7 +14,6 @@ class Specification:
 
     recipe: Recipe
     robot: Path
-    """Folder of the robot's description."""
     rg: Path | None = None
     """Folder of the fitted reference generator; without one θ_S_ref is the default posture."""
     drake: Drake | None = None

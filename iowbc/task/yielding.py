@@ -4,9 +4,7 @@ import numpy as np
 
 from iowbc.arrays import Array, Mask
 from iowbc.recipe.task.reward import Yielding
-
-SLOW = 1e-6
-"""Keeps a command to stand from dividing by zero [m/s]."""
+from iowbc.task.rewards.terms import SLOW
 
 
 def excess_force(hand_force: Array, command: Array, needed: Array) -> Array:

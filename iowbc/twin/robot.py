@@ -96,7 +96,6 @@ class Twin:
         self._command, self._silent = message, 0
 
     def step(self) -> None:
-        """A period of the bus."""
         motors = self._command["motor_cmd"][: len(self.robot.joints)]
         enabled = motors["mode"] == 1
         kp, kd = (np.where(enabled, motors[name], 0.0).astype(np.float64) for name in ("kp", "kd"))
@@ -136,12 +135,10 @@ class Twin:
 
     @property
     def state(self) -> Record:
-        """The state that the robot sends."""
         return low_state(round(1e3 * self.time), self.simulation.measured, self.simulation.state.joint_torque[0])
 
     @property
     def battery(self) -> Record:
-        """The battery state that the robot sends."""
         message = messages.empty(messages.BATTERY_STATE)
         message["soc"] = CHARGE
         return message

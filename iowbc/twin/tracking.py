@@ -29,5 +29,4 @@ class ObjectTracking:
             self._socket.sendto(json.dumps({"seen": seen}).encode(), self._address)
 
     def close(self) -> None:
-        """Closes the socket."""
         self._socket.close()

@@ -27,7 +27,7 @@ def legend(axes: Any) -> list[str]:
 
 def test_the_comparison_with_optimal_control_shows_every_sample_and_its_limit() -> None:
     differences = np.r_[np.linspace(0.001, 0.01, 599), 0.3]
-    (axes,) = figures.crosscheck_figure(MethodComparison(differences, len(differences), {}, []), 0.02).axes
+    (axes,) = figures.crosscheck_figure(MethodComparison(differences, {}, []), 0.02).axes
     assert sum(bar.get_height() for bar in axes.patches) == 600, "also the one far beyond the limit"
     assert "600 samples" in axes.get_title()
     (line,) = [line for line in axes.lines if line.get_linestyle() == "--"]

@@ -63,9 +63,7 @@ def test_the_object_is_handed_over_without_an_arrow_of_a_disturbance(start, calm
 
 
 def _arrows(renderer, kind):
-    colours = np.array(
-        [renderer._offscreen.scene.geoms[index].rgba for index in range(renderer._offscreen.scene.ngeom)]
-    )
+    colours = np.array([renderer.scene.geoms[index].rgba for index in range(renderer.scene.ngeom)])
     return int(np.sum(np.all(np.isclose(colours, COLOURS[kind]), axis=1)))
 
 

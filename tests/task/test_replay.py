@@ -8,7 +8,7 @@ from changes import changed
 
 from iowbc.recipe.recipe import Recipe
 from iowbc.task.endings import Ending
-from iowbc.task.memory import Memory
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.schedule import Schedule
 
 COUNT = 3
@@ -19,7 +19,7 @@ EVERY = np.arange(COUNT)
 def schedule(recipe: Recipe):
     def make(replay: float) -> Schedule:
         task = changed(recipe, "task.curriculum.replay", replay).task
-        memory = Memory.blank(COUNT, 14, 15)
+        memory = EpisodeState.blank(COUNT, 14, 15)
         return Schedule(task, memory, environments=EVERY, seed=0, trials=None, period=0.02)
 
     return make

@@ -28,7 +28,6 @@ class FitData:
     jacobian: Array
 
     def take(self, which: Array) -> "FitData":
-        """Some of the samples."""
         return FitData(self.inputs[which], self.outputs[which], self.jacobian[which])
 
 

@@ -21,7 +21,6 @@ class Verdict:
     gates: dict[str, dict[str, float | bool | None]]
     """Value, limit and result of each gate."""
     failures: list[str]
-    """Each missed gate in words."""
     worst: list[str]
     """The worst held-out samples in words."""
 

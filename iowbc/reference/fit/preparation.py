@@ -56,11 +56,7 @@ def prepare(
             legs(dataset.support[train]),
             legs(jacobian[train]),
         )
-        learnt = FitData(
-            np.concatenate([learnt.inputs, image.inputs]),
-            np.concatenate([learnt.outputs, image.outputs]),
-            np.concatenate([learnt.jacobian, image.jacobian]),
-        )
+        learnt = FitData(*map(np.concatenate, zip(vars(learnt).values(), vars(image).values(), strict=True)))
     return Prepared(learnt, whole.take(validation), train, held_out, samples, kinematics)
 
 

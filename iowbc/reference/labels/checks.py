@@ -21,7 +21,6 @@ class MethodComparison:
 
     difference: Array
     """Largest joint difference of each sample, shape (n,) [rad]."""
-    count: int
     metrics: dict[str, float]
     worst: list[str]
 
@@ -52,7 +51,7 @@ def compare_methods(dataset: Dataset, again: Shard) -> MethodComparison | None:
         f"pitch {dataset.command[rows[i], 1]:+.3f} rad): {difference[i]:.4f} rad"
         for i in np.argsort(-difference)[:WORST]
     ]
-    return MethodComparison(difference, len(difference), metrics, worst)
+    return MethodComparison(difference, metrics, worst)
 
 
 def mirror_error(robot: Robot, plan: SamplePlan, dataset: Dataset) -> Array | None:

@@ -48,7 +48,6 @@ class Dataset:
         return len(self.index)
 
     def save(self, path: Path) -> None:
-        """Writes a compressed archive of plain arrays."""
         np.savez_compressed(path, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
 
     @classmethod

@@ -13,7 +13,7 @@ from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.soles import sole_limits, support_edges, support_margin
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import SupportModel, ground_forces
 from iowbc.robot.description import Robot
 from iowbc.robot.mjcf import Capsule
 
@@ -42,9 +42,6 @@ class LabelJudge:
         self.soles = [model.getFrameId(site) for site in robot.soles]
         self.torso, self.base = model.getFrameId(robot.torso), model.getFrameId(robot.base)
         self.effort = support.problem.effort_fraction * robot.effort
-        self.forces = pinocchio.StdVec_Force()
-        for _ in range(model.njoints):
-            self.forces.append(pinocchio.Force.Zero())
 
     def arms(self, sample: Sample) -> None:
         """Rejects arms that collide with each other or the trunk, before anything is solved; legs at their default."""
@@ -61,10 +58,7 @@ class LabelJudge:
         q = support.whole(posture.configuration, sample.arm)
         if not (np.isfinite(q).all() and np.isfinite(posture.wrench).all()):
             raise Rejected("not finite")
-        for sole, wrench in zip(self.soles, posture.wrench, strict=True):
-            frame = model.frames[sole]
-            self.forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(wrench))
-        torque = pinocchio.computeStaticTorque(model, data, q, self.forces).copy()
+        torque = pinocchio.computeStaticTorque(model, data, q, ground_forces(model, self.soles, posture.wrench)).copy()
         pinocchio.framesForwardKinematics(model, data, q)
         com = pinocchio.centerOfMass(model, data, q)
         errors = [place.actInv(data.oMf[sole]) for sole, place in zip(self.soles, support.stance, strict=True)]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.static import StaticMethod
 from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import load_robot
-
-if TYPE_CHECKING:
-    from iowbc.reference.labels.optimal_control import OptimalControlMethod
 
 
 class Solver(Protocol):
@@ -34,7 +31,6 @@ class LabelTask:
     """Description of a labeller, from which a worker process makes it."""
 
     robot: Path
-    """The robot's folder."""
     recipe: ReferenceGenerator
     seed: int
     method: Literal["static", "ocp"]
@@ -52,7 +48,12 @@ class Labeller:
         self.draw = SamplePlan(robot, recipe, task.seed).draw
         support = SupportModel(robot, recipe.problem)
         self.judge = LabelJudge(support, recipe.gates, recipe.height)
-        self.method = make_method(task.method, support, recipe)
+        if task.method == "ocp":  # crocoddyl is loaded only where it is used
+            from iowbc.reference.labels.optimal_control import OptimalControlMethod
+
+            self.method: StaticMethod | OptimalControlMethod = OptimalControlMethod(support, recipe)
+        else:
+            self.method = StaticMethod(support, recipe.height)
 
     def solve(self, index: int, sample: Sample) -> dict[str, Array]:
         """A label that passed every gate, as arrays named as in the dataset. Raises `Rejected`."""
@@ -68,14 +69,3 @@ class Labeller:
             "margin": np.asarray(evidence.margin),
             "reached": np.asarray(evidence.height),
         }
-
-
-def make_method(
-    name: Literal["static", "ocp"], support: SupportModel, recipe: ReferenceGenerator
-) -> "StaticMethod | OptimalControlMethod":
-    """The named way to find postures, whose `solve` raises `Rejected`; crocoddyl is loaded only where it is used."""
-    if name == "static":
-        return StaticMethod(support, recipe.height)
-    from iowbc.reference.labels.optimal_control import OptimalControlMethod
-
-    return OptimalControlMethod(support, recipe)

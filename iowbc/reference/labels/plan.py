@@ -53,7 +53,10 @@ class SamplePlan:
         wanted = np.array([self.group(int(index)) for index in indices], dtype=np.int64)
         sources = np.unique(wanted[wanted < self.original])
         if len(sources):
-            found = dict(zip(sources.tolist(), self._originals(self.unit[sources]), strict=True))
+            unit = self.unit[sources]
+            command = self._commands(unit)
+            drawn = map(Sample, self._arms(unit, command), command)
+            found = dict(zip(sources.tolist(), drawn, strict=True))
         return [self._one(int(index), int(source), found) for index, source in zip(indices, wanted, strict=True)]
 
     def _one(self, index: int, source: int, originals: dict[int, Sample]) -> Sample:
@@ -74,10 +77,6 @@ class SamplePlan:
         everywhere = np.repeat(place, len(self.pitches), axis=0)
         target = self.kinematics.into_torso(np.zeros((len(self.pitches), 3)), self.pitches, everywhere)
         return self.kinematics.solve(np.tile(self.rest, (len(self.pitches), 1)), target)
-
-    def _originals(self, unit: Array) -> list[Sample]:
-        command = self._commands(unit)
-        return [Sample(*pair) for pair in zip(self._arms(unit, command), command, strict=True)]
 
     def _commands(self, unit: Array) -> Array:
         """Height and pitch, shape (n, 2); some moved onto an edge."""

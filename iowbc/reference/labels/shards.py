@@ -32,7 +32,6 @@ def cut(indices: Sequence[int], size: int, folder: Path) -> tuple[list[list[int]
 
 
 def write_shard(path: Path, key: str, shard: Shard) -> None:
-    """Writes a shard as a checked file."""
     content = BytesIO()
     np.savez(
         content,

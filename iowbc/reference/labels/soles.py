@@ -19,7 +19,6 @@ class SoleLimits:
     """Limits of one flat sole: friction pyramid, centre of pressure in a rectangle, torsion, least load."""
 
     friction: float
-    """Friction coefficient."""
     half_length: float
     half_width: float
     """Half sides of the rectangle for the centre of pressure [m]."""

@@ -15,7 +15,7 @@ from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
 from iowbc.reference.labels.kinematic_start import PostureCost, cost_weights
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.soles import sole_limits
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import SupportModel, ground_forces
 from iowbc.robot.description import GRAVITY
 
 
@@ -56,7 +56,8 @@ class StaticMethod:
     ) -> tuple[PostureCost, Array, Array, Array, Array]:
         """At (q, wrench): cost without torques, joint torques and their rows, equality rows and error."""
         support, nv = self.support, self.velocities
-        by_position = pinocchio.computeStaticTorqueDerivatives(support.model, support.data, q, support.external(wrench))
+        forces = ground_forces(support.model, support.soles, wrench)
+        by_position = pinocchio.computeStaticTorqueDerivatives(support.model, support.data, q, forces)
         static = support.data.tau.copy()
         cost = PostureCost.at(support, self.height, q, sample, rest)
         soles = cost.equality

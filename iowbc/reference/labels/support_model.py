@@ -40,7 +40,6 @@ class SupportModel:
 
     @property
     def torso_joint(self) -> int:
-        """Index of the joint that moves the torso."""
         return int(self.model.frames[self.torso].parentJoint)
 
     def lock(self, sample: Sample) -> None:
@@ -79,15 +78,16 @@ class SupportModel:
         q[7 + waist] = np.clip(lean, self.lower[waist], self.upper[waist])
         return q
 
-    def external(self, wrench: Array) -> Any:
-        """Ground wrenches (2, 6) as pinocchio's list of forces in the joints' frames."""
-        forces = pinocchio.StdVec_Force()
-        for _ in range(self.model.njoints):
-            forces.append(pinocchio.Force.Zero())
-        for sole, values in zip(self.soles, wrench, strict=True):
-            frame = self.model.frames[sole]
-            forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))
-        return forces
+
+def ground_forces(model: Any, soles: list[int], wrench: Array) -> Any:
+    """Ground wrenches (2, 6) on a model's soles as pinocchio's list of forces in the joints' frames."""
+    forces = pinocchio.StdVec_Force()
+    for _ in range(model.njoints):
+        forces.append(pinocchio.Force.Zero())
+    for sole, values in zip(soles, wrench, strict=True):
+        frame = model.frames[sole]
+        forces[frame.parentJoint] = frame.placement.act(pinocchio.Force(values))
+    return forces
 
 
 def posture_weights(robot: Robot, problem: PostureProblem) -> Array:

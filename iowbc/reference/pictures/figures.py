@@ -64,7 +64,7 @@ def crosscheck_figure(check: MethodComparison, limit: float) -> Figure:
     figure, (axes,) = _figure(1, 1, 5.0, 3.4)
     said = (limit, "limit of the 90th percentile")
     histogram(axes, check.difference, "largest joint difference [rad]", said, everything=True)
-    axes.set_title(f"static labels against optimal control, {check.count} samples")
+    axes.set_title(f"static labels against optimal control, {len(check.difference)} samples")
     return figure
 
 
@@ -111,7 +111,6 @@ def gentle_figure(folder: Path, plan: SamplePlan, region: GentleRegion, held: Fe
 
 
 def learning_figure(folder: Path, training: Sequence[float], validation: Sequence[float]) -> None:
-    """Loss by epoch."""
     figure, (axes,) = _figure(1, 1, 5.0, 3.4)
     epochs = np.arange(1, len(training) + 1)
     axes.semilogy(epochs, training, color=SOFT, label="training")
@@ -145,7 +144,6 @@ def _on_grid(axes: Any, plan: SamplePlan, values: Array, colours: Any, top: floa
 
 
 def _outline(axes: Any, plan: SamplePlan, outline: FeasibleMap, label: str, style: str = "-") -> None:
-    """Draws a map over the grid."""
     pitch = np.concatenate([outline.pitch, outline.pitch[::-1], outline.pitch[:1]])
     height = np.concatenate([outline.low, outline.high[::-1], outline.low[:1]])
     axes.plot(pitch, height, color=WARM, linewidth=2, linestyle=style, label=label)

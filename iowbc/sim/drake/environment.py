@@ -8,26 +8,11 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import ModelInstanceIndex, PlanarJoint, QuaternionFloatingJoint
 
-from iowbc.arrays import Array, Indices, Mask
+from iowbc.arrays import Array, Mask
 from iowbc.recipe.evaluation.engine import Drake
 from iowbc.robot import rotations
 from iowbc.sim.drake.plant import Plant
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """What is given to Drake for one control period."""
-
-    targets: Array
-    """Of the joint controllers, (substeps, joints) [rad]."""
-    torque_range: Array
-    """Least and greatest torque of each motor, (joints, 2) [N·m]."""
-    applied: Array
-    """Force and torque on each body about its centre of mass, world frame, (bodies, 6) [N, N·m]."""
-    holds: Mask
-    """Grips that hold, (grips,)."""
-    resistance: float
-    """Rolling resistance of a crate [N]."""
+from iowbc.sim.model_index import ModelIndex
 
 
 @dataclass(frozen=True)
@@ -44,21 +29,10 @@ class Forces:
     """On the object in the last step from all it touches but the hands, (3,) [N]."""
 
 
-@dataclass(frozen=True)
-class Places:
-    """Bodies of the model."""
-
-    feet: Indices
-    """(2,)."""
-    hands: Indices
-    """(2,); without an object those of the wrists."""
-    object: int | None
-
-
-class Environment:
+class DrakeEnvironment:
     """A plant with its state and inputs."""
 
-    def __init__(self, model: Any, settings: Drake, places: Places, *, implicit: bool, yaw_arm: float) -> None:
+    def __init__(self, model: Any, settings: Drake, layout: ModelIndex, *, implicit: bool, yaw_arm: float) -> None:
         """`implicit`: the damping of the joint control is solved for in each step; `yaw_arm`: see
         `iowbc.recipe.simulation.scene.Scene` [m]."""
         self._model, self._implicit = model, implicit
@@ -72,11 +46,12 @@ class Environment:
         brakes.FixValue(context, np.zeros(brakes.size()))
         self._torques = np.zeros(tree.num_actuators())
         self._actuation = tree.get_actuation_input_port().FixValue(context, self._torques)
-        self._feet = {int(plant.bodies[body].index()): side for side, body in enumerate(places.feet)}
-        hands = places.hands if places.object is not None else ()
+        bodies = np.arange(model.nbody)
+        self._feet = {int(plant.bodies[body].index()): side for side, body in enumerate(bodies[layout.feet])}
+        hands = bodies[layout.hands] if layout.object is not None else ()
         self._hands = [(int(plant.joints[body].index()), plant.bodies[body]) for body in hands]
         self._hand_bodies = {int(hand.index()) for _, hand in self._hands}
-        self._object = None if places.object is None else int(plant.bodies[places.object].index())
+        self._object = None if layout.object is None else int(plant.bodies[layout.object].index())
         self._crate = next((joint for joint in plant.joints if isinstance(joint, PlanarJoint)), None)
         self._kp, self._kd = model.actuator_gainprm[:, 0].copy(), -model.actuator_biasprm[:, 2]
         self._passive = np.array([joint.default_damping() for joint in plant.motors])
@@ -112,7 +87,6 @@ class Environment:
         self.tree.SetVelocities(self.context, turned[self._from_speed])
 
     def state(self) -> tuple[Array, Array]:
-        """Inverse of `set_state`."""
         position, speed = np.empty(len(self._from_position)), np.empty(len(self._from_speed))
         position[self._from_position] = self.tree.GetPositions(self.context)
         speed[self._from_speed] = self.tree.GetVelocities(self.context)
@@ -121,17 +95,19 @@ class Environment:
             speed[angular] = rotations.rotate_inverse(position[quaternion], speed[angular])
         return position, speed
 
-    def advance(self, inputs: Inputs) -> Forces:
-        """One control period from the state that is set."""
-        tree, context, substeps = self.tree, self.context, len(inputs.targets)
-        for grip, holds in zip(self.plant.grips, inputs.holds, strict=True):
+    def advance(self, targets: Array, torque_range: Array, applied: Array, held: Mask, resistance: float) -> Forces:
+        """One control period from the state that is set. `targets` of the joint controllers, (substeps, joints) [rad];
+        `torque_range` of each motor, (joints, 2) [N·m]; `applied`: force and torque on each body about its centre of
+        mass, world frame, (bodies, 6) [N, N·m]; `held`: grips that hold; `resistance`: of a crate's wheels [N]."""
+        tree, context, substeps = self.tree, self.context, len(targets)
+        for grip, holds in zip(self.plant.grips, held, strict=True):
             tree.SetConstraintActiveStatus(context, grip, bool(holds))
-        tree.get_applied_spatial_force_input_port().FixValue(context, self._applied(inputs.applied))
+        tree.get_applied_spatial_force_input_port().FixValue(context, self._applied(applied))
         feet, hands, thing = np.zeros((2, substeps, 6)), np.zeros((2, substeps, 3)), np.zeros(3)
-        for step, target in enumerate(inputs.targets):
-            torque = self._drive(target, inputs.torque_range)
+        for step, target in enumerate(targets):
+            torque = self._drive(target, torque_range)
             if self._crate is not None:
-                self._brake(self._crate, inputs.resistance)
+                self._brake(self._crate, resistance)
             self.plant.diagram.ExecuteForcedEvents(self._root)
             thing = self._touch(feet[:, step])
             self._hold(hands[:, step])

@@ -144,7 +144,8 @@ class Plant:
             properties=properties,
         )
         properties.AddProperty("material", "relaxation_time", settings.relaxation)
-        place = _pose(model.geom_pos[geom], model.geom_quat[geom]) @ _below(model, geom)
+        below = -0.5 * GROUND * (model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE)  # the upper side of a cube
+        place = _pose(model.geom_pos[geom], model.geom_quat[geom]) @ RigidTransform([0.0, 0.0, below])
         body, shape = self.bodies[model.geom_bodyid[geom]], _shape(model, geom)
         return [
             self.tree.RegisterCollisionGeometry(
@@ -183,12 +184,6 @@ def _exclude(model: Any, scene_graph: Any, shapes: list[list[Any]]) -> None:
 def _inertia(model: Any, body: int) -> Any:
     central = RotationalInertia(*model.body_inertia[body]).ReExpress(_rotation(model.body_iquat[body]))
     return SpatialInertia.MakeFromCentralInertia(float(model.body_mass[body]), model.body_ipos[body], central)
-
-
-def _below(model: Any, geom: int) -> Any:
-    """From a geom to the centre of its shape: the ground is the upper side of a cube."""
-    plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
-    return RigidTransform([0.0, 0.0, -0.5 * GROUND * plane])
 
 
 def _shape(model: Any, geom: int) -> Any:

@@ -10,7 +10,7 @@ from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.sim.drake.environment import Environment, Inputs, Places
+from iowbc.sim.drake.environment import DrakeEnvironment
 from iowbc.sim.period import Period
 from iowbc.sim.soles import Soles
 from iowbc.sim.timing import Timing
@@ -27,9 +27,7 @@ class DrakeWorld(World):
         super().__init__(robot, physics, scene, rows, timing)
         self._settings = settings
         self._steps = Timing(timing.period, settings.timestep, timing.longest_latency)
-        bodies, layout = np.arange(self.model.nbody), self.layout
-        self._places = Places(bodies[layout.feet], bodies[layout.hands], layout.object)
-        self._environments: list[Environment] = []
+        self._environments: list[DrakeEnvironment] = []
         n = len(rows)
         self._lag = np.zeros(n, np.intp)
         """Physics steps by which the motors follow their targets late, (n,)."""
@@ -45,23 +43,21 @@ class DrakeWorld(World):
         """Makes the plants of some environments from their models."""
         self._environments += [None] * (len(self.rows) - len(self._environments))  # type: ignore[list-item]
         for index in ids:
-            self._environments[index] = Environment(
+            self._environments[index] = DrakeEnvironment(
                 self.batch.get_model(index),
                 self._settings,
-                self._places,
+                self.layout,
                 implicit=self.physics.pd == "implicit",
                 yaw_arm=self.scene.yaw_arm,
             )
 
     def reset(self, ids: Indices, joint_position: Array, pitch: Array, yaw: Array, drawn: Mapping[str, Array]) -> None:
-        """See `World`."""
         super().reset(ids, joint_position, pitch, yaw, drawn)
         self._lag[ids] = np.round(drawn["action_latency"] * self._steps.substeps)
         self._targets[ids] = self.control[ids, None]
         self._build(ids)
 
     def restore(self, values: Mapping[str, Array]) -> None:
-        """See `World`."""
         super().restore(values)
         self._build(np.arange(len(self.rows)))
 
@@ -70,22 +66,20 @@ class DrakeWorld(World):
         targets[:, :-substeps] = targets[:, substeps:]
         targets[:, -substeps:] = self.control[:, None]
         for index, environment in enumerate(self._environments):
-            last = targets.shape[1] - self._lag[index]
-            inputs = Inputs(
-                targets=targets[index, last - substeps : last],
-                torque_range=given.effort[index],
-                applied=self._applied[index],
-                holds=self._connected[index] > 0.5,
-                resistance=float(given.resistance[index]),
-            )
             if not diverged[index]:
-                diverged[index] = not self._step_one(index, environment, inputs)
+                diverged[index] = not self._step_one(index, environment, given)
 
-    def _step_one(self, index: int, environment: Environment, inputs: Inputs) -> bool:
+    def _step_one(self, index: int, environment: DrakeEnvironment, given: Period) -> bool:
         """Whether Drake found a solution in each step of the period."""
+        last, applied, held = (
+            self._targets.shape[1] - self._lag[index],
+            self._applied[index],
+            self._connected[index] > 0.5,
+        )
+        targets = self._targets[index, last - self._steps.substeps : last]
         environment.set_state(self.qpos[index], self.qvel[index])
         try:
-            forces = environment.advance(inputs)
+            forces = environment.advance(targets, given.effort[index], applied, held, float(given.resistance[index]))
         except RuntimeError:
             return False
         self.qpos[index], self.qvel[index] = environment.state()
@@ -96,9 +90,7 @@ class DrakeWorld(World):
         if self.layout.object is not None:
             external[HANDS, 3:] = forces.hands[:, -1]
             self._past_forces[index, :, 0] = _greatest(forces.hands)
-            external[THING, 3:] = (
-                forces.object + inputs.applied[self.layout.object, :3] - forces.hands[:, -1].sum(axis=0)
-            )
+            external[THING, 3:] = forces.object + applied[self.layout.object, :3] - forces.hands[:, -1].sum(axis=0)
         return True
 
     def _look(self) -> None:

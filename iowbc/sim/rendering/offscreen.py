@@ -2,7 +2,6 @@
 
 import weakref
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 import mujoco
@@ -51,14 +50,11 @@ class Offscreen:
         return self._image[::-1].copy()
 
     def close(self) -> None:
-        """Frees the graphics memory."""
         self._pictures.free()
         self._finalizer()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()

@@ -1,8 +1,6 @@
 """Pictures of an environment: a camera that follows the robot, and arrows for the forces."""
 
 from itertools import pairwise
-from types import TracebackType
-from typing import Self
 
 import mujoco
 import numpy as np
@@ -17,7 +15,7 @@ LINE_RADIUS = 0.012
 """Of lines on the ground [m]."""
 
 
-class SceneRenderer:
+class SceneRenderer(Offscreen):
     """Draws one environment of a simulation. Use as a context manager, or `close` it."""
 
     def __init__(
@@ -32,27 +30,20 @@ class SceneRenderer:
         elevation: float = -12.0,
         forces: bool = True,
     ) -> None:
-        """`distance` [m], `azimuth` (of the view, from the world's x axis), `elevation` [degrees] of the camera."""
+        """See `Offscreen`; with `forces`, arrows are drawn for them."""
         self._simulation, self._env, self._forces = simulation, env, forces
         self._appearance = Appearance(simulation, env)
-        self._offscreen = Offscreen(
-            self._appearance.model,
-            width=width,
-            height=height,
-            distance=distance,
-            azimuth=azimuth,
-            elevation=elevation,
-        )
+        view = {"distance": distance, "azimuth": azimuth, "elevation": elevation}
+        super().__init__(self._appearance.model, width=width, height=height, **view)
         self.lines: list[tuple[Array, tuple[float, ...]]] = []
         """Lines to draw beside: points (k, 3) [m] and a colour (red, green, blue, opacity) each."""
-        self.camera = self._offscreen.camera
         self.camera.lookat[:] = self._aim()
 
     def frame(self) -> Image:
         """The environment as it is now, (height, width, 3)."""
         data = self._appearance.update()
         self.camera.lookat[:] += 0.1 * (self._aim() - self.camera.lookat)
-        return self._offscreen.draw(data, self._draw_beside)
+        return self.draw(data, self._draw_beside)
 
     def _aim(self) -> Array:
         """Between the ground and the pelvis, on the side of the object."""
@@ -72,22 +63,10 @@ class SceneRenderer:
 
     def _connect(self, kind: int, radius: float, start: Array, end: Array, colour: tuple[float, ...]) -> None:
         """Draws an arrow or a capsule between two points, (3,) [m], where there is room for it."""
-        scene = self._offscreen.scene
+        scene = self.scene
         if scene.ngeom >= scene.maxgeom:
             return
         geom = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32))
         mujoco.mjv_connector(geom, kind, radius, start, end)
         scene.ngeom += 1
-
-    def close(self) -> None:
-        """Frees the graphics memory."""
-        self._offscreen.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -12,7 +12,7 @@ from iowbc.recipe.task.task import Task
 from iowbc.task.commands.drawing import draw_goals, draw_holding_time, interpolate
 from iowbc.task.commands.script import CommandScript
 from iowbc.task.curriculum import difficulty
-from iowbc.task.memory import Memory
+from iowbc.task.episode_state import EpisodeState
 
 
 class Commander:
@@ -44,7 +44,7 @@ class Commander:
         self._given = wanted
         self.scripted[:], self._drawn[:], self._any_script = True, False, True
 
-    def start(self, which: Indices, memory: Memory, key: Keys) -> None:
+    def start(self, which: Indices, memory: EpisodeState, key: Keys) -> None:
         """First goals of new episodes; `key` (k,). A drawn episode starts standing, in its posture where it can,
         or with an object in the hands on the way to it."""
         memory.draws[which] = 0
@@ -59,7 +59,7 @@ class Commander:
                 command[:, VELOCITY] = 0.0
         memory.command[which] = self._references.clamp(command)
 
-    def advance(self, memory: Memory, key: Keys) -> None:
+    def advance(self, memory: EpisodeState, key: Keys) -> None:
         """Goals and commands of the next control step; `key` of the episodes, (n,)."""
         due = np.flatnonzero((memory.steps >= memory.goal_until) & self._drawn)
         if len(due):
@@ -68,7 +68,7 @@ class Commander:
             memory.goal[self.scripted] = self._scripted(memory)[self.scripted]
         memory.command[...] = self._references.clamp(approach(memory.command, memory.goal, self._largest_step))
 
-    def _draw(self, which: Indices, memory: Memory, key: Keys) -> None:
+    def _draw(self, which: Indices, memory: EpisodeState, key: Keys) -> None:
         drawn = random.absorb(key, memory.draws[which])
         hardness = difficulty(self._curriculum, memory.played[which])
         memory.goal[which] = draw_goals(
@@ -78,7 +78,7 @@ class Commander:
         memory.goal_until[which] = memory.steps[which] + np.ceil(held / self._period).astype(np.int64)
         memory.draws[which] += 1
 
-    def _scripted(self, memory: Memory) -> Array:
+    def _scripted(self, memory: EpisodeState) -> Array:
         if self._given is not None:
             return np.broadcast_to(self._given, memory.goal.shape)
         return interpolate(self._times, self._values, memory.steps * self._period)

@@ -62,12 +62,10 @@ class CommandScript:
         return np.array(times), np.array(values)
 
     def as_json(self) -> list[dict[str, Any]]:
-        """Plain lists and numbers, read back by `from_json`."""
         return [{"duration": s.duration, "ramp": s.ramp, "command": list(s.command)} for s in self.segments]
 
     @classmethod
     def from_json(cls, segments: Sequence[Mapping[str, Any]]) -> "CommandScript":
-        """Inverse of `as_json`."""
         return cls(
             tuple(
                 CommandSegment(float(s["duration"]), tuple(map(float, s["command"])), float(s["ramp"]))

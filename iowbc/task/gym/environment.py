@@ -86,7 +86,6 @@ class Environment(gymnasium.Env[Observation, Observation]):  # type: ignore[misc
         return self._renderer.frame()
 
     def close(self) -> None:
-        """Frees the renderer."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None

@@ -12,8 +12,8 @@ from iowbc.sim.divergence import Divergence
 from iowbc.sim.simulation import Simulation
 from iowbc.sim.state import SimulationState
 from iowbc.task.endings import Ending
+from iowbc.task.episode_state import EpisodeState
 from iowbc.task.judge import Judgement
-from iowbc.task.memory import Memory
 from iowbc.task.motion import Motion
 from iowbc.task.record.signals import ACTION_SIGNAL, COUNTERS, ERRORS, KINDS, REASONS
 from iowbc.task.rewards import terms
@@ -37,7 +37,7 @@ def keep_divergences(divergences: deque[Divergence], folder: Path | None) -> Non
 
 
 def write_signals(
-    buffers: Buffers, state: SimulationState, moved: Motion, memory: Memory, ending: Ending, period: float
+    buffers: Buffers, state: SimulationState, moved: Motion, memory: EpisodeState, ending: Ending, period: float
 ) -> None:
     """The signals of the step just made, of `period` [s]; see `iowbc.task.record.signals.SIGNALS`."""
     command = memory.command
@@ -93,8 +93,7 @@ def write_trial_signals(buffers: Buffers, simulation: Simulation, correction: Ar
         buffers[f"signal/{name}"][:] = columns
 
 
-def count_step(buffers: Buffers, judgement: Judgement, memory: Memory) -> None:
-    """Adds a step to the counters."""
+def count_step(buffers: Buffers, judgement: Judgement, memory: EpisodeState) -> None:
     counters, scored = buffers["counters"], judgement.scored
     buffers["terms"][:] += scored.terms
     counters[:, COLUMN["steps"]] += 1.0
@@ -126,7 +125,7 @@ def count_endings(buffers: Buffers, ending: Ending, causes: dict[str, Mask], whi
         counters[which, COLUMN[name]] += reasons[name][which]
 
 
-def count_pushes(buffers: Buffers, pushing: Mask, memory: Memory, which: NDArray[np.intp]) -> None:
+def count_pushes(buffers: Buffers, pushing: Mask, memory: EpisodeState, which: NDArray[np.intp]) -> None:
     """Adds the pushes that begin, (k,), to the counters, and the infeasible ones; `pushing`: scenes, (n,)."""
     counters = buffers["counters"]
     counters[which, COLUMN["pushes"]] += pushing[which]

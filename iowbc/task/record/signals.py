@@ -1,28 +1,17 @@
 """The signals and counters that an environment batch leaves for its parent each step."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from iowbc.task.vector.shared import Fields
 
-NO_SIGNALS: Mapping[str, int] = MappingProxyType({})
 SIGNALS = {
     "system_velocity": 3,
     "commanded_velocity": 3,
-    "heading": 1,
-    "heading_reference": 1,
-    "torso_pitch": 1,
-    "torso_pitch_command": 1,
-    "pelvis_height": 1,
-    "height_command": 1,
-    "saturation": 1,
+    **dict.fromkeys(("heading", "heading_reference", "torso_pitch", "torso_pitch_command"), 1),
+    **dict.fromkeys(("pelvis_height", "height_command", "saturation"), 1),
     "grip_force": 6,
     "partner_force": 3,
-    "slipped": 1,
-    "fallen": 1,
-    "dropped": 1,
-    "lagging": 1,
-    "diverged": 1,
+    **dict.fromkeys(("slipped", "fallen", "dropped", "lagging", "diverged"), 1),
     "base_position": 3,
     "power": 1,
     "phase": 1,
@@ -34,8 +23,7 @@ SIGNALS = {
 (v_x, v_y, ω) in the heading frame [m/s, rad/s], heading and its reference [rad], torso pitch [rad], height that H
 speaks of [m], saturated fraction of all joints, forces of left and right grip and of the partner in the world frame
 [N], flags, base position in the world frame [m], power [W], gait phase in [0, 1), feet in contact, curriculum
-levels,
-time in the episode [s]."""
+levels, time in the episode [s]."""
 
 TRIAL_SIGNALS = {
     "torso_position": 3,
@@ -85,7 +73,7 @@ def trial_signals(joints: int, support: int) -> dict[str, int]:
     return TRIAL_SIGNALS | dict.fromkeys(JOINT_SIGNALS, joints) | {ACTION_SIGNAL: support}
 
 
-def buffer_fields(observation: int, action: int, terms: int, extra: Mapping[str, int] = NO_SIGNALS) -> Fields:
+def buffer_fields(observation: int, action: int, terms: int, extra: Mapping[str, int]) -> Fields:
     """Everything that passes between a batch and its parent; `terms`: number of the reward's; `extra`: signals beside
     the usual ones, with sizes."""
     return {

@@ -7,7 +7,7 @@ from operator import attrgetter
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.task.reward import Kernel, Later, OwnTerm, Reward
+from iowbc.recipe.task.reward import Kernel, OwnTerm, Reward
 from iowbc.task.own_function import load_function
 from iowbc.task.rewards.table import ONCE, TERMS, TRACKED, Step, Term
 
@@ -95,13 +95,12 @@ class RewardFunction:
             terms[diverged] = 0.0
             terms[diverged, self._once] = 1.0
         tracking = terms[:, self._tracked]
-        terms *= self._weights if self._later is None else self._weights + self._taken_over(self._later, level)
+        weights, later = self._weights, self._later
+        if later is not None:
+            part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
+            weights = weights + part[:, None] * self._change
+        terms *= weights
         return Scored(reward=terms.sum(axis=1), terms=terms, tracking=tracking)
-
-    def _taken_over(self, later: Later, level: Array) -> Array:
-        """Change of the weights at levels (n,), (n, terms)."""
-        part = ((level - later.begin) / (later.end - later.begin)).clip(0.0, 1.0)
-        return part[:, None] * self._change
 
 
 def _weighted(column: int, function: Term, setting: float | Kernel, seconds: float) -> WeightedTerm:

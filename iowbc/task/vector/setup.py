@@ -23,7 +23,6 @@ class Setup:
 
     specification: Specification
     count: int
-    """Number of environments."""
     seed: int
     episodes: tuple[Episode, ...] | None = None
     """What each environment plays; without, episodes are drawn as in training."""
@@ -38,7 +37,6 @@ class Setup:
 
     @property
     def scenes(self) -> list[str]:
-        """Name of each environment's scene."""
         if self.episodes is not None:
             return [episode.scene for episode in self.episodes]
         return scene_of(self.count, self.specification.recipe.task.scenes)

@@ -29,7 +29,6 @@ class Buffers:
         return self.arrays[name]
 
     def rows(self, first: int, last: int) -> "Buffers":
-        """Views of the rows of some environments."""
         return Buffers({name: array[first:last] for name, array in self.arrays.items()})
 
 

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from iowbc.arrays import Array
 from iowbc.robot.description import load_robot
 from iowbc.rollouts.rollout_policies import RolloutPolicy
-from iowbc.rollouts.trajectories import Trajectories, side_by_side
+from iowbc.rollouts.trajectories import Trajectories, roll, side_by_side
 from iowbc.task.batch import Batch
 from iowbc.task.curriculum import AXES
 from iowbc.task.episodes import Episode
@@ -125,7 +125,7 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def roll(self, rollout_policy: RolloutPolicy, steps: int) -> Trajectories:
         """Make a rollout of some control steps, each group of environments where it is: one message to each worker
         and one back. What comes of it does not depend on the workers."""
-        messages = [Message.of(Batch.roll, rollout_policy.part(*group), steps) for group in self.workers.groups]
+        messages = [Message.of(roll, rollout_policy.part(*group), steps) for group in self.workers.groups]
         return side_by_side(self._call(messages))
 
     def _ending(self, index: int) -> dict[str, Any]:
@@ -186,7 +186,6 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         self._reset_seeds()
 
     def close(self) -> None:
-        """Ends the worker processes."""
         self.workers.close()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:

@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from typing import IO, Any, Concatenate, ParamSpec, Self
+from typing import Any, Concatenate, ParamSpec, Self
 
 from iowbc.errors import IowbcError
 from iowbc.processes import die_with_parent
@@ -61,11 +61,12 @@ def main() -> None:
     except (EOFError, BrokenPipeError, ConnectionResetError):
         pass
     finally:
-        _leave(connection, file)
+        connection.close()
+        file.flush()
+        os._exit(0)
 
 
 def _serve(connection: Connection, memory: int) -> None:
-    """Answers messages."""
     try:
         from iowbc.task.vector.shared import attach_shared
 
@@ -82,9 +83,3 @@ def _serve(connection: Connection, memory: int) -> None:
         connection.send((False, str(error)))
     except BaseException:
         connection.send((False, traceback.format_exc()))
-
-
-def _leave(connection: Connection, file: IO[str]) -> None:
-    connection.close()
-    file.flush()
-    os._exit(0)

@@ -132,7 +132,6 @@ class WorkerProcesses:
 
     @property
     def processes(self) -> list[int]:
-        """Process numbers of the workers."""
         return [process.popen.pid for process in self._processes]
 
     def ask(self, messages: Sequence[Message]) -> None:

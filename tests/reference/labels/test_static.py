@@ -14,7 +14,7 @@ from iowbc.recipe.generator import PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import SupportModel, posture_weights
+from iowbc.reference.labels.support_model import SupportModel, ground_forces, posture_weights
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import interaction_mirror, support_mirror
 
@@ -102,7 +102,8 @@ def cost(method: StaticMethod, support: SupportModel, sample: Sample, posture: P
     pinocchio.framesForwardKinematics(support.model, support.data, q)
     height = support.data.oMf[support.base].translation[2]
     turn = pinocchio.log3(sample.torso_rotation().T @ support.data.oMf[support.torso].rotation)
-    torque = pinocchio.computeStaticTorque(support.model, support.data, q, support.external(posture.wrench))[6:]
+    forces = ground_forces(support.model, support.soles, posture.wrench)
+    torque = pinocchio.computeStaticTorque(support.model, support.data, q, forces)[6:]
     rest = support.robot.default_position[support.robot.support]
     return float(
         problem.com_weight * (com[:2] @ com[:2])

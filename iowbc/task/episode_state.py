@@ -23,7 +23,7 @@ LONG_AGO = 1_000_000
 
 
 @dataclass
-class Memory:
+class EpisodeState:
     """State of the task, one row an environment; together with the simulation's it is the whole state."""
 
     episode: Array
@@ -99,7 +99,6 @@ class Memory:
 
     @classmethod
     def blank(cls, n: int, arms: int, support: int) -> Self:
-        """All zero."""
         kinds: dict[str, Any] = dict.fromkeys(COUNTERS, np.int64) | dict.fromkeys(FLAGS, np.bool_)
         kinds["failed_key"] = np.uint64
         widths = {"tracking": len(TRACKED), "foothold": 2, "filtered_velocity": 3, "excess_force": 2, "object_place": 3}
@@ -115,7 +114,6 @@ class Memory:
         self.undisturbed[which] = LONG_AGO
 
     def arrays(self) -> dict[str, Array]:
-        """Copies of all arrays, by name."""
         return {field.name: getattr(self, field.name).copy() for field in fields(self)}
 
     def restore(self, arrays: dict[str, Array]) -> None:
