@@ -88,9 +88,10 @@ class Chain(Constants):
         has one."""
         links = [_links(chain) for chain in chains]
         self.length = len(links[0])
-        self._axis = _by_hinge([[link.axis for link in chain] for chain in links])
-        self._offset = _by_hinge([[link.position for link in chain] for chain in links])
-        self._turn = _by_hinge([[link.turn() for link in chain] for chain in links])
+        self._axis, self._offset, self._turn = (
+            np.moveaxis(np.array([[link[part] for link in chain] for chain in links]), 0, -1)[..., None].copy()
+            for part in range(3)
+        )
 
     def frames(self, angle: Array, base: Array | None = None) -> Frames:
         """The hinges, for angles (hinges, chains, n) [rad]; `base` (3, 3, chains, n) turns the whole chain."""
@@ -117,28 +118,12 @@ class Chain(Constants):
         return self._turn[:, 0] + self._turn[:, 1] * xp.cos(by) + self._turn[:, 2] * xp.sin(by)
 
 
-def _by_hinge(values: Sequence[Sequence[Array]]) -> Array:
-    """Constants of each chain's hinges, (hinges, ..., chains, 1)."""
-    return np.moveaxis(np.array(values), 0, -1)[..., None].copy()
+def _links(chain: Sequence[Body]) -> list[tuple[Array, Array, Array]]:
+    """Of each hinge its axis, (3,), its position in the frame of the hinge before, (3,) [m], and matrices A, B, C,
+    (3, 3, 3): after the hinge the body is turned by A + B cos θ + C sin θ (Rodrigues).
 
-
-@dataclass(frozen=True)
-class _Link:
-    """A hinge and its place in the frame of the hinge before."""
-
-    axis: Array
-    position: Array
-    rotation: Array
-
-    def turn(self) -> Array:
-        """Matrices A, B, C, (3, 3, 3): after the hinge the body is turned by A + B cos θ + C sin θ (Rodrigues)."""
-        along = np.outer(self.axis, self.axis)
-        quarter = rotations.axis_matrix(self.axis, np.asarray(0.5 * np.pi))
-        return self.rotation @ np.stack([along, np.eye(3) - along, quarter - along])
-
-
-def _links(chain: Sequence[Body]) -> list[_Link]:
-    """The hinges of a chain. Raises ValueError where the last body has none."""
+    Raises ValueError where the last body has no hinge.
+    """
     if chain and chain[-1].hinge is None:
         raise ValueError(f"body {chain[-1].name!r} ends a joint chain but has no hinge; take the body it is fixed to")
     links, position, rotation = [], np.zeros(3), np.eye(3)
@@ -146,6 +131,8 @@ def _links(chain: Sequence[Body]) -> list[_Link]:
         position = position + rotation @ body.position
         rotation = rotation @ rotations.matrix(body.quaternion)
         if body.hinge is not None:
-            links.append(_Link(body.hinge.axis, position, rotation))
+            axis, along = body.hinge.axis, np.outer(body.hinge.axis, body.hinge.axis)
+            quarter = rotations.axis_matrix(axis, np.asarray(0.5 * np.pi))
+            links.append((axis, position, rotation @ np.stack([along, np.eye(3) - along, quarter - along])))
             position, rotation = np.zeros(3), np.eye(3)
     return links

@@ -5,9 +5,8 @@ arrays in simulation and torch tensors while the graph is exported, so it uses o
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from operator import attrgetter
 
 from iowbc.arrays import Array
 from iowbc.control.command import command_mirror
@@ -39,10 +38,6 @@ class Sensed:
     """θ_I_ref, (n, arm joints) [rad]."""
 
 
-def _measured(name: str) -> Callable[[Sensed], Any]:
-    return lambda sensed: getattr(sensed.measured, name)
-
-
 def joint_deviation(sensed: Sensed) -> Array:
     """Joint positions relative to their references, (n, joints) [rad]."""
     return sensed.measured.joint_position - sensed.joint_reference
@@ -61,23 +56,23 @@ def object_orientation(sensed: Sensed) -> Array:
 
 
 PROPRIOCEPTION: tuple[Part[Sensed], ...] = (
-    Part("command", command_mirror, "m/s, m/s, rad/s, m, rad, m x 6", "heading", lambda s: s.command),
-    Part("projected_gravity", polar_vector, "1", "base", _measured("projected_gravity")),
-    Part("base_angular_velocity", axial_vector, "rad/s", "base", _measured("base_angular_velocity")),
+    Part("command", command_mirror, "m/s, m/s, rad/s, m, rad, m x 6", "heading", attrgetter("command")),
+    Part("projected_gravity", polar_vector, "1", "base", attrgetter("measured.projected_gravity")),
+    Part("base_angular_velocity", axial_vector, "rad/s", "base", attrgetter("measured.base_angular_velocity")),
     Part("heading_error", turn, "rad", "world", heading_error),
     Part("joint_position", joint_mirror, "rad", "joint", joint_deviation),
-    Part("joint_velocity", joint_mirror, "rad/s", "joint", _measured("joint_velocity")),
-    Part("phase", phase_mirror, "1", "-", lambda s: s.phase),
-    Part("last_action", support_mirror, "action", "joint", lambda s: s.last_action),
-    Part("support_reference", support_mirror, "rad", "joint", lambda s: s.support_reference),
-    Part("arm_reference", interaction_mirror, "rad", "joint", lambda s: s.arm_reference),
+    Part("joint_velocity", joint_mirror, "rad/s", "joint", attrgetter("measured.joint_velocity")),
+    Part("phase", phase_mirror, "1", "-", attrgetter("phase")),
+    Part("last_action", support_mirror, "action", "joint", attrgetter("last_action")),
+    Part("support_reference", support_mirror, "rad", "joint", attrgetter("support_reference")),
+    Part("arm_reference", interaction_mirror, "rad", "joint", attrgetter("arm_reference")),
 )
 """Parts of s_t without the object, in order. Units are SI; scaling is the business of the learner's normalisation."""
 OBJECT: tuple[Part[Sensed], ...] = (
-    Part("object_position", polar_vector, "m", "base", _measured("object_position")),
+    Part("object_position", polar_vector, "m", "base", attrgetter("measured.object_position")),
     Part("object_orientation", axial_vector, "1", "base", object_orientation),
-    Part("object_linear_velocity", polar_vector, "m/s", "base", _measured("object_linear_velocity")),
-    Part("object_angular_velocity", axial_vector, "rad/s", "base", _measured("object_angular_velocity")),
+    Part("object_linear_velocity", polar_vector, "m/s", "base", attrgetter("measured.object_linear_velocity")),
+    Part("object_angular_velocity", axial_vector, "rad/s", "base", attrgetter("measured.object_angular_velocity")),
 )
 """Parts of s_t that describe the object."""
 

@@ -70,7 +70,9 @@ def joint_mirror(robot: Robot) -> MirrorMap:
 
     A hinge is an axial vector: reflection keeps a rotation about y and reverses one about x or z.
     """
-    permutation = np.array([robot.joints.index(_other_side(name)) for name in robot.joints])
+    other = {"left": "right", "right": "left"}
+    sides = [(other.get(side, side), rest) for side, *rest in (name.split("_") for name in robot.joints)]
+    permutation = np.array([robot.joints.index("_".join([side, *rest])) for side, rest in sides])
     leading = [int(np.argmax(np.abs(hinge.axis))) for hinge in robot.tree.hinges()]
     return MirrorMap(permutation, AXIAL_SIGN[leading])
 
@@ -95,11 +97,3 @@ def _restricted(whole: MirrorMap, branch: Indices) -> MirrorMap:
     place = {int(joint): index for index, joint in enumerate(branch)}
     permutation = np.array([place[int(whole.permutation[joint])] for joint in branch])
     return MirrorMap(permutation, whole.sign[branch])
-
-
-def _other_side(name: str) -> str:
-    if name.startswith("left_"):
-        return "right_" + name.removeprefix("left_")
-    if name.startswith("right_"):
-        return "left_" + name.removeprefix("right_")
-    return name

@@ -3,6 +3,7 @@
 import numpy as np
 
 from iowbc.arrays import Array, Indices
+from iowbc.sim.timing import require_latency
 
 
 class DelayLine:
@@ -22,12 +23,7 @@ class DelayLine:
 
     def set_latency(self, which: Indices, latency: Array) -> None:
         """Latencies of some environments, (k,) [periods]."""
-        longest = self._length - 2
-        if latency.max() > longest or latency.min() < 0.0:
-            worst = latency[np.argmax(np.abs(latency))]
-            raise ValueError(
-                f"a latency of {worst:g} periods is outside 0 to {longest}; see randomization.longest_latency"
-            )
+        require_latency(latency, self._length - 2)
         whole = np.floor(latency)
         self._whole[which], self._part[which, 0] = whole, latency - whole
         self._point(which)

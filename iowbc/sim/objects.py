@@ -40,11 +40,9 @@ def add_object(
     if thing is None:
         raise ValueError("a scene without an object has none to add")
     shape = measured(thing)
-    body = spec.worldbody.add_body(name="object", pos=[0.0, 0.0, CLEARANCE - shape.low[2]])
-    body.explicitinertial = True
-    body.mass = thing.mass
-    body.ipos = OFF_CENTRE
-    body.inertia, body.iquat = shape.principal * thing.mass, shape.turn
+    inertial = {"mass": thing.mass, "ipos": OFF_CENTRE, "inertia": shape.principal * thing.mass, "iquat": shape.turn}
+    place = [0.0, 0.0, CLEARANCE - shape.low[2]]
+    body = spec.worldbody.add_body(name="object", pos=place, explicitinertial=True, **inertial)
     by_contact = scene.kind == "push" or scene.grasp.kind == "contact"
     bits = {"contype": OBJECT_BIT if by_contact or touched else 0, "conaffinity": ground_bit}
     if thing.shape == "tyre":
@@ -73,10 +71,9 @@ def add_object(
 def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
     """The hands, each with a sensor of the force that passes through it, which keeps those of a control period."""
     for name, wrist, place in zip(HANDS, robot.wrist_bodies, robot.grip_offset, strict=True):
-        hand = spec.body(wrist).add_body(name=name, pos=place)
-        hand.explicitinertial = True
-        hand.mass, hand.inertia = WEIGHTLESS, [WEIGHTLESS] * 3
-        hand.add_site(name=name).group = 4
+        inertial = {"mass": WEIGHTLESS, "inertia": [WEIGHTLESS] * 3}
+        hand = spec.body(wrist).add_body(name=name, pos=place, explicitinertial=True, **inertial)
+        hand.add_site(name=name, group=4)
         spec.add_sensor(
             name=name,
             type=mujoco.mjtSensor.mjSENS_FORCE,
@@ -89,8 +86,7 @@ def _add_hands(spec: Any, robot: Robot, timing: Timing) -> None:
 def _add_grips(spec: Any, body: Any, scene: Scene) -> None:
     """A compliant point connection of each grip; its place on the object is set when that is put between the hands."""
     for side, hand, sign in (("left", HANDS[0], 1.0), ("right", HANDS[1], -1.0)):
-        site = body.add_site(name=f"object_{side}_grip", pos=[0.0, sign * 0.15, scene.grasp.height])
-        site.group = 4
+        site = body.add_site(name=f"object_{side}_grip", pos=[0.0, sign * 0.15, scene.grasp.height], group=4)
         spec.add_equality(
             name=f"{side}_grasp",
             type=mujoco.mjtEq.mjEQ_CONNECT,
@@ -147,8 +143,7 @@ def _add_wheels(spec: Any, body: Any, thing: Object, dressed: bool) -> None:
 
 
 def _add_ring(body: Any, thing: Object, bits: dict[str, int]) -> None:
-    size = measured(thing).size
-    outer = 0.25 * (size[1] + size[2])
+    outer = 0.5 * measured(thing).high[1:].sum()
     thickness = 0.5 * outer * (1.0 - HOLE)
     middle = outer - thickness
     angles = np.linspace(0.0, 2.0 * np.pi, RING_SEGMENTS + 1)

@@ -40,11 +40,6 @@ class Shape:
     faces: Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
     """Triangles, by the numbers of their vertices, (m, 3)."""
 
-    @property
-    def size(self) -> Array:
-        """Extent along the axes, (3,) [m]."""
-        return self.high - self.low
-
 
 @functools.cache
 def measured(thing: Object) -> Shape:

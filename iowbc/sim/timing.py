@@ -28,11 +28,13 @@ class Timing:
 
         A whole number of physics steps, less half of one: targets are read by time, and times are rounded.
         """
-        if np.any(latency > self.longest_latency) or np.any(latency < 0.0):
-            worst = latency[np.argmax(np.abs(latency))]
-            raise ValueError(
-                f"a latency of {worst:g} periods is outside 0 to {self.longest_latency}; "
-                f"see randomization.longest_latency"
-            )
+        require_latency(latency, self.longest_latency)
         steps = np.round(latency * self.substeps)
         return np.where(steps > 0.0, (steps - 0.5) * self.timestep, 0.0)
+
+
+def require_latency(latency: Array, longest: int) -> None:
+    """Raises ValueError where one of the latencies [control periods] is negative or longer than the longest."""
+    if np.any(latency > longest) or np.any(latency < 0.0):
+        worst = latency[np.argmax(np.abs(latency))]
+        raise ValueError(f"a latency of {worst:g} periods is outside 0 to {longest}; see randomization.longest_latency")

@@ -65,7 +65,8 @@ class World:
         self.qpos, self.qvel, self.control = bind("qpos"), bind("qvel"), bind("ctrl")
         self._applied, self._connected = bind("xfrc_applied"), bind("eq_active")
         self._last_torque, self._last_external = bind("actuator_force"), bind("cfrc_ext")
-        self._touched = _places(self.layout, self.model.nbody)
+        bodies, thing = np.arange(self.model.nbody), [] if self.layout.object is None else [self.layout.object]
+        self._touched = np.concatenate([bodies[self.layout.feet], bodies[self.layout.hands], bodies[thing]])
         self._torque, self._external = self._last_torque.copy(), self._last_external[:, self._touched]
         """Torques of the motors, torques and forces on `FEET`, `HANDS` and `THING` from what they touch, in the last
         physics step."""
@@ -365,10 +366,3 @@ def _past(history: Array, place: slice, substeps: int) -> Array:
     """Forces of a pair of sensors in the physics steps of the last control period, (n, 2, substeps, 3) [N]."""
     kept = history[:, place].reshape(len(history), 2, -1)
     return kept[..., 2 + substeps :].reshape(len(history), 2, substeps, 3)
-
-
-def _places(layout: ModelIndex, bodies: int) -> Indices:
-    """Bodies whose forces are kept, in order; the object, where there is one, is the last."""
-    every = np.arange(bodies)
-    thing = every[:0] if layout.object is None else every[[layout.object]]
-    return np.concatenate([every[layout.feet], every[layout.hands], thing])

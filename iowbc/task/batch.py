@@ -254,14 +254,15 @@ class Batch:
     def snapshot(self) -> dict[str, Array]:
         """Everything that the future depends on, a row an environment."""
         schedule = self._schedule
-        own = self.memory.arrays() | {"key": schedule.key, "episode_key": schedule.episode_key}
+        own = vars(self.memory) | {"key": schedule.key, "episode_key": schedule.episode_key}
         saved = {f"task/{name}": values.copy() for name, values in own.items()}
         saved |= {f"buffer/{name}": values.copy() for name, values in self.buffers.arrays.items()}
         return saved | self.simulation.snapshot()
 
     def restore(self, saved: Mapping[str, Array]) -> None:
         """Inverse of `snapshot`: the environments then take bit for bit the same course."""
-        self.memory.restore({field: saved[f"task/{field}"] for field in self.memory.arrays()})
+        for name, values in vars(self.memory).items():
+            values[...] = saved[f"task/{name}"]
         schedule = self._schedule
         schedule.key[:], schedule.episode_key[:] = saved["task/key"], saved["task/episode_key"]
         for name, values in self.buffers.arrays.items():

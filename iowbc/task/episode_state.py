@@ -112,11 +112,3 @@ class EpisodeState:
         for name in OF_EPISODE:
             getattr(self, name)[which] = 0
         self.undisturbed[which] = LONG_AGO
-
-    def arrays(self) -> dict[str, Array]:
-        return {field.name: getattr(self, field.name).copy() for field in fields(self)}
-
-    def restore(self, arrays: dict[str, Array]) -> None:
-        """Inverse of `arrays`; shapes must agree."""
-        for field in fields(self):
-            getattr(self, field.name)[...] = arrays[field.name]

@@ -5,6 +5,7 @@ To add a part, write a function that computes it from `Truth` and a line of the 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 from iowbc.arrays import Array
 from iowbc.control.layout import Layout, Part
@@ -38,14 +39,6 @@ def _drawn(name: str) -> Callable[[Truth], Array]:
     return lambda truth: truth.drawn[name]
 
 
-def _moving(name: str) -> Callable[[Truth], Array]:
-    return lambda truth: getattr(truth.motion, name)
-
-
-def _state(name: str) -> Callable[[Truth], Array]:
-    return lambda truth: getattr(truth.state, name)
-
-
 PRIVILEGED: tuple[Part[Truth], ...] = (
     Part("object_mass", scalar, "kg", "-", _drawn("object_mass")),
     Part("object_com_offset", polar_vector, "m", "object", _drawn("object_com_offset")),
@@ -53,17 +46,17 @@ PRIVILEGED: tuple[Part[Truth], ...] = (
     Part("ground_friction", scalar, "1", "-", _drawn("ground_friction")),
     Part("object_ground_friction", scalar, "1", "-", _drawn("object_ground_friction")),
     Part("surface_friction", scalar, "1", "-", _drawn("surface_friction")),
-    Part("base_linear_velocity", polar_vector, "m/s", "heading", _moving("base_velocity")),
-    Part("system_velocity", polar_vector, "m/s", "heading", _moving("system_velocity")),
-    Part("pelvis_height", scalar, "m", "-", _moving("pelvis_height")),
-    Part("foot_force", polar_vector_each_side, "N", "heading", _moving("foot_force")),
-    Part("external_force", polar_vector, "N", "heading", _moving("external_force")),
-    Part("external_torque", axial_vector, "N·m", "heading", _moving("external_torque")),
-    Part("push_force", polar_vector, "N", "heading", _moving("push_force")),
-    Part("link_object_force", scalar, "N", "-", _state("link_object_force")),
-    Part("hand_weight_share", scalar, "1", "-", _state("hand_weight_share")),
+    Part("base_linear_velocity", polar_vector, "m/s", "heading", attrgetter("motion.base_velocity")),
+    Part("system_velocity", polar_vector, "m/s", "heading", attrgetter("motion.system_velocity")),
+    Part("pelvis_height", scalar, "m", "-", attrgetter("motion.pelvis_height")),
+    Part("foot_force", polar_vector_each_side, "N", "heading", attrgetter("motion.foot_force")),
+    Part("external_force", polar_vector, "N", "heading", attrgetter("motion.external_force")),
+    Part("external_torque", axial_vector, "N·m", "heading", attrgetter("motion.external_torque")),
+    Part("push_force", polar_vector, "N", "heading", attrgetter("motion.push_force")),
+    Part("link_object_force", scalar, "N", "-", attrgetter("state.link_object_force")),
+    Part("hand_weight_share", scalar, "1", "-", attrgetter("state.hand_weight_share")),
     Part("rolling_resistance", scalar, "N", "-", _drawn("rolling_resistance")),
-    Part("motor_effort", joint_magnitude, "N·m", "joint", lambda truth: truth.motor_effort),
+    Part("motor_effort", joint_magnitude, "N·m", "joint", attrgetter("motor_effort")),
     Part("encoder_bias", joint_mirror, "rad", "joint", _drawn("encoder_bias")),
     Part("imu_tilt", roll_and_pitch, "rad", "base", _drawn("imu_tilt")),
     Part("gyro_bias", axial_vector, "rad/s", "base", _drawn("gyro_bias")),

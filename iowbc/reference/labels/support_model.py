@@ -31,16 +31,13 @@ class SupportModel:
         self.soles = [self.model.getFrameId(site) for site in robot.soles]
         self.torso = self.model.getFrameId(robot.torso)
         self.base = self.model.getFrameId(robot.base)
-        self._full_torso = self.full.getJointId(self.model.names[self.torso_joint])
+        self._torso_joint = int(self.model.frames[self.torso].parentJoint)
+        self._full_torso = self.full.getJointId(self.model.names[self._torso_joint])
         places = mean_stance(problem.stance_width)
         self.stance = [pinocchio.SE3(np.eye(3), place) for place in places]
         margin = problem.limit_margin
         self.lower, self.upper = robot.lower[robot.support] + margin, robot.upper[robot.support] - margin
         self.effort = problem.effort_fraction * robot.effort[robot.support]
-
-    @property
-    def torso_joint(self) -> int:
-        return int(self.model.frames[self.torso].parentJoint)
 
     def lock(self, sample: Sample) -> None:
         """Gives the torso the inertia of the arms in their posture."""
@@ -51,7 +48,7 @@ class SupportModel:
         inertia = self.full.inertias[self._full_torso].copy()
         for joint in self._arms:
             inertia += torso.actInv(self.full_data.oMi[joint]).act(self.full.inertias[joint])
-        self.model.inertias[self.torso_joint] = inertia
+        self.model.inertias[self._torso_joint] = inertia
 
     def whole(self, configuration: Array, arm: Array) -> Array:
         """Configuration of the full model (36,) from the reduced one (22,) and the arms (14,)."""

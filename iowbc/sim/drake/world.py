@@ -27,7 +27,6 @@ class DrakeWorld(World):
         super().__init__(robot, physics, scene, rows, timing)
         self._settings = settings
         self._steps = Timing(timing.period, settings.timestep, timing.longest_latency)
-        self._environments: list[DrakeEnvironment] = []
         n = len(rows)
         self._lag = np.zeros(n, np.intp)
         """Physics steps by which the motors follow their targets late, (n,)."""
@@ -37,11 +36,11 @@ class DrakeWorld(World):
         self._past_forces, past_ground = np.zeros((n, 2, 1, 3)), np.zeros((n, 2, 1, 3))
         self._past_ground = past_ground
         self.soles = Soles(robot, self.batch, self.layout, self._external[:, FEET], past_ground, physics.contact_force)
+        self._environments: list[DrakeEnvironment] = [None] * n  # type: ignore[list-item]
         self._build(np.arange(n))
 
     def _build(self, ids: Indices) -> None:
         """Makes the plants of some environments from their models."""
-        self._environments += [None] * (len(self.rows) - len(self._environments))  # type: ignore[list-item]
         for index in ids:
             self._environments[index] = DrakeEnvironment(
                 self.batch.get_model(index),
@@ -71,11 +70,8 @@ class DrakeWorld(World):
 
     def _step_one(self, index: int, environment: DrakeEnvironment, given: Period) -> bool:
         """Whether Drake found a solution in each step of the period."""
-        last, applied, held = (
-            self._targets.shape[1] - self._lag[index],
-            self._applied[index],
-            self._connected[index] > 0.5,
-        )
+        last, applied = self._targets.shape[1] - self._lag[index], self._applied[index]
+        held = self._connected[index] > 0.5
         targets = self._targets[index, last - self._steps.substeps : last]
         environment.set_state(self.qpos[index], self.qvel[index])
         try:

@@ -28,10 +28,9 @@ class SceneRenderer(Offscreen):
         distance: float = 2.6,
         azimuth: float = 125.0,
         elevation: float = -12.0,
-        forces: bool = True,
     ) -> None:
-        """See `Offscreen`; with `forces`, arrows are drawn for them."""
-        self._simulation, self._env, self._forces = simulation, env, forces
+        """See `Offscreen`."""
+        self._simulation, self._env = simulation, env
         self._appearance = Appearance(simulation, env)
         view = {"distance": distance, "azimuth": azimuth, "elevation": elevation}
         super().__init__(self._appearance.model, width=width, height=height, **view)
@@ -58,7 +57,7 @@ class SceneRenderer(Offscreen):
         for points, colour in self.lines:
             for start, end in pairwise(points):
                 self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE.value, LINE_RADIUS, start, end, colour)
-        for force in forces(self._simulation, self._env) if self._forces else ():
+        for force in forces(self._simulation, self._env):
             self._connect(mujoco.mjtGeom.mjGEOM_ARROW.value, ARROW_RADIUS, force.start, force.end, COLOURS[force.kind])
 
     def _connect(self, kind: int, radius: float, start: Array, end: Array, colour: tuple[float, ...]) -> None:
