@@ -37,7 +37,6 @@ TITLES = {
     "steps_per_second": "environment steps a second [1/s]",
     "kl": "KL divergence from the teacher [nat]",
     "kl_at_shared_std": "KL divergence at the teacher's std [nat]",
-    "train/estimate_error": "mean squared error of the estimate of s_priv",
     "auxiliary_error": "mean squared error of what is read from the latent",
     "std": "standard deviation of the student",
     "action_rmse": "difference from the teacher's action",

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from iowbc.learning.networks import Mirrors, Normalizer, StudentNetwork, mirror_as_json, mirrors_as_json
 from iowbc.learning.perceptron import Hidden, Perceptron
@@ -63,20 +63,12 @@ class HistoryActor(Perceptron):
         self.length, self.observation = int(architecture["history"]), int(architecture["observation"])
 
     def hidden(self, prepared: Tensor) -> Hidden:
-        return self.hidden_and_error(prepared)[0]
-
-    def hidden_and_error(self, prepared: Tensor) -> tuple[Hidden, Tensor]:
-        """The last hidden layer, and the mean squared error of the estimate of s_priv, where the body sees one."""
         flat = prepared.reshape(-1, prepared.shape[-1])
-        frames, privileged = flat.tensor_split([self.length * self.observation], dim=1)
-        frames = frames.reshape(-1, self.length, self.observation)
+        frames = flat[:, : self.length * self.observation].reshape(-1, self.length, self.observation)
         context = self.network.body_context(self.network.encoder(frames))
         both = torch.cat([frames[:, -1], context], dim=1)
         parts = self.network.body.hidden(self.network.body.prepare(both))
-        hidden = tuple(part.reshape(*prepared.shape[:-1], -1) for part in parts)
-        if self.network.estimate is None:
-            return hidden, prepared.new_zeros(())
-        return hidden, nn.functional.mse_loss(context.float(), privileged)
+        return tuple(part.reshape(*prepared.shape[:-1], -1) for part in parts)
 
     def head(self, hidden: Hidden) -> Tensor:
         return self.network.body.head(hidden)

@@ -27,10 +27,6 @@ class Perceptron(nn.Module, ABC):
     def hidden(self, prepared: Tensor) -> Hidden:
         """The last hidden layer."""
 
-    def hidden_and_error(self, prepared: Tensor) -> tuple[Hidden, Tensor]:
-        """The last hidden layer, and the mean squared error of what is estimated on the way to it, if anything is."""
-        return self.hidden(prepared), prepared.new_zeros(())
-
     @abstractmethod
     def head(self, hidden: Hidden) -> Tensor:
         """The output."""

@@ -35,7 +35,7 @@ from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy
 from iowbc.rollouts.trajectories import Trajectories
 
-FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share", "estimate_error")
+FIGURES = ("policy_loss", "value_loss", "kl", "approx_kl", "clip_share")
 """Means over minibatches: of all, and of the last epoch's for the two divergences."""
 
 
@@ -60,7 +60,6 @@ class Learner:
         env.seed(seed)
         self.settings, self.env, self.device = teacher, env, torch.device(device)
         self._on_cpu = self.device.type == "cpu"
-        self.auxiliary = 0.0 if teacher.history is None else teacher.history.auxiliary
         self.side_by_side = SideBySide(teacher.parts if self._on_cpu else 1, cores)
         self._arguments = _policy_arguments(teacher, env, mirrors, value_only)
         self.policy = ActorCritic(
@@ -213,8 +212,6 @@ class Learner:
         last = dict(zip(FIGURES, every[-1].mean(0).tolist(), strict=True))
         values = means | {"kl": last["kl"], "approx_kl": last["approx_kl"], "explained_variance": self.explained}
         values |= {"std": float(torch.exp(self.policy.log_std.detach()).mean()), "learning_rate": rate}
-        if not self.auxiliary:
-            del values["estimate_error"]
         if self._policy_learns:
             self.learning_rate = adapted(rate, last["kl"], settings, self.caution)
         return {f"train/{name}": value for name, value in values.items()}
@@ -247,8 +244,7 @@ class Learner:
         """The loss of samples, and `FIGURES`; their advantages are normalised."""
         policy, settings, advantage = self.policy, self.settings, samples["advantage"]
         with reduced(settings.precision):
-            acting, estimate_error = policy.actor.hidden_and_error(samples["observation"])
-            judging = policy.critic.hidden(samples["observation"])
+            acting, judging = policy.actor.hidden(samples["observation"]), policy.critic.hidden(samples["observation"])
         mean, value, log_std = policy.actor.head(acting), policy.critic.head(judging)[:, 0], policy.log_std
         difference = log_density(samples["action"], mean, log_std) - samples["log_density"]
         ratio = torch.exp(difference)
@@ -256,8 +252,6 @@ class Learner:
         policy_loss = -torch.min(advantage * ratio, advantage * clipped).mean()
         value_loss = torch.nn.functional.mse_loss(value, samples["target"])
         loss = policy_loss + settings.value_weight * value_loss - settings.entropy * entropy(log_std)
-        if self.auxiliary:
-            loss = loss + self.auxiliary * estimate_error
         if settings.smoothness:
             std = log_std.detach()  # smoother by its mean, not by more noise
             loss = loss + settings.smoothness * divergence(samples["neighbours"], std, mean, std).mean()
@@ -265,7 +259,7 @@ class Learner:
             kl = divergence(samples["mean"], before, mean, log_std).mean()
             sampled = (ratio - 1.0 - difference).mean()
             share = ((ratio - 1.0).abs() > settings.clip).float().mean()
-            figures = torch.stack([policy_loss, value_loss, kl, sampled, share, estimate_error])
+            figures = torch.stack([policy_loss, value_loss, kl, sampled, share])
         return loss, figures
 
     def _bound_deviation(self) -> None:

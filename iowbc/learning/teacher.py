@@ -156,11 +156,9 @@ class TeacherTraining:
             **({} if self.average is None else prefixed("average", self.average.arrays)),
         }
 
-    def begin(self, network: Network, estimated: Sequence[Sequence[float]] = ((), ())) -> None:
+    def begin(self, network: Network) -> None:
         """Starts from a trained policy, with the statistics that it was trained with, which stay, and with the least
         step size where that may move: what is trained is soon led astray.
-
-        `estimated`: mean and standard deviation in whose terms a student estimates s_priv.
 
         Raises StageFailed where its networks are of another shape.
         """
@@ -171,9 +169,7 @@ class TeacherTraining:
             names = "teacher.hidden, activation, symmetry and history (estimate, too)"
             path, _ = self.settings.beginning
             raise StageFailed(f"{path}: that policy's networks are other ones; {names} say which") from error
-        own = network.normalizer.mean, network.normalizer.std
-        mean, std = (np.concatenate([seen.numpy(), behind]) for seen, behind in zip(own, estimated, strict=True))
-        model.normalization.inherited = mean.astype(np.float32), std.astype(np.float32)
+        model.normalization.inherited = network.normalizer.mean.numpy(), network.normalizer.std.numpy()
         model.normalization.move(model.policy.normalizer)
         if self.average is not None:
             self.average.restore(checkpoint.module_arrays(model.policy))

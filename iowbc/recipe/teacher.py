@@ -80,9 +80,6 @@ class HistoryNetwork(Encoder):
     estimate: bool = Field(default=False, json_schema_extra=LATER)
     """Lets the body see an estimate of s_priv from the latent, and not the latent, as a student does that is distilled
     with `distill.start: teacher`."""
-    auxiliary: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
-    """With `estimate`: weight of the mean squared error of the estimate of s_priv, each number in its standard
-    deviations. Without it the estimate becomes whatever the reward makes of it."""
     student: ArtifactName | None = Field(default=None, json_schema_extra=COSMETIC)
     """A distilled student to begin from, as `teacher.start` names a teacher: that recipe's student goes on learning
     from the reward. A student imitates its teacher, also where the history does not tell what its teacher knows; PPO
@@ -198,8 +195,6 @@ class Teacher(PPO):
             yield "", f"std_floor, std_end and initial_std must ascend, got {stds}"
         if self.restart is not None and self.restart.std < self.std_end:
             yield "", f"restart.std {self.restart.std:g} is below std_end {self.std_end:g}: nothing comes back"
-        if self.history is not None and self.history.auxiliary and not self.history.estimate:
-            yield "", "history.auxiliary weighs the error of an estimate; set history.estimate, or auxiliary to 0"
         if self.history is not None and self.symmetry == "augment":
             yield "", "symmetry: with `history` it is `construction` or `none`, not `augment`"
         if self.start is not None and self.history is not None and self.history.student is not None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from iowbc.errors import StageFailed
 from iowbc.learning.curves import TABLE
@@ -108,10 +108,7 @@ def run(job: Job) -> None:
         curves = train(job, training, settings.checkpoint_every, _note, look)
         leave_extendable(job, training)
         training.keep_best()
-        about: dict[str, Any] = {"layout": environments.layout.describe(), "curriculum": environments.curriculum()}
-        if settings.history is not None:
-            normalizer, seen = training.model.policy.normalizer, environments.layout.state.size
-            about["estimated"] = [part[seen:].tolist() for part in (normalizer.mean, normalizer.std)]
+        about = {"layout": environments.layout.describe(), "curriculum": environments.curriculum()}
 
     network, architecture = training.network()
     save_network(network, architecture, job.out, "teacher", about)
@@ -133,7 +130,7 @@ def _begin(training: "TeacherTraining", environments: "VectorEnv", start: Path) 
     if about["layout"] != environments.layout.describe():
         path, _ = training.settings.beginning
         raise StageFailed(f"{path}: that policy observes something else; leave the observation as it was")
-    training.begin(network, about.get("estimated", ((), ())))
+    training.begin(network)
     if "curriculum" in about:  # students of earlier versions left none
         environments.set_curriculum(about["curriculum"])
 

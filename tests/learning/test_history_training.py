@@ -110,20 +110,6 @@ def test_what_it_leaves_acts_as_it_trained_and_knows_nothing_privileged(symmetry
     assert isinstance(policy_of(network, architecture), StudentPolicy)
 
 
-def test_it_goes_on_estimating_in_the_terms_of_its_teacher() -> None:
-    estimating = NETWORK.model_copy(update={"estimate": True, "auxiliary": 1.0})
-    some = training(history=estimating)
-    errors = [some.update()["train/estimate_error"] for _ in range(40)]
-    assert errors[-1] < 0.5 * errors[0], errors
-    some.begin(some.network()[0], ([2.0], [0.5]))
-    some.update()
-    normalizer = some.model.policy.normalizer
-    assert (float(normalizer.mean[SEEN]), float(normalizer.std[SEEN])) == (2.0, 0.5)
-    assert "train/estimate_error" not in training().update()
-    with pytest.raises(ValueError, match="estimate"):
-        Teacher(history=HistoryNetwork(auxiliary=1.0))
-
-
 def test_it_can_be_looked_at_while_it_trains(tmp_path: Path) -> None:
     some, path = training(), tmp_path / "training.checkpoint"
     some.update()
