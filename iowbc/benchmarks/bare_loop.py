@@ -20,7 +20,7 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 def wander(step: int, rows: int, columns: int) -> Array:
-    """Small random actions, the same for whoever measures, (rows, columns) float32."""
+    """Small random actions, the same in every measurement, (rows, columns) float32."""
     return (0.3 * np.random.default_rng(step).normal(size=(rows, columns))).astype(np.float32)
 
 

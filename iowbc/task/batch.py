@@ -136,7 +136,7 @@ class Batch:
         write_signals(self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period)
 
     def step(self) -> None:
-        """One control step of every environment; those that end begin anew."""
+        """One control step of every environment; those that end start a new episode."""
         memory, simulation = self.memory, self.simulation
         given, support = self.buffers["action"].astype(np.float64), len(self.robot.support)
         action = given[:, :support].clip(-self._bound, self._bound)
@@ -172,13 +172,13 @@ class Batch:
             write_trial_signals(self.buffers, simulation, action * self._scale)
 
     def feed_partner(self, feed: Array) -> None:
-        """Writes what the partner hears of the command, (n, 4)."""
+        """Writes the entries of the command that the partner receives, (n, 4)."""
         feed[:, :3] = self.memory.command[:, VELOCITY]
         left, right = self.memory.command[:, OFFSET][:, 2::3].T
         feed[:, 3] = self.memory.command[:, HEIGHT] + 0.5 * (left + right)
 
     def finish(self, judgement: Judgement) -> None:
-        """Writes the results of the step, and begins anew where an episode has ended."""
+        """Writes the results of the step, and starts a new episode where one has ended."""
         memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
         memory.total += scored.reward
         memory.tracking += scored.tracking

@@ -1,7 +1,7 @@
 """Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample.
 
-Only what a solver does to itself rejects a sample. A worker that was killed says nothing about its sample: somebody
-else ended it, and the dataset must not depend on that.
+Only what a solver does to itself rejects a sample. A worker that was killed from outside says nothing about its
+sample, and the dataset must not depend on that.
 """
 
 import multiprocessing
@@ -129,7 +129,7 @@ def _assign(worker: _Worker, book: _Book, chunks: Sequence[Sequence[int]], paths
         return
     worker.chunk = book.waiting.pop(0)
     job = (worker.chunk, chunks[worker.chunk], book.crashed.get(worker.chunk, []), paths[worker.chunk])
-    with suppress(BrokenPipeError, ConnectionResetError):  # of a dead worker _receive hears
+    with suppress(BrokenPipeError, ConnectionResetError):  # _receive reports a dead worker
         worker.connection.send(job)
 
 
