@@ -12,7 +12,6 @@ from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
 from iowbc.control.observation import Sensed
-from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
@@ -107,15 +106,6 @@ class Batch:
         """Environments in which a public controller moves its arms, (k,)."""
         self._divergences = divergences
 
-    @property
-    def command(self) -> Array:
-        """C in force in the step to come, (n, 11)."""
-        return self.memory.command
-
-    @property
-    def measured(self) -> Measured:
-        return self.simulation.measured
-
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]."""
         return self.guidance.targets(self.memory, action.clip(-self._bound, self._bound))
@@ -161,7 +151,7 @@ class Batch:
         )
         self.record(judgement, action)
         memory.earlier_action[:], memory.action[:] = memory.action, action
-        self.guidance.advance(memory, self._schedule.episode_key, self.measured)
+        self.guidance.advance(memory, self._schedule.episode_key, self.simulation.measured)
         self.finish(judgement)
 
     def record(self, judgement: Judgement, action: Array) -> None:

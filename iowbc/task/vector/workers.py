@@ -77,12 +77,10 @@ class InProcess:
         self._answer: Any = None
 
     def ask(self, messages: Sequence[Message]) -> None:
-        """See `Workers`."""
         (message,) = messages
         self._answer = message.carry_out(self.batch)
 
     def answers(self) -> list[Any]:
-        """See `Workers`."""
         return [self._answer]
 
     def close(self) -> None:
