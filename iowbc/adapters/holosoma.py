@@ -12,6 +12,7 @@ from iowbc.adapters.adapter import Adapter, Seen, scaled
 from iowbc.adapters.networks import metadata, network
 from iowbc.arrays import Array
 from iowbc.errors import StageFailed
+from iowbc.robot.description import kind_of
 from iowbc.robot.rotations import wrapped
 
 DEFAULT = {
@@ -41,7 +42,9 @@ def adapter(policy: Path) -> Adapter:
     joints = tuple(said["dof_names"])
     return Adapter(
         joints=joints,
-        default=np.array([_default(name) for name in joints]),
+        default=np.array(
+            [DEFAULT.get(name.removesuffix("_joint"), DEFAULT.get(kind_of(name), 0.0)) for name in joints]
+        ),
         kp=np.array(said["kp"]),
         kd=np.array(said["kd"]),
         acted=joints,
@@ -67,9 +70,3 @@ def feet_phase(seen: Seen) -> Array:
     """Phases of the left and right foot, (n, 2) [rad]: half a period apart in walking, both π in standing."""
     phase = 2.0 * np.pi * seen.walked / GAIT_PERIOD + np.array([0.0, np.pi])
     return np.where(seen.walking[:, None], wrapped(phase), np.pi)
-
-
-def _default(joint: str) -> float:
-    """Of a joint in the default posture [rad]."""
-    name = joint.removesuffix("_joint")
-    return DEFAULT.get(name, DEFAULT.get(name.removeprefix("left_").removeprefix("right_"), 0.0))

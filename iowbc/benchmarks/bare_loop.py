@@ -19,8 +19,8 @@ from iowbc.task.vector.shared import private_buffers
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
-def wander(step: int, rows: int, columns: int) -> Array:
-    """Small random actions, the same for whoever measures, (rows, columns) float32."""
+def random_actions(step: int, rows: int, columns: int) -> Array:
+    """Small random actions, the same in every measurement, (rows, columns) float32."""
     return (0.3 * np.random.default_rng(step).normal(size=(rows, columns))).astype(np.float32)
 
 
@@ -59,7 +59,7 @@ def record(setup: Setup, first: int, last: int, periods: int) -> RecordedSteps:
     asked = mujoco.mjtState.mjSTATE_CTRL.value | mujoco.mjtState.mjSTATE_XFRC_APPLIED.value
     data, now = mujoco.MjData(world.model), np.empty(mujoco.mj_stateSize(world.model, asked))
     for period in range(periods):
-        batch.buffers["action"][:] = wander(period, setup.count, batch.buffers["action"].shape[1])[first:last]
+        batch.buffers["action"][:] = random_actions(period, setup.count, batch.buffers["action"].shape[1])[first:last]
         batch.step()
         states[period] = world.before
         for after, state in zip(world.batch.state, states[period], strict=True):  # add controls and applied forces

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from iowbc.benchmarks.bare_loop import wander
+from iowbc.benchmarks.bare_loop import random_actions
 from iowbc.task.batch import Batch
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.worker import Message
@@ -69,7 +69,7 @@ def step_breakdown(setup: Setup, periods: int, rounds: int) -> dict[str, float]:
         for name in watch.spent:
             watch.spent[name] = 0.0
         for period in range(periods):
-            workers.buffers["action"][:] = wander(period, batch.n, workers.buffers["action"].shape[1])
+            workers.buffers["action"][:] = random_actions(period, batch.n, workers.buffers["action"].shape[1])
             batch.step()
         row = {name: 1e3 * spent / periods for name, spent in watch.spent.items()}
         row["simulation"] -= row["physics"]

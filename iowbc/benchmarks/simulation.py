@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
-from iowbc.benchmarks.bare_loop import bare_loops, wander
+from iowbc.benchmarks.bare_loop import bare_loops, random_actions
 from iowbc.benchmarks.breakdown import PARTS, step_breakdown, transfer_time
 from iowbc.benchmarks.standing_generator import benchmark_world
 from iowbc.processes import available_cores
@@ -97,7 +97,7 @@ def _rate(env: VectorEnv) -> float:
     """Environment steps a second over the first periods of the episodes that the bare loop replays."""
     env.seed(env.setup.seed)
     env.reset()
-    given = [wander(period, env.num_envs, env.action_space.shape[0]) for period in range(PERIODS)]
+    given = [random_actions(period, env.num_envs, env.action_space.shape[0]) for period in range(PERIODS)]
     begin = time.perf_counter()
     for action in given:
         env.step(action)
@@ -122,7 +122,7 @@ def _others(
                 env.reset()
                 begin = time.perf_counter()
                 for period in range(PERIODS):
-                    env.step(wander(period, count, width))
+                    env.step(random_actions(period, count, width))
                 rates.append(count * PERIODS / (time.perf_counter() - begin))
         finally:
             env.close()

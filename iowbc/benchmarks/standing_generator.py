@@ -20,23 +20,21 @@ from iowbc.task.specification import Specification
 def write_standing_generator(folder: Path, robot: Robot, recipe: ReferenceGenerator) -> None:
     """Writes an artifact like that of `rg-fit`: a network of the recipe's size whose last layer is zero, and a feasible
     map of that one posture."""
-    names, support = input_names(robot, recipe.height), robot.support
-    sizes = (len(names), *recipe.fit.hidden, len(support))
+    inputs, support = len(input_names(robot, recipe.height)), robot.support
+    sizes = (inputs, *recipe.fit.hidden, len(support))
     rng = np.random.default_rng(0)
     weights = [
         rng.normal(scale=size**-0.5, size=(after, size)).astype(np.float32) for size, after in itertools.pairwise(sizes)
     ]
     weights[-1][:] = 0.0
-    ReferenceNetwork(
-        inputs=names,
-        outputs=tuple(robot.joints[index] for index in support),
+    ReferenceNetwork.of(
+        robot,
+        recipe.height,
         layers=tuple((weight, np.zeros(len(weight), np.float32)) for weight in weights),
-        input_mean=np.zeros(len(names), np.float32),
-        input_std=np.ones(len(names), np.float32),
+        input_mean=np.zeros(inputs, np.float32),
+        input_std=np.ones(inputs, np.float32),
         output_mean=robot.default_position[support].astype(np.float32),
         output_std=np.ones(len(support), np.float32),
-        lower=robot.lower[support].astype(np.float32),
-        upper=robot.upper[support].astype(np.float32),
     ).save(folder)
     FeasibleMap.single(robot.default_height).save(folder / FEASIBLE)
 

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from safetensors.numpy import load_file, save_file
@@ -67,7 +68,14 @@ class ReferenceNetwork(Constants):
         (folder / ARCHITECTURE).write_text(json.dumps(architecture, indent=2) + "\n", encoding="utf-8")
 
     @classmethod
-    def load(cls, folder: Path) -> "ReferenceNetwork":
+    def of(cls, robot: Robot, height: str, **numbers: Any) -> Self:
+        """A network for a robot with its joint limits; `height`: `pelvis` or `com`; `numbers`: layers, means, stds."""
+        outputs = tuple(robot.joints[index] for index in robot.support)
+        lower, upper = (limit[robot.support].astype(np.float32) for limit in (robot.lower, robot.upper))
+        return cls(inputs=input_names(robot, height), outputs=outputs, lower=lower, upper=upper, **numbers)
+
+    @classmethod
+    def load(cls, folder: Path) -> Self:
         """Reads the artifact of rg-fit. Raises FileNotFoundError, or ValueError where its parts do not fit together."""
         source = folder / ARCHITECTURE
         if not source.is_file() or not (folder / WEIGHTS).is_file():

@@ -57,7 +57,7 @@ class ExportedPolicy:
     def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
         del observation, privileged
         batch = self.environment.batch
-        targets = self.controller.step(batch.measured, batch.command)
+        targets = self.controller.step(batch.simulation.measured, batch.memory.command)
         expected = batch.targets(targets.action)
         passed = np.abs(expected - targets.position)[~targets.held]
         self.largest_difference = max(self.largest_difference, float(passed.max(initial=0.0)))

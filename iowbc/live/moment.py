@@ -117,7 +117,7 @@ class MomentRecorder(SimulationRecorder):
         return replace(
             moment,
             reference=_poses(reference),
-            command=np.array(self.batch.command[0]).reshape(len(COMMAND)),
+            command=np.array(self.batch.memory.command[0]).reshape(len(COMMAND)),
             signals={name: values[0].copy() for name, values in self._signals.items()},
         )
 

@@ -27,7 +27,7 @@ def filter_gains(period: float, settings: Estimation, angle: float, rate: float)
 
 
 class MotionFilter:
-    """Direction of gravity, joint positions, angular rates, and accelerations that nobody planned, of n robots."""
+    """Direction of gravity, joint positions, angular rates, and unplanned accelerations, of n robots."""
 
     def __init__(self, n: int, joints: int, period: float, settings: Estimation) -> None:
         base = filter_gains(period, settings, settings.gravity_noise, settings.gyro_noise)

@@ -1,4 +1,4 @@
-"""Simulations that left the numbers: what led to it, kept for replay."""
+"""Simulations that diverged: state and inputs before it, kept for replay."""
 
 import json
 from collections.abc import Mapping

@@ -35,7 +35,7 @@ CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCon
 
 
 def scene_spec(robot: Robot, physics: Physics, scene: Scene, timing: Timing, *, dressed: bool) -> Any:
-    """The editable description. With `dressed`, everything that is for the eye; without, only what moves or touches.
+    """The editable description. With `dressed`, visual geometry too; without, only what moves or touches.
 
     Constraints are solved with sparse Jacobians: the same trajectories to rounding, in 5 to 10 % less time.
     """

@@ -34,7 +34,7 @@ def add_object(
 ) -> None:
     """Body `object` with the scene's nominal mass, its joints, the hands with its grips or the palms that touch it.
 
-    `touched`: links other than the palms may touch it too; `dressed`: with what is for the eye.
+    `touched`: links other than the palms may touch it too; `dressed`: with visual geometry.
     """
     thing = scene.object
     if thing is None:

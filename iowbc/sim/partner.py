@@ -21,7 +21,7 @@ from iowbc.sim.state import SimulationState
 NOISE_WIDTH = 3
 """Columns of noise that the partner takes each step: two of its unsteady force, one of its share."""
 FEED = 4
-"""What the partner hears of the command: v_x, v_y, yaw rate, height."""
+"""Entries of the command that the partner receives: v_x, v_y, yaw rate, height."""
 SLOW = 0.1
 """Speed below which a follower pushes a crate the less, the slower it rolls [m/s]."""
 HESITANT = 0.03
@@ -156,7 +156,9 @@ class Partner:
         state.partner_share[:] = self._share * self._present
         if not self._any:
             return
-        self._share_now(gust[:, 2], state)
+        self._wandering *= self._keep_share  # the share wanders about the drawn one, between zero and one
+        self._wandering += self._drift * gust[:, 2]
+        state.partner_share[:] = (self._share + self._wandering).clip(self._least, self._most) * self._present
         velocity = self._path(commanded)
         state.partner_velocity[:] = velocity * self._present[:, None]
         along = velocity[:, :2] / (_length(velocity) + self._slow)[:, None]
@@ -199,12 +201,6 @@ class Partner:
         strongest = self._recipe.strongest * self._recipe.hand_distance
         torque: Array = self._yaw_stiffness * self._yaw_lead + self._yaw_damping * rate
         return torque.clip(-strongest, strongest)
-
-    def _share_now(self, chance: Array, state: SimulationState) -> None:
-        """The share wanders about the one drawn; it neither changes sign nor passes one."""
-        self._wandering *= self._keep_share
-        self._wandering += self._drift * chance
-        state.partner_share[:] = (self._share + self._wandering).clip(self._least, self._most) * self._present
 
     def _path(self, commanded: Array) -> Array:
         """Velocity of the path at the handle, (n, 3) [m/s], after the partner's delay; turns the path's heading."""

@@ -54,7 +54,7 @@ class Simulation:
         `scenes`: name of each environment's scene. `fixed`: quantities held at a value, not drawn, (n,); NaN draws.
         `drake`: settings with which Drake takes the steps, not MuJoCo; raises UsageError where it is not installed.
         """
-        mujoco.set_mju_user_warning(_ignore)
+        mujoco.set_mju_user_warning(lambda message: None)  # prints and logs nothing: they are read from their counters
         self.robot, self.recipe = robot, recipe
         self.envs = np.asarray(envs, np.int64)
         self.n = n = len(self.envs)
@@ -147,7 +147,7 @@ class Simulation:
             self.fixed.setdefault(name, np.full(self.n, np.nan))[which] = values
 
     def reseed(self, key: NDArray[np.uint64]) -> None:
-        """All that is random starts anew, from the next reset on; `key` (n,) as from `random.environment_key`."""
+        """Restarts all random sequences, from the next reset on; `key` (n,) as from `random.environment_key`."""
         self._key[:] = key
         self.episode[:] = 0
 
@@ -237,7 +237,7 @@ class Simulation:
         self._deliver()
 
     def pause(self) -> None:
-        """A control period in which nothing moves; the sensors deliver anew."""
+        """A control period in which nothing moves; refreshes the sensor readings."""
         self.clock += 1
         self._deliver()
 
@@ -347,10 +347,6 @@ class Simulation:
         """Positions of the grips, (2, 3) [m]."""
         world, index = self.world_of(env)
         return world.grips[index].copy()
-
-
-def _ignore(message: str) -> None:
-    """MuJoCo's warnings are read from its counters; without this it prints them and writes a log file."""
 
 
 def _scene(recipe: Recipe, name: str) -> Any:

@@ -87,7 +87,7 @@ class SimulationState:
     push_force: Array
     """Force of pushes on the base, (n, 3) [N]."""
     diverged: Mask
-    """Simulation left the numbers in this control period, and stands where it was before; to be reset, (n,)."""
+    """Simulation diverged in this control period and is back in the state before it; to be reset, (n,)."""
 
     @classmethod
     def empty(cls, n: int, joints: int) -> Self:

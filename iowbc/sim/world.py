@@ -143,7 +143,8 @@ class World:
         hands = self.grips[ids]
         hands[..., 2] -= drop[:, None]
         if self.layout.palms is not None:
-            hands = hands + self._palm_offset(ids)
+            to_palms = np.broadcast_to(self.model.geom_pos[self.layout.palms], hands.shape)
+            hands = hands + rotations.rotate(self._body_quaternion[ids][:, self.layout.hands], to_palms)
         in_heading = rotations.rotate_inverse(turn[:, None], hands)
         middle = 0.5 * (in_heading[:, 0] + in_heading[:, 1])
         radius = self.scene.palm_radius
@@ -163,14 +164,8 @@ class World:
             between = in_heading[:, 0, 1] - in_heading[:, 1, 1]
             self.fields.fit_width(ids, between - 2.0 * (radius - PRESSED))
 
-    def _palm_offset(self, ids: Indices) -> Array:
-        """From the grips to the centres of the palms, world frame, (k, 2, 3) [m]."""
-        local = self.model.geom_pos[self.layout.palms]
-        turn = self._body_quaternion[ids][:, self.layout.hands]
-        return rotations.rotate(turn, np.broadcast_to(local, (len(ids), 2, 3)))
-
     def step(self, given: Period, diverged: Mask) -> None:
-        """One control period. Marks in `diverged` the simulations that left the numbers and puts them back."""
+        """One control period. Marks in `diverged` the simulations that diverged, and restores their state before it."""
         np.copyto(self.before, self.batch.state)
         np.copyto(self.control, given.target)
         np.copyto(self.fields.torque_range, given.effort)
@@ -223,7 +218,7 @@ class World:
             applied[:, layout.hands, 3:] = -0.5 * torque[:, None]
 
     def _check(self, diverged: Mask) -> None:
-        """Marks what warned, or moves too fast or not in numbers, and puts it back to the start of the period."""
+        """Marks simulations with a warning, or a speed too high or not finite, and restores the start of the period."""
         counts, fastest = self._warning_counts, self.physics.fastest
         speed = np.abs(self.qvel)
         if speed.max() < fastest and (counts == self._warnings).all() and not diverged.any():

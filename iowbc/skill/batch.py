@@ -122,7 +122,7 @@ class GameBatch:
         """Reward and endings of the decision just made; begins anew where a game has ended."""
         self._decisions += 1
         lower, buffers, held = self.lower, self.buffers, ~self._pushing
-        force, wrists = self._hands.read(lower.measured.projected_gravity)
+        force, wrists = self._hands.read(lower.simulation.measured.projected_gravity)
         self._felt = np.concatenate([self._felt[:, 1:], force[:, None]], axis=1)
         memory, guidance = lower.memory, lower.guidance
         target = guidance.references.wrist_target(memory.posture, memory.command, guidance.grasp)
@@ -232,9 +232,9 @@ class GameBatch:
     def _observe(self, time: str) -> None:
         lower, drawn, now, ahead = self.lower, self.drawn, self.now, self._skill.pursuit.waypoints
         path = seen.waypoints(self.paths, now, ahead, now.heading)
-        thing = of_object(lower.measured, self._sees_object)
+        thing = of_object(lower.simulation.measured, self._sees_object)
         robot = robot_observation(
-            *(lower.command, lower.measured, self._wrist_error, thing),
+            *(lower.memory.command, lower.simulation.measured, self._wrist_error, thing),
             *(self._pushing, drawn.known, path, self._felt),
         )
         force = self.origin.turned(lower.simulation.state.partner_force)

@@ -15,8 +15,8 @@ from iowbc.skill.figures import FIGURES
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.student import Student
-from iowbc.task.scenes import scene_of
 from iowbc.task.specification import Specification
+from iowbc.task.vector.setup import scene_of
 from iowbc.task.vector.shared import Buffers, Fields
 
 

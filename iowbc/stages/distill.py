@@ -50,7 +50,7 @@ def run(job: Job) -> None:
     from iowbc.robot.description import load_robot
     from iowbc.robot.mirror import side_by_side
     from iowbc.stages.environments import training_environments
-    from iowbc.task.scenes import scene_of
+    from iowbc.task.vector.setup import scene_of
 
     prepare_process()
     recipe, settings, robot = job.recipe, job.recipe.distill, load_robot(job.robot)

@@ -12,7 +12,7 @@ def run(job: Job) -> None:
     import numpy as np
 
     from iowbc.control.feasible_map import FeasibleMap
-    from iowbc.control.generator import ReferenceNetwork, input_names
+    from iowbc.control.generator import ReferenceNetwork
     from iowbc.reference.fit.fitting import fit
     from iowbc.reference.fit.gates import judge_fit
     from iowbc.reference.fit.preparation import prepare
@@ -35,19 +35,8 @@ def run(job: Job) -> None:
         job.report.progress(epoch, rg.fit.epochs, f"validation loss {validation:.2e}")
 
     fitted = fit(prepared.train, prepared.validation, rg.fit, job.recipe.seed, epoch_done, job.interrupted)
-    support = robot.support
-    network = ReferenceNetwork(
-        inputs=input_names(robot, rg.height),
-        outputs=tuple(robot.joints[index] for index in support),
-        layers=fitted.layers,
-        input_mean=fitted.input_mean,
-        input_std=fitted.input_std,
-        output_mean=fitted.output_mean,
-        output_std=fitted.output_std,
-        lower=robot.lower[support].astype(np.float32),
-        upper=robot.upper[support].astype(np.float32),
-    )
-    network.save(job.out)
+    numbers = {name: getattr(fitted, name) for name in ("input_mean", "input_std", "output_mean", "output_std")}
+    ReferenceNetwork.of(robot, rg.height, layers=fitted.layers, **numbers).save(job.out)
     network = ReferenceNetwork.load(job.out)
     plan = SamplePlan(robot, rg, job.recipe.seed)
     learnt = prepared.training[dataset.index[prepared.training] < plan.drawn]

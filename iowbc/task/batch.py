@@ -12,7 +12,6 @@ from iowbc.control.action import action_scale
 from iowbc.control.command import HEIGHT, OFFSET, VELOCITY
 from iowbc.control.layout import EVERY
 from iowbc.control.observation import Sensed
-from iowbc.control.sensors import Measured
 from iowbc.recipe.simulation.holding import FREE
 from iowbc.robot.description import load_robot
 from iowbc.sim.simulation import Simulation
@@ -107,15 +106,6 @@ class Batch:
         """Environments in which a public controller moves its arms, (k,)."""
         self._divergences = divergences
 
-    @property
-    def command(self) -> Array:
-        """C in force in the step to come, (n, 11)."""
-        return self.memory.command
-
-    @property
-    def measured(self) -> Measured:
-        return self.simulation.measured
-
     def targets(self, action: Array) -> Array:
         """Joint targets of an action (n, 15) in the step to come, (n, joints) [rad]."""
         return self.guidance.targets(self.memory, action.clip(-self._bound, self._bound))
@@ -136,7 +126,7 @@ class Batch:
         write_signals(self.buffers, self.simulation.state, moved, self.memory, Ending.none(self.n), self.period)
 
     def step(self) -> None:
-        """One control step of every environment; those that end begin anew."""
+        """One control step of every environment; those that end start a new episode."""
         memory, simulation = self.memory, self.simulation
         given, support = self.buffers["action"].astype(np.float64), len(self.robot.support)
         action = given[:, :support].clip(-self._bound, self._bound)
@@ -161,7 +151,7 @@ class Batch:
         )
         self.record(judgement, action)
         memory.earlier_action[:], memory.action[:] = memory.action, action
-        self.guidance.advance(memory, self._schedule.episode_key, self.measured)
+        self.guidance.advance(memory, self._schedule.episode_key, self.simulation.measured)
         self.finish(judgement)
 
     def record(self, judgement: Judgement, action: Array) -> None:
@@ -172,13 +162,13 @@ class Batch:
             write_trial_signals(self.buffers, simulation, action * self._scale)
 
     def feed_partner(self, feed: Array) -> None:
-        """Writes what the partner hears of the command, (n, 4)."""
+        """Writes the entries of the command that the partner receives, (n, 4)."""
         feed[:, :3] = self.memory.command[:, VELOCITY]
         left, right = self.memory.command[:, OFFSET][:, 2::3].T
         feed[:, 3] = self.memory.command[:, HEIGHT] + 0.5 * (left + right)
 
     def finish(self, judgement: Judgement) -> None:
-        """Writes the results of the step, and begins anew where an episode has ended."""
+        """Writes the results of the step, and starts a new episode where one has ended."""
         memory, buffers, ending, scored = self.memory, self.buffers, judgement.ending, judgement.scored
         memory.total += scored.reward
         memory.tracking += scored.tracking

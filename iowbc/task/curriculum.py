@@ -30,7 +30,7 @@ class Difficulty:
 
 
 @dataclass(frozen=True)
-class Course:
+class EpisodeOutcome:
     """How the episodes of n environments went, each (n,)."""
 
     survived: Mask
@@ -92,38 +92,38 @@ def phase(curriculum: Curriculum, levels: Array) -> Array:
     return 1 + first.astype(np.int64) + second
 
 
-def next_levels(curriculum: Curriculum, levels: Array, played: Array, course: Course) -> Array:
+def next_levels(curriculum: Curriculum, levels: Array, played: Array, outcome: EpisodeOutcome) -> Array:
     """Levels after an episode, (n, axes). An axis that was held back below its own level says nothing, and stays."""
     if not curriculum.enabled:
         return levels
     own = played >= levels - ROUNDING
-    moved = levels + curriculum.rise * (_success(curriculum, played, course) & own)
-    moved -= curriculum.fall * (_failure(curriculum, played, course) & own)
+    moved = levels + curriculum.rise * (_success(curriculum, played, outcome) & own)
+    moved -= curriculum.fall * (_failure(curriculum, played, outcome) & own)
     ceilings = np.stack([_row(each) for each in (curriculum.balance, curriculum.locomotion, curriculum.extreme)])
     ceiling = np.minimum(ceilings[phase(curriculum, levels) - 1], curriculum.limit)
     return np.clip(moved, 0.0, np.maximum(ceiling, levels))
 
 
-def _success(curriculum: Curriculum, played: Array, course: Course) -> Mask:
-    steady = course.survived & (course.posture >= curriculum.tracking)
-    walked = course.walked >= curriculum.least_walk
-    there = (course.covered >= curriculum.progress) & (course.heading <= curriculum.heading)
-    beyond = course.infeasible | (played[:, LOCOMOTION] > OWN_RANGES + ROUNDING)
+def _success(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> Mask:
+    steady = outcome.survived & (outcome.posture >= curriculum.tracking)
+    walked = outcome.walked >= curriculum.least_walk
+    there = (outcome.covered >= curriculum.progress) & (outcome.heading <= curriculum.heading)
+    beyond = outcome.infeasible | (played[:, LOCOMOTION] > OWN_RANGES + ROUNDING)
     success = np.repeat(steady[:, None], len(AXES), axis=1)
-    carried = ~walked | course.infeasible | (course.covered >= curriculum.load_progress)
+    carried = ~walked | outcome.infeasible | (outcome.covered >= curriculum.load_progress)
     success[:, LOAD] &= carried
-    success[:, LOCOMOTION] = walked & course.survived & np.where(beyond, steady, there)
+    success[:, LOCOMOTION] = walked & outcome.survived & np.where(beyond, steady, there)
     return success
 
 
-def _failure(curriculum: Curriculum, played: Array, course: Course) -> Mask:
-    ended = ~course.survived & (course.progress_in_time < curriculum.early)
-    walking = course.stepping | course.lagged
-    pushed = course.disturbed & (played[:, DISTURBANCE] > 0.0) & ~course.lagged
-    statue = course.survived & (course.walked >= curriculum.least_walk) & (course.covered < curriculum.lagging)
+def _failure(curriculum: Curriculum, played: Array, outcome: EpisodeOutcome) -> Mask:
+    ended = ~outcome.survived & (outcome.progress_in_time < curriculum.early)
+    walking = outcome.stepping | outcome.lagged
+    pushed = outcome.disturbed & (played[:, DISTURBANCE] > 0.0) & ~outcome.lagged
+    statue = outcome.survived & (outcome.walked >= curriculum.least_walk) & (outcome.covered < curriculum.lagging)
     failure = np.zeros(played.shape, np.bool_)
     failure[:, DISTURBANCE] = ended & pushed
-    statue &= ~course.infeasible & (played[:, LOCOMOTION] <= OWN_RANGES)
+    statue &= ~outcome.infeasible & (played[:, LOCOMOTION] <= OWN_RANGES)
     failure[:, LOCOMOTION] = (ended & walking & ~pushed) | statue
     failure[:, POSTURE] = failure[:, LOAD] = ended & ~walking & ~pushed
     return failure

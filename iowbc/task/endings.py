@@ -31,7 +31,7 @@ class Ending:
 
     @property
     def done(self) -> Mask:
-        """Ended for whatever reason."""
+        """Ended for any reason."""
         return self.failed | self.time_limit | self.diverged
 
     @property

@@ -1,4 +1,4 @@
-"""What came of a control step: the motion, whether the episode ends, and the reward."""
+"""Evaluates a control step: the motion, whether the episode ends, and the reward."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ from iowbc.task.yielding import Admittance, excess_force
 
 @dataclass(frozen=True)
 class Judgement:
-    """What came of a control step of n environments."""
+    """Result of a control step of n environments."""
 
     motion: Motion
     ending: Ending

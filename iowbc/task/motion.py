@@ -13,7 +13,7 @@ from iowbc.sim.state import SimulationState
 
 @dataclass(frozen=True)
 class Motion:
-    """The true state of n environments, reduced to what the task speaks of. Vectors are in the heading frame."""
+    """The true state of n environments, reduced to the quantities of the task. Vectors are in the heading frame."""
 
     heading: Array
     """Yaw of the base, (n,) [rad]."""
@@ -26,7 +26,7 @@ class Motion:
     pelvis_height: Array
     """(n,) [m]."""
     height: Array
-    """What the command's H speaks of: the pelvis, or the robot's centre of mass by recipe, (n,) [m]."""
+    """The height that H commands: that of the pelvis, or the robot's centre of mass by recipe, (n,) [m]."""
     pelvis_tilt: Array
     """Angle of the pelvis from upright, (n,) [rad]."""
     torso_pitch: Array
@@ -50,7 +50,7 @@ class Motion:
 
 
 def motion(state: SimulationState, height: Literal["pelvis", "com"] = "pelvis") -> Motion:
-    """The motion in a simulation state; `height`: what H speaks of."""
+    """The motion in a simulation state; `height`: of the pelvis or the centre of mass, as H commands it."""
     rotation, base = state.base_rotation, state.base_position
     vectors = np.empty((len(base), 11, 3))
     vectors[:, 0] = state.system_velocity

@@ -1,4 +1,4 @@
-"""Functions in a user's file: executed when they are loaded, and held against what they must return."""
+"""Functions in a user's file: executed when they are loaded, and checked for what they must return."""
 
 import functools
 import linecache
@@ -22,8 +22,8 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
-class Held(Generic[Source]):
-    """A function whose values are held against its contract."""
+class CheckedFunction(Generic[Source]):
+    """A function whose values are checked against its contract."""
 
     where: str
     """Its place: path in the recipe, file, name."""
@@ -55,8 +55,8 @@ class Held(Generic[Source]):
         return found
 
 
-def load_function(path: str, own: OwnFunction, contract: str) -> Held[Any]:
-    """Executes the file of a function. `path`: in the recipe; `contract`: see `Held`.
+def load_function(path: str, own: OwnFunction, contract: str) -> CheckedFunction[Any]:
+    """Executes the file of a function. `path`: in the recipe; `contract`: see `CheckedFunction`.
 
     Raises StageFailed where it cannot be used.
     """
@@ -71,7 +71,7 @@ def load_function(path: str, own: OwnFunction, contract: str) -> Held[Any]:
         known = ", ".join(functions) or "none"
         hint = nearest(own.function, functions)
         raise StageFailed(f"{where}: has no function {own.function!r}; there are: {known}{hint}; {contract}")
-    return Held(f"{where}, function {own.function}", contract, own.module, function)
+    return CheckedFunction(f"{where}, function {own.function}", contract, own.module, function)
 
 
 def _fits(found: tuple[int, ...], shape: ArrayShape) -> bool:

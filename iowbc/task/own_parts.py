@@ -9,7 +9,7 @@ from iowbc.control.layout import Part
 from iowbc.errors import StageFailed
 from iowbc.recipe.task.task import Observation, OwnPart
 from iowbc.robot.mirror import in_place
-from iowbc.task.own_function import Held, load_function
+from iowbc.task.own_function import CheckedFunction, load_function
 from iowbc.task.privileged import PRIVILEGED, Truth
 
 CONTRACT = (
@@ -26,7 +26,7 @@ class OwnValue:
     said: OwnPart
 
     @cached_property
-    def function(self) -> Held[Truth]:
+    def function(self) -> CheckedFunction[Truth]:
         """The user's function. Raises StageFailed where it cannot be used."""
         return load_function(self.path, self.said, CONTRACT)
 

@@ -6,7 +6,7 @@ from iowbc.arrays import Array, Mask
 from iowbc.control.command import VELOCITY, YAW_RATE
 from iowbc.recipe.task.task import Termination
 from iowbc.robot.rotations import TINY
-from iowbc.task.curriculum import Course
+from iowbc.task.curriculum import EpisodeOutcome
 from iowbc.task.endings import Ending
 from iowbc.task.episode_state import EpisodeState
 from iowbc.task.rewards.terms import progress
@@ -28,11 +28,11 @@ def follow(
     memory.undisturbed[:] = np.where(disturbed, 0, memory.undisturbed + 1)
 
 
-def course(memory: EpisodeState, ending: Ending, period: float, blame: float) -> Course:
+def outcome(memory: EpisodeState, ending: Ending, period: float, blame: float) -> EpisodeOutcome:
     """How the episodes went that end in this step; `blame`: time after a disturbance within which it counts [s]."""
     steps = np.maximum(memory.steps, 1)
     moved = memory.commanded > TINY
-    return Course(
+    return EpisodeOutcome(
         survived=ending.truncated,
         progress_in_time=memory.steps / memory.limit,
         posture=memory.tracking.min(axis=1) / steps,

@@ -12,6 +12,7 @@ from iowbc.onboard import messages
 from iowbc.onboard.checks import MODEL
 from iowbc.onboard.machine import FREQUENCY
 from iowbc.onboard.messages import Record
+from iowbc.recipe.simulation.randomization import LATENCIES
 from iowbc.recipe.simulation.simulation import SimulationSettings
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
@@ -28,7 +29,6 @@ CHARGE, WARM = 90, 35
 """Battery [%] and motor temperature [°C] of a twin."""
 LYING_HEIGHT, LYING_TILT = 0.35, 1.2
 """Pelvis height [m] below which, and tilt [rad] beyond which, the robot has fallen."""
-LATENCIES = ("action_latency", "sensor_latency", "object_latency")
 
 
 def at_bus_rate(recipe: SimulationSettings, control_frequency: float) -> SimulationSettings:

@@ -85,7 +85,7 @@ def test_skill_and_controller_do_what_the_game_does(
         control = lower.control
 
         def watched() -> None:
-            measurements.append(copied(lower.measured))
+            measurements.append(copied(lower.simulation.measured))
             control()
 
         lower.control = watched  # type: ignore[method-assign]

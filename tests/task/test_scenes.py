@@ -7,7 +7,7 @@ import iowbc.task.gym.registration  # noqa: F401
 from iowbc.recipe.simulation.holding import SCENES
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.recipe.task.task import SceneShares
-from iowbc.task.scenes import scene_of
+from iowbc.task.vector.setup import scene_of
 
 
 def test_every_scene_has_a_share_a_grasp_and_a_name_for_gymnasium() -> None:

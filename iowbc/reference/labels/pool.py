@@ -1,7 +1,7 @@
 """Labels samples in worker processes, in shards on disk; a native crash of a solver costs one sample.
 
-Only what a solver does to itself rejects a sample. A worker that was killed says nothing about its sample: somebody
-else ended it, and the dataset must not depend on that.
+Only what a solver does to itself rejects a sample. A worker that was killed from outside says nothing about its
+sample, and the dataset must not depend on that.
 """
 
 import multiprocessing
@@ -53,7 +53,7 @@ class _Worker:
 
 
 @dataclass
-class _Book:
+class _Queue:
     """The chunks that remain, and the samples that brought a worker down."""
 
     waiting: list[int]
@@ -81,20 +81,20 @@ def label_all(
     folder.mkdir(parents=True, exist_ok=True)
     chunks, paths = cut(indices, chunk_size, folder)
     done = {number: shard for number, path in enumerate(paths) if (shard := read_shard(path, key, chunks[number]))}
-    book = _Book([number for number in range(len(chunks)) if number not in done])
+    queue = _Queue([number for number in range(len(chunks)) if number not in done])
     progress(sum(len(chunks[number]) for number in done), len(indices))
-    team = [_start_worker(task, key) for _ in range(min(max(workers, 1), len(book.waiting)))]
+    team = [_start_worker(task, key) for _ in range(min(max(workers, 1), len(queue.waiting)))]
     try:
         while len(done) < len(chunks):
             if interrupted():
                 raise Interrupted("finished shards are kept")
             for worker in team:
-                _assign(worker, book, chunks, paths)
+                _assign(worker, queue, chunks, paths)
             ready = wait([worker.connection for worker in team], timeout=POLL)
             for worker in [worker for worker in team if worker.connection in ready]:
                 number = _receive(worker)
                 if number is None:
-                    _on_death(worker, book)
+                    _on_death(worker, queue)
                     team[team.index(worker)] = _start_worker(task, key)
                     continue
                 shard = read_shard(paths[number], key, chunks[number])
@@ -124,12 +124,12 @@ def _start_worker(task: SolverTask, key: str) -> _Worker:
     return _Worker(process, ours, current)
 
 
-def _assign(worker: _Worker, book: _Book, chunks: Sequence[Sequence[int]], paths: Sequence[Path]) -> None:
-    if worker.chunk is not None or not book.waiting:
+def _assign(worker: _Worker, queue: _Queue, chunks: Sequence[Sequence[int]], paths: Sequence[Path]) -> None:
+    if worker.chunk is not None or not queue.waiting:
         return
-    worker.chunk = book.waiting.pop(0)
-    job = (worker.chunk, chunks[worker.chunk], book.crashed.get(worker.chunk, []), paths[worker.chunk])
-    with suppress(BrokenPipeError, ConnectionResetError):  # of a dead worker _receive hears
+    worker.chunk = queue.waiting.pop(0)
+    job = (worker.chunk, chunks[worker.chunk], queue.crashed.get(worker.chunk, []), paths[worker.chunk])
+    with suppress(BrokenPipeError, ConnectionResetError):  # _receive reports a dead worker
         worker.connection.send(job)
 
 
@@ -144,30 +144,30 @@ def _receive(worker: _Worker) -> int | None:
     return int(number)
 
 
-def _on_death(worker: _Worker, book: _Book) -> None:
+def _on_death(worker: _Worker, queue: _Queue) -> None:
     """Notes the sample on which a worker died, and puts its chunk back in the queue."""
     worker.process.join()
     worker.connection.close()
     sample = int(worker.current.value)
     if worker.chunk is None or sample == IDLE:
-        book.failed_starts += 1
-        if book.failed_starts >= STARTS_WITHOUT_WORK:
+        queue.failed_starts += 1
+        if queue.failed_starts >= STARTS_WITHOUT_WORK:
             raise WorkerFailed(
                 f"labelling workers end before their first sample (exit code {worker.process.exitcode}); "
                 "try `iowbc doctor`, which checks that crocoddyl and pinocchio fit together"
             )
     elif worker.process.exitcode in CRASHES:
-        book.crashed.setdefault(worker.chunk, []).append(sample)
+        queue.crashed.setdefault(worker.chunk, []).append(sample)
     else:
-        book.killed += 1
-        if book.killed >= TRIES:
+        queue.killed += 1
+        if queue.killed >= TRIES:
             raise WorkerFailed(
-                f"{book.killed} labelling workers were ended from outside (the last with exit code "
+                f"{queue.killed} labelling workers were ended from outside (the last with exit code "
                 f"{worker.process.exitcode}, on sample {sample}); finished shards are kept. Is there too little "
                 "memory? Try fewer workers (`--workers`)"
             )
     if worker.chunk is not None:
-        book.waiting.insert(0, worker.chunk)
+        queue.waiting.insert(0, worker.chunk)
 
 
 def _work(task: SolverTask, key: str, connection: Connection, current: Any, parent: int, bound: bool) -> None:

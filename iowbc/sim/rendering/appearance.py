@@ -1,4 +1,4 @@
-"""The model of a scene for the eye: ground, light, looks of the object, the robot's meshes where they are installed."""
+"""The visual model of a scene: ground, light, object, the robot's meshes where they are installed."""
 
 import sysconfig
 import xml.etree.ElementTree as ElementTree
@@ -36,7 +36,7 @@ class Mesh:
 
 
 class Appearance:
-    """One environment of a simulation for the eye: a model with looks, and data that follow its state."""
+    """The visual model of one environment of a simulation, and data that follow its state."""
 
     def __init__(self, simulation: Simulation, env: int) -> None:
         self._world, self._index = simulation.world_of(env)

@@ -39,7 +39,7 @@ class Commander:
         self._given: Array | None = None
 
     def steer(self, wanted: Array) -> None:
-        """Follow commands that somebody gives, (11,) or (n, 11), in place of drawn and scripted ones; they may be
+        """Follow a user's commands, (11,) or (n, 11), in place of drawn and scripted ones; they may be
         changed in place. Episodes begin in their posture, standing."""
         self._given = wanted
         self.scripted[:], self._drawn[:], self._any_script = True, False, True

@@ -21,7 +21,7 @@ SIGNALS = {
 }
 """Signals with their sizes: values of the step just made, before an automatic reset. v_sys and the commanded velocity
 (v_x, v_y, ω) in the heading frame [m/s, rad/s], heading and its reference [rad], torso pitch [rad], height that H
-speaks of [m], saturated fraction of all joints, forces of left and right grip and of the partner in the world frame
+commands [m], saturated fraction of all joints, forces of left and right grip and of the partner in the world frame
 [N], flags, base position in the world frame [m], power [W], gait phase in [0, 1), feet in contact, curriculum
 levels, time in the episode [s]."""
 

@@ -1,5 +1,6 @@
 """What a process needs to know to build its part of the environments."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +13,6 @@ from iowbc.task.episodes import Episode
 from iowbc.task.layout import full_layout
 from iowbc.task.record.signals import buffer_fields, trial_signals
 from iowbc.task.rewards.reward import term_names
-from iowbc.task.scenes import scene_of
 from iowbc.task.specification import Specification
 from iowbc.task.vector.shared import Buffers, Fields
 
@@ -66,3 +66,18 @@ class Setup:
 def shares(count: int, parts: int) -> list[tuple[int, int]]:
     """First and last environment (excluded) of each of `parts` nearly equal groups."""
     return list(pairwise(round(part * count / parts) for part in range(parts + 1)))
+
+
+def scene_of(count: int, shares: Iterable[tuple[str, float]]) -> list[str]:
+    """Scene of each of `count` environments, in given shares rounded to whole environments.
+
+    Environments of one scene follow one another: most worker processes then hold one scene alone, and their arrays are
+    copied as a block.
+    """
+    names, given = zip(*shares, strict=True)
+    weights = np.array(given)
+    wanted = count * weights / weights.sum()
+    whole = np.floor(wanted + 1e-9).astype(int)
+    short = np.argsort(-(wanted - whole), kind="stable")[: count - whole.sum()]
+    whole[short] += 1
+    return [name for name, number in zip(names, whole.tolist(), strict=True) for _ in range(number)]

@@ -60,11 +60,14 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
         self.setup = Setup(specification, num_envs, seed, trials, divergences)
         recipe = specification.recipe
         self.layout = full_layout(recipe, load_robot(specification.robot))
-        load_parts(recipe.task.observation)  # what is wrong with them is told here, before processes start
+        load_parts(recipe.task.observation)  # errors in them are raised here, before processes start
         if trials is None:
             load_terms(recipe.task.reward)
         self._scenes = self.setup.scenes
-        self.workers = _workers(self.setup, workers, patience)
+        if callable(workers):
+            self.workers = workers(self.setup)
+        else:
+            self.workers = WorkerProcesses(self.setup, workers, patience) if workers else InProcess(self.setup)
         self._buffers = self.workers.buffers
         self.signals: dict[str, Array] = {
             name.removeprefix("signal/"): values
@@ -245,9 +248,3 @@ class VectorEnv(VecEnv):  # type: ignore[misc]
     def _call(self, messages: Sequence[Message]) -> list[Any]:
         self.workers.ask(messages)
         return self.workers.answers()
-
-
-def _workers(setup: Setup, asked: int | Callable[[Setup], Workers], patience: float) -> Workers:
-    if callable(asked):
-        return asked(setup)
-    return WorkerProcesses(setup, asked, patience) if asked else InProcess(setup)

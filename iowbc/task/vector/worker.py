@@ -1,4 +1,4 @@
-"""A worker process: builds its environments, then does what it is asked until its parent is gone."""
+"""A worker process: builds its environments, then answers calls until its parent is gone."""
 
 import contextlib
 import faulthandler

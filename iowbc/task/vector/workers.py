@@ -30,13 +30,13 @@ LEAVING = 2.0
 SLICE = 0.5
 """Patience is counted in waits of this length [s], so that a suspended machine does not use it up."""
 STEPS = COUNTERS.index("steps")
-"""Column of the counters that tells that a worker is at it."""
+"""Column of the counters that shows a worker's progress."""
 DUMPING = 0.5
 """Time that a hung worker gets to write down where it is [s]."""
 
 
 class Workers(Protocol):
-    """Whoever steps the environments, in consecutive groups."""
+    """Steps the environments, in consecutive groups."""
 
     groups: list[tuple[int, int]]
     """First and last environment (excluded) of each group."""
@@ -77,12 +77,10 @@ class InProcess:
         self._answer: Any = None
 
     def ask(self, messages: Sequence[Message]) -> None:
-        """See `Workers`."""
         (message,) = messages
         self._answer = message.carry_out(self.batch)
 
     def answers(self) -> list[Any]:
-        """See `Workers`."""
         return [self._answer]
 
     def close(self) -> None:
@@ -195,7 +193,7 @@ class WorkerProcesses:
             what = "failed"
         else:
             what = _end_of(process.popen)
-        text = (text or _read(process.log)).rstrip()
+        text = (text or os.pread(process.log, os.fstat(process.log).st_size, 0).decode(errors="replace")).rstrip()
         self.close()
         raise WorkerFailed(f"{who} {what}\n{text or 'it left no traceback; see its output above'}")
 
@@ -246,7 +244,3 @@ def _end(processes: list[WorkerProcess], owner: int) -> None:
             process.popen.wait()
         os.close(process.log)
     processes.clear()
-
-
-def _read(log: int) -> str:
-    return os.pread(log, os.fstat(log).st_size, 0).decode(errors="replace")

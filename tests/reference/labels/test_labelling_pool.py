@@ -14,7 +14,7 @@ from reference_doubles import DoubleTask
 from stage_jobs import Backwards
 
 from iowbc.errors import Interrupted, WorkerFailed
-from iowbc.reference.labels.pool import CRASHED, _Book, _on_death, _Worker, label_all
+from iowbc.reference.labels.pool import CRASHED, _on_death, _Queue, _Worker, label_all
 from iowbc.reference.labels.shards import Shard, read_shard
 from iowbc.stages.labelling import label_everywhere
 
@@ -87,12 +87,12 @@ def test_a_native_crash_ends_one_sample(tmp_path: Path, expected: Shard) -> None
 
 @pytest.mark.parametrize("code", [*range(-64, 0), 1, 77])
 def test_only_what_a_solver_does_to_itself_rejects_a_sample(code: int) -> None:
-    book = _Book([])
+    queue = _Queue([])
     process: Any = SimpleNamespace(exitcode=code, join=lambda: None)
-    _on_death(_Worker(process, SimpleNamespace(close=lambda: None), SimpleNamespace(value=13), chunk=2), book)  # type: ignore[arg-type]
+    _on_death(_Worker(process, SimpleNamespace(close=lambda: None), SimpleNamespace(value=13), chunk=2), queue)  # type: ignore[arg-type]
     own = -code in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL)
-    assert (book.crashed, book.killed) == (({2: [13]}, 0) if own else ({}, 1))
-    assert book.waiting == [2], "its chunk is made again"
+    assert (queue.crashed, queue.killed) == (({2: [13]}, 0) if own else ({}, 1))
+    assert queue.waiting == [2], "its chunk is made again"
 
 
 def test_a_killed_worker_costs_no_sample(tmp_path: Path, expected: Shard) -> None:
