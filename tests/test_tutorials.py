@@ -130,7 +130,7 @@ def test_add_a_transport_task(place: Path) -> None:
     write("tutorials/task.md", place)
     recipe = load_recipe(place / "recipes" / "around_the_table.yaml").recipe
     assert recipe.skill.tasks.own == ("around_the_table",)
-    assert recipe.skill.tasks.around_the_table.length == 4.0
+    assert sum(stretch.length for stretch in recipe.skill.tasks.around_the_table.path) == 4.0
     assert not [text for stage in recipe.stages for _, text in STAGES[stage].problems(recipe)]
 
 
