@@ -99,9 +99,9 @@ def test_play_that_is_terminated_leaves_no_part_of_its_film(tmp_path: Path) -> N
             pytest.skip(f"nothing can be drawn here: {playing.communicate()[1].decode()}")
         time.sleep(0.05)
     playing.terminate()
-    assert playing.wait(60) == 130
+    _, errors = playing.communicate(timeout=60)
+    assert playing.returncode == 130, errors.decode()
     assert list(tmp_path.iterdir()) == []
-    playing.communicate()
 
 
 def test_a_film_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
