@@ -24,7 +24,7 @@ from iowbc.robot.description import Robot
 
 @dataclass(frozen=True)
 class State:
-    """What the control loop remembers of n robots from one step to the next: a row each, of the shapes in
+    """State of n control loops between two steps: one row a robot, of the shapes in
     `ControlStep.shapes`; units, frames and meaning in `STATE`."""
 
     command: Array

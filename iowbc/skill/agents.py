@@ -1,4 +1,4 @@
-"""What the agents of a game want: motion along the path, the robot's nominal command, the human's intention."""
+"""Goals of a game's agents: object motion along the path, the robot's nominal command, the human's intention."""
 
 from dataclasses import dataclass
 
@@ -96,7 +96,7 @@ class Human:
         self._velocity[which], self._height[which], self._offset[which] = 0.0, 0.0, 0.0
 
     def of_action(self, action: Array, now: Situation) -> Array:
-        """What actions add to the script's intentions, (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the
+        """Intentions that actions add to the script's, (n, 5): velocity in space [m/s], yaw rate [rad/s], offset of the
         height [m]. `action` (n, 5) in [-1, 1]: velocity of the handle in the frame of the object's yaw, offset of its
         height, yaw rate of the object."""
         s = self._settings
@@ -127,7 +127,7 @@ class Human:
         self._offset[which] = 0.0
 
     def advance(self) -> Array:
-        """What the partner of the simulation is fed in the control step to come, (n, 4): see `Partner.steered`."""
+        """Input of the simulated partner for the next control step, (n, 4): see `Partner.steered`."""
         step = self._settings.vertical_velocity * self._period
         self._height[:, 0] += self._velocity[:, 2] * self._period
         self._height[:, 1] += (self._offset - self._height[:, 1]).clip(-step, step)

@@ -1,4 +1,4 @@
-"""What each episode of a game is, planned or drawn: its task, human and load, and whether the robot knows the path."""
+"""Episodes of a game, planned or drawn: task, human and load of each, and whether the robot knows the path."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -71,9 +71,9 @@ class EpisodeDraws:
         self.task, self.kind, self.rule = np.zeros((3, n), np.int64)
         """Number of the task, of the human among `KINDS`, of the nominal command among `RULES`, (n,)."""
         self.pace = np.ones(n)
-        """Of a human who walks the path by the clock, as a part of the nominal speed, (n,)."""
+        """Speed of a human who ignores the robot, as a fraction of the nominal speed, (n,)."""
         self.known, self.acts = np.zeros((2, n), np.bool_)
-        """Whether the robot knows the path, and whether the human of the actions plays, (n,)."""
+        """True where the robot knows the path; true where the learning human plays, (n,)."""
         if plans is not None:
             self.task[:] = [list(tasks).index(plan.task) for plan in plans]
             self.kind[:] = [KINDS.index(plan.partner) for plan in plans]
