@@ -24,8 +24,8 @@ class Distillation(Encoder):
     recipe's own teacher everywhere. What the experts are is part of the key, not what they are called."""
     start: Literal["teacher", "anew"] = "teacher"
     """Beginning of the body behind the encoder. `teacher`: the teacher's own body; where that sees s_priv, it sees
-    what a linear map reads from the latent, at first the mean of training. Nothing of the teacher has to be learnt
-    again, and all that is learnt is what the history shows. `anew`: from nothing, on the latent itself."""
+    a linear estimate from the latent, at first the mean of training, so that training begins with the teacher's
+    behaviour. `anew`: from random weights, on the latent itself."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers behind the encoder (paper Table I), where they start anew; else they are the teacher's."""
     activation: Literal["elu", "relu", "tanh"] = "elu"

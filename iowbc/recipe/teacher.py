@@ -166,9 +166,9 @@ class Teacher(PPO):
     check: Check = Check()
     """A small fixed evaluation that keeps the best policy and brings a lost training back to it."""
     value_only: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
-    """Parts of s_priv, by name, that the value network receives and the policy does not. Of quantities that are drawn
-    anew in each of some ten thousand episodes a policy learns by heart what they were: given the means of 58 motor
-    strengths and encoder biases in their place, it survived more trials and kept closer to the command."""
+    """Parts of s_priv, by name, that the value network receives and the policy does not. A policy overfits to
+    quantities that are drawn once an episode: given the means of 58 motor strengths and encoder biases in their place,
+    it survived more trials and kept closer to the command."""
     history: HistoryNetwork | None = Field(default=None, json_schema_extra=LATER)
     """With it the policy sees H_t alone and not s_priv: it is the student's network, needs no distillation, and can be
     exported. The value network, which nobody deploys, sees the newest s_t and s_priv as ever. `hidden` and `activation`
