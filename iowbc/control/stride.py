@@ -30,6 +30,8 @@ class Stride(Constants):
     legs: Legs
     joints: tuple[tuple[int, int], ...]
     """Places of each joint of the legs, left and right, among the support joints."""
+    spread: Array
+    """How far each sole is to the left of where the posture has it, (2,) [m]."""
     order: tuple[int, ...]
     """For each support joint its place among those of the legs, or among the zeros after them."""
     lower: Array
@@ -44,9 +46,11 @@ class Stride(Constants):
         left, right = leg_joints(robot)
         moved = [joint for pair in zip(left, right, strict=True) for joint in pair]
         others = [joint for joint in range(len(robot.support)) if joint not in moved]
+        legs = leg_geometry(robot)
         return cls(
             settings=settings,
-            legs=leg_geometry(robot),
+            legs=legs,
+            spread=settings.spread * np.sign(legs.side),
             joints=tuple(zip(left, right, strict=True)),
             order=tuple(np.argsort([*moved, *others]).tolist()),
             lower=robot.lower[robot.support],
@@ -97,8 +101,8 @@ class Stride(Constants):
         place_x = xp.cos(pitch) * legs.hip[0] + xp.sin(pitch) * legs.hip[1] + ankle_x + legs.sole[0]
         sway = gait.sway * (xp.sin(2.0 * np.pi * phase) * stepping)[:, None]
         return (
-            part * (command[:, 0:1] - rate * legs.side),
-            part * (command[:, 1:2] + rate * place_x) - sway,
+            part * (command[:, 0:1] - rate * (legs.side + self.spread)),
+            part * (command[:, 1:2] + rate * place_x) - sway + self.spread,
             swing_height(swing, gait) * stepping[:, None],
             part * rate,
         )

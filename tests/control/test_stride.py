@@ -127,6 +127,21 @@ def test_at_rest_the_posture_is_left_alone(robot: Robot, stride: Stride) -> None
     np.testing.assert_array_equal(kept, posture)
 
 
+def test_spread_feet_stand_and_walk_further_apart_and_stay_flat(robot: Robot, stride: Stride) -> None:
+    wide = Stride.of(robot, PRIOR.model_copy(update={"spread": 0.04}))
+    assert wide is not None
+    posture, still = crouch(robot, 0.7, 0.02, 0.0), np.zeros(1)
+    standing = wide(posture[None], still, np.zeros((1, 11)), still, still)[0]
+    for side, outward in enumerate((1.0, -1.0)):
+        (before, _), (after, rotation) = sole(robot, posture, side, 0.0), sole(robot, standing, side, 0.0)
+        assert after - before == pytest.approx([0.0, 0.04 * outward, 0.0], abs=0.004)
+        assert rotation[2, 2] > 0.999
+    _, narrow, _ = walk(robot, stride, posture, 0.0, COMMANDS["forward"])
+    _, soles, _ = walk(robot, wide, posture, 0.0, COMMANDS["forward"])
+    width = soles[:, 0, 1] - soles[:, 1, 1] - narrow[:, 0, 1] + narrow[:, 1, 1]
+    assert width == pytest.approx(np.full(len(PHASES), 0.08), abs=0.008)
+
+
 def test_the_mirrored_command_half_a_stride_later_gives_the_mirrored_stride(robot: Robot, stride: Stride) -> None:
     random, rows = np.random.default_rng(0), 64
     legs = stride.legs.converted(lambda values: np.full(2, values.mean()))
