@@ -42,9 +42,7 @@ class DistillationLoss(nn.Module):
         self.log_stds = nn.Parameter(teacher_log_std[kinds].clone(), requires_grad=settings.std == "learnt")
         """One for each pair of actions that the mirror swaps, and one for each other."""
         both = (swap(settings.latent // 2), facts_mirror) if symmetric else None
-        self.reader = None
-        if settings.auxiliary_of == "load":
-            self.reader = perceptron(settings.latent, (settings.latent,), facts, settings.activation, both)
+        self.reader = perceptron(settings.latent, (settings.latent,), facts, settings.activation, both)
 
     @property
     def log_std(self) -> Tensor:
@@ -59,7 +57,7 @@ class DistillationLoss(nn.Module):
         loss = kl = divergence(target, self.teacher_log_std, mean, self.log_std).mean()
         figures = {"kl" if self.settings.std == "learnt" else "kl_at_shared_std": float(kl.detach())}
         if self.settings.auxiliary:
-            read = nn.functional.mse_loss((self.reader or self.network.body_context)(latent), facts)
+            read = nn.functional.mse_loss(self.reader(latent), facts)
             loss = loss + self.settings.auxiliary * read
             figures["auxiliary_error"] = float(read.detach())
         return loss, figures

@@ -85,8 +85,6 @@ class StudentTraining:
         log_std = torch.stack([one.log_std for one in teachers]).mean(0).clamp(min=floor)
         self.loss = DistillationLoss(settings, log_std, self.network, rows.facts_mirror, rows.action_mirror, symmetry)
         self.facts_mean, self.facts_std = teacher.normalizer.mean[rows.facts], teacher.normalizer.std[rows.facts]
-        self.estimated = teacher.normalizer.mean[rows.privileged], teacher.normalizer.std[rows.privileged]
-        """Mean and standard deviation in whose terms the body sees s_priv."""
         self.optimizer = torch.optim.Adam(self.loss.parameters(), settings.learning_rate)
         self.random = np.random.default_rng(seed)
         self.experience = Experience(

@@ -55,12 +55,8 @@ class Distillation(Encoder):
     std_floor: float = Field(default=0.1, gt=0)
     """Least standard deviation of the two Gaussians in the KL divergence, in units of action: it scales the error."""
     auxiliary: float = Field(default=0.1, ge=0)
-    """Weight of the mean squared error with which `auxiliary_of` is read from the latent, each number in its standard
-    deviations; 0 leaves it out. It makes the latent hold what the history shows."""
-    auxiliary_of: Literal["load", "privileged"] = Field(default="load", json_schema_extra=LATER)
-    """Of what the auxiliary error is. `load`: of the object's mass and the base's velocity, by a reading of its own.
-    `privileged`: of all s_priv, by the estimate that the body sees (with `start: teacher`), which imitation alone
-    leaves poor: a student learns then how fast it moves and how high its pelvis is."""
+    """Weight of the mean squared error with which the object's mass and the base's velocity are read from the latent,
+    each number in its standard deviations; 0 leaves it out. It makes the latent hold what the history shows."""
     seed: int | None = Field(default=None, ge=0, lt=2**32, json_schema_extra=LATER)
     """Seed of this training alone; the recipe's `seed` when empty."""
     checkpoint_every: int = Field(default=50, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
@@ -69,5 +65,3 @@ class Distillation(Encoder):
     def problems(self) -> Iterator[tuple[str, str]]:
         if self.batch > self.buffer:
             yield "", f"batch ({self.batch}) is larger than buffer ({self.buffer})"
-        if self.auxiliary_of == "privileged" and self.start != "teacher":
-            yield "", "auxiliary_of: a student estimates s_priv with `start: teacher` alone"

@@ -21,7 +21,7 @@ PANELS = (
 )
 """Shown in the figure of the learning curves."""
 FACTS = ("object_mass", "base_linear_velocity")
-"""Privileged observations of the load, which `distill.auxiliary_of: load` reads from the latent."""
+"""Privileged observations of the load, which the auxiliary loss reads from the latent."""
 
 
 def problems(recipe: Recipe) -> Iterator[tuple[str, str]]:
@@ -67,16 +67,15 @@ def run(job: Job) -> None:
         own = dict(zip(layout.extra.names, layout.extra.mirrors, strict=True))
         seen = observation_layout(robot, recipe.task.observation.observe_object and settings.observe_object)
         unseen = layout.state.parts[len(seen.parts) :]
-        unseen_mirror = side_by_side([*(part.kind(robot) for part in unseen), layout.extra.mirror]).as_float32()
-        load = settings.auxiliary_of == "load"
+        unseen_mirror = side_by_side([*(part.kind(robot) for part in unseen), layout.extra.mirror])
         rows = Rows(
             observation=slice(0, seen.size),
             privileged=slice(seen.size, layout.size),
-            facts=layout.privileged_places(FACTS) if load else np.arange(seen.size, layout.size),
+            facts=layout.privileged_places(FACTS),
             withheld=layout.privileged_places(settings.withheld) - seen.size,
             observation_mirror=seen.mirror,
-            privileged_mirror=unseen_mirror,
-            facts_mirror=side_by_side([own[name] for name in FACTS]) if load else unseen_mirror,
+            privileged_mirror=unseen_mirror.as_float32(),
+            facts_mirror=side_by_side([own[name] for name in FACTS]),
             action_mirror=action_mirror(robot),
         )
         training = StudentTraining(
@@ -95,7 +94,7 @@ def run(job: Job) -> None:
         environments.close()
 
     layouts = {"observation": seen.describe(), "privileged": layout.describe()["privileged"]}
-    about = {"layout": layouts, "curriculum": curriculum, "estimated": [part.tolist() for part in training.estimated]}
+    about = {"layout": layouts, "curriculum": curriculum}
     save_network(training.network, training.architecture, job.out, "student", about)
     job.summarize(curves.write_artifact(job.out, f"{recipe.name}: student", PANELS))
 

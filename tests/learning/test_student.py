@@ -115,24 +115,6 @@ def test_a_teacher_that_is_not_told_what_the_student_cannot_know_answers_as_the_
     assert untold.update()["action_rmse"] < 1e-6 < told.update()["action_rmse"]
 
 
-@pytest.mark.parametrize("symmetry", ["construction", "none"])
-def test_a_student_that_is_asked_to_estimates_what_its_teacher_is_told(symmetry: Any) -> None:
-    errors = []
-    for weight in (0.0, 1.0):
-        training, _ = students_training(symmetry, auxiliary=weight, auxiliary_of="privileged")
-        while training.steps < training.planned:
-            training.update()
-        histories, answers = training.experience.sample(200, np.random.default_rng(0))
-        with torch.no_grad():
-            estimate = training.network.body_context(training.network.read(torch.from_numpy(histories))[1])[
-                :, 0
-            ].numpy()
-        errors.append(np.mean((estimate - answers[:, 1]) ** 2))
-    assert errors[1] < 0.2 * errors[0], errors
-    with pytest.raises(ValueError, match="start: teacher"):
-        Distillation(auxiliary_of="privileged", start="anew")
-
-
 def test_a_student_is_read_back(tmp_path: Path) -> None:
     about = architecture(symmetric=True)
     network = StudentNetwork(**about)

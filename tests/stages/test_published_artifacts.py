@@ -34,7 +34,6 @@ PUBLISHED_TO = {
     "compliant_quick": "export",
     "drake": "eval",
     "experts/quick": "distill",
-    "experts/quick_estimate": "distill",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
     "transport_controllers": "skill-eval",
