@@ -33,6 +33,7 @@ PUBLISHED_TO = {
     "compliant": "export",
     "compliant_quick": "export",
     "drake": "eval",
+    "experts/late_lift": "teacher",
     "experts/quick": "distill",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
