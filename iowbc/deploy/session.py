@@ -16,6 +16,7 @@ def open_session(path: Path) -> onnxruntime.InferenceSession:
     """A session on one thread: the graph is small, and a control loop shares its processor."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.enable_mem_reuse = False  # its planner takes seconds for the iterations of `settle` and saves 10 MB
     return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 

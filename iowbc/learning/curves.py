@@ -67,9 +67,11 @@ class Curves:
 
         shown = [name for name in panels if any(name in row for row in self.rows)]
         columns = 3
-        lines = -(-len(shown) // columns)
-        figure = Figure(figsize=(4 * columns, 2.6 * lines), layout="constrained")
-        figure.suptitle(title)
+        lines = max(1, -(-len(shown) // columns))
+        width, height = 4.0 * columns, 2.6 * lines
+        figure = Figure(figsize=(width, height))
+        figure.subplots_adjust(0.75 / width, 0.5 / height, 1 - 0.15 / width, 1 - 0.6 / height, wspace=0.24, hspace=0.45)
+        figure.suptitle(title, y=1 - 0.1 / height, va="top")
         for position, name in enumerate(shown, 1):
             axes = figure.add_subplot(lines, columns, position)
             points = [(row["step"] / 1e6, row[name]) for row in self.rows if name in row]

@@ -24,8 +24,13 @@ def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
         yield from leaves(below, (*path, str(name)))
 
 
-def test_each_value_can_be_set_alone_and_the_published_schema_allows_it() -> None:
-    schema = jsonschema.Draft202012Validator(recipe_schema())
+@pytest.fixture(scope="module")
+def schema() -> Any:
+    """Validates data by the published schema."""
+    return jsonschema.Draft202012Validator(recipe_schema())
+
+
+def test_each_value_can_be_set_alone_and_the_published_schema_allows_it(schema: Any) -> None:
     said = located({"name": "usual"}, "file.yaml:1:1")
     count = 0
     for path, value in leaves(USUAL.model_dump(mode="json")):
@@ -44,16 +49,16 @@ def test_each_value_can_be_set_alone_and_the_published_schema_allows_it() -> Non
         {"rg": {"sampling": {"pitch": {"high": 1.2}}}},
     ],
 )
-def test_a_part_of_a_section_keeps_the_rest_of_its_default(given: dict[str, Any]) -> None:
+def test_a_part_of_a_section_keeps_the_rest_of_its_default(schema: Any, given: dict[str, Any]) -> None:
     recipe = validate(located({"name": "mine", **given}, "file.yaml:1:1"))
     after = dict(leaves(recipe.model_dump(mode="json")))
     before = dict(leaves(USUAL.model_dump(mode="json")))
     ((path, value),) = leaves(given)
     assert {name for name in after if after[name] != before[name]} == {"name", path}
     assert after[path] == value
-    jsonschema.validate({"name": "mine", **given}, recipe_schema())
+    schema.validate({"name": "mine", **given})
 
 
-def test_the_schema_knows_every_key_of_a_section() -> None:
+def test_the_schema_knows_every_key_of_a_section(schema: Any) -> None:
     with pytest.raises(jsonschema.ValidationError, match="Additional properties"):
-        jsonschema.validate({"name": "mine", "task": {"reward": {"sync": {"height": {"wieght": 2}}}}}, recipe_schema())
+        schema.validate({"name": "mine", "task": {"reward": {"sync": {"height": {"wieght": 2}}}}})
