@@ -162,7 +162,7 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
     """The games of a skill, beginning with the first task of the requested scene. Raises `UsageError`."""
     from iowbc.learning.storage import read_teacher
     from iowbc.live.game import GameRequest, GameSession
-    from iowbc.skill.student import load_student
+    from iowbc.skill.lower_layer import load_student
 
     recipe = Recipe.model_validate(skill.recipe)
     generator, student = (input_of(store, skill, name) for name in ("rg-fit", policy_stage(recipe)))
