@@ -15,7 +15,7 @@ from iowbc.errors import Interrupted, NoDisplay, require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
 from iowbc.evaluation.films import film_episode, written_film
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.trials.plan import Condition, command_script, held_fixed, sequence_for
+from iowbc.evaluation.trials.plan import command_script, held_fixed, planned_episode, sequence_for
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.evaluation.trials.rollout import Acting, play_in
 from iowbc.evaluation.trials.trace import Outcome
@@ -112,7 +112,7 @@ def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
     require_known(request.scene, "scene", recipe.simulation.scenes.names)
     script = command_script(sequence_for(recipe, request.scene, request.sequence), recipe.task.commands)
     fixed = held_fixed(request.partner_share, disturbed=request.disturbances)
-    return Condition(request.scene, script, fixed).episode(request.object_mass, request.seed)
+    return planned_episode(request.scene, script, request.object_mass, request.seed, fixed)
 
 
 def open_policy(source: Source, environment: VectorEnv) -> Acting:

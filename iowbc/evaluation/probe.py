@@ -14,7 +14,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import StandardScaler
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
 from iowbc.evaluation.trials.rollout import Acting, play_episodes
 from iowbc.learning.acting import StudentPolicy
 from iowbc.recipe.recipe import Recipe
@@ -96,9 +96,11 @@ def probe_episodes(recipe: Recipe) -> list[Episode]:
     held = ({} if recipe.eval.disturbances else dict(UNDISTURBED)) | probe.fixed
     if probe.partner_share is not None:
         held["partner_share"] = probe.partner_share
-    condition = Condition(probe.scene, command_script(probe.sequence, recipe.task.commands), held)
-    masses = np.linspace(*probe.masses, probe.trials).tolist()
-    return [condition.episode(mass, probe.seed + number) for number, mass in enumerate(masses)]
+    script, masses = command_script(probe.sequence, recipe.task.commands), np.linspace(*probe.masses, probe.trials)
+    return [
+        planned_episode(probe.scene, script, mass, probe.seed + number, held)
+        for number, mass in enumerate(masses.tolist())
+    ]
 
 
 def read(

@@ -58,8 +58,7 @@ def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
     import torch
 
-    from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import evaluated_world
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
@@ -162,8 +161,7 @@ def play_batch(
     """Play one batch; its file."""
     import torch
 
-    from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import evaluated_world, played
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world, played
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as in the stage
