@@ -96,12 +96,12 @@ def play(
 
     try:
         with filming(console, request.video) as progress:
-            shown = play_episode(source, request, progress=progress)
+            episode, outcome, pictures = play_episode(source, request, progress=progress)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return
-    made = f"; {request.video} has {shown.frames} pictures" if request.video else ""
-    tell(console, f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}")
+    made = f"; {request.video} has {pictures} pictures" if request.video else ""
+    tell(console, f"{outcome.ending} after {outcome.seconds:.1f} of {episode.duration:.1f} s{made}")
 
 
 def play_on_web(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, port: int) -> None:

@@ -16,9 +16,10 @@ from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
-from iowbc.evaluation.trials.rollout import Acting, play_episodes, play_in
+from iowbc.evaluation.trials.rollout import play_episodes, play_in
 from iowbc.evaluation.trials.table import carried_along
 from iowbc.evaluation.trials.trace import Outcome
+from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
@@ -107,7 +108,7 @@ def try_out(
         return policy, _each_judged(world, episodes, play_in(environment, policy, interrupted))
 
 
-def try_out_network(world: Specification, policy: Acting, interrupted: Callable[[], bool]) -> list[Accepted]:
+def try_out_network(world: Specification, policy: Policy, interrupted: Callable[[], bool]) -> list[Accepted]:
     """Let the policy that was exported play the same trials, as it was trained. Raises Interrupted when interrupted."""
     episodes = acceptance_episodes(world.recipe)
     return _each_judged(world, episodes, play_episodes(world, episodes, policy, workers=0, interrupted=interrupted))

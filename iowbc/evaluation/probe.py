@@ -15,8 +15,8 @@ from sklearn.preprocessing import StandardScaler
 
 from iowbc.errors import StageFailed
 from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
-from iowbc.evaluation.trials.rollout import Acting, play_episodes
-from iowbc.learning.acting import StudentPolicy
+from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.learning.acting import Policy, StudentPolicy
 from iowbc.recipe.recipe import Recipe
 from iowbc.rollouts.history import History
 from iowbc.task.episodes import Episode
@@ -50,7 +50,7 @@ class ProbeReadings:
 class Listener:
     """Lets a policy act, and keeps what it sees at every so many control steps."""
 
-    def __init__(self, policy: Acting, environments: int, every: int, length: int) -> None:
+    def __init__(self, policy: Policy, environments: int, every: int, length: int) -> None:
         """`length`: of the history, where the policy has none."""
         self.policy, self.every = policy, every
         self.student = policy.network if isinstance(policy, StudentPolicy) else None
@@ -105,7 +105,7 @@ def probe_episodes(recipe: Recipe) -> list[Episode]:
 
 def read(
     world: Specification,
-    policy: Acting,
+    policy: Policy,
     *,
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,

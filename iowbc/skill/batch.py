@@ -221,8 +221,8 @@ class GameBatch:
         touched = np.zeros(self.n, np.bool_)
         for corner in range(len(CORNERS)):
             at = now.position[:, :2] + turned(self._corners[:, corner], now.yaw)
-            place = self.paths.place(task, at, now.covered)
-            touched |= np.abs(place.lateral) > self.paths.half_width(task, place.covered)
+            covered, lateral = self.paths.place(task, at, now.covered)
+            touched |= np.abs(lateral) > self.paths.half_width(task, covered)
         return touched
 
     def _observe(self, time: str) -> None:

@@ -17,10 +17,10 @@ from iowbc.evaluation.trials.plan import (
     planned_sweeps,
     push_trials,
 )
-from iowbc.evaluation.trials.rollout import Acting, PolicyInBatch, play_episodes
+from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.evaluation.trials.table import trial_row
 from iowbc.files import newest_checked, write_checked
-from iowbc.learning.acting import load_policy
+from iowbc.learning.acting import Policy, load_policy
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.scene_names import with_scenes
 from iowbc.recipe.task.joint_references import Grasps, Loads
@@ -65,7 +65,7 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
     )
 
 
-def evaluated_policy(world: Specification, folder: Path | None) -> Acting:
+def evaluated_policy(world: Specification, folder: Path | None) -> Policy:
     """The policy that `eval.policy` names: a trained one, the model-based rival, or a public controller; `folder`: the
     artifact of the stage that trained it, where one did."""
     if folder is not None:
@@ -94,7 +94,7 @@ class Protocol:
     def __init__(
         self,
         world: Specification,
-        policy: Acting,
+        policy: Policy,
         *,
         work: Path,
         workers: int,
@@ -170,7 +170,7 @@ class Protocol:
 
 def played(
     world: Specification,
-    policy: Acting,
+    policy: Policy,
     trials: Sequence[Trial],
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,

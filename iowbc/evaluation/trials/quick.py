@@ -7,8 +7,9 @@ import numpy as np
 
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, planned_episode, script_for
-from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.rollout import play_in
 from iowbc.evaluation.trials.table import trial_row
+from iowbc.learning.acting import Policy
 from iowbc.recipe.teacher import Check
 from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
@@ -57,7 +58,7 @@ class QuickEvaluation:
         """The one in the middle: with as many trials of each load, one of a middling load."""
         return self.trials[(len(self.trials) - 1) // 2]
 
-    def play(self, policy: Acting) -> dict[str, float]:
+    def play(self, policy: Policy) -> dict[str, float]:
         """Means over all trials, see `figures`, and over those of each load: `push_30_kg/survived`, `…/E_v`."""
         outcomes = zip(self.trials, play_in(self._environment, policy), strict=True)
         rows = [
