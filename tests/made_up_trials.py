@@ -1,27 +1,24 @@
 """Made-up trials, whose figures are known."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
 from iowbc.evaluation.report.aggregate import ALL_ERRORS, OVER_ALL_TRIALS, STILL
-from iowbc.evaluation.trials.metrics import Measure
-from iowbc.evaluation.trials.trace import Trace
-from iowbc.recipe.task.commands import Commands
-from iowbc.recipe.task.joint_references import GaitPrior
+from iowbc.evaluation.trials.trace import Outcome, Trace
+from iowbc.recipe.recipe import Recipe
 from iowbc.task.commands.script import CommandScript, CommandSegment
 
 DT = 0.02
 JOINTS = {"hip": 80.0, "knee": 100.0}
-MEASURE = Measure(
-    control_frequency=50.0,
-    gait=GaitPrior(frequency=1.25),
-    commands=Commands(nominal_height=0.75),
-    least_weight=5.0,
-    foot_load=50.0,
-    push_part=0.5,
-    efforts=JOINTS,
+ROBOT: Any = SimpleNamespace(joints=tuple(JOINTS), effort=np.array([*JOINTS.values()]))
+"""All of a robot that its measurement needs."""
+RECIPE = Recipe.model_validate(
+    {"name": "x", "task": {"references": {"gait": {"frequency": 1.25}}, "commands": {"nominal_height": 0.75}}}
 )
-GAIT_STEPS = MEASURE.window
+GAIT_STEPS = round(RECIPE.task.control_frequency / RECIPE.task.references.gait.frequency)
 COSTS = (
     *("E_v_raw", "E_v_raw_moving", "E_v_partner", "distance", "saturation", "saturation_peak", "slip_share"),
     *("partner_force_peak", "grip_force_peak", "link_object_force", "energy"),
@@ -37,6 +34,13 @@ COSTS = (
 def script(seconds: float = 8.0, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> CommandScript:
     """One segment at H 0.75 m, upright."""
     return CommandScript((CommandSegment(seconds, (*velocity, 0.75, 0.0, *[0.0] * 6)),))
+
+
+def outcome(signals: Trace, mass: float = 0.0, friction: float = 1.0, rolling: float = 0.0) -> Outcome:
+    """A trial that was survived, with the drawn mass [kg], friction of the ground and rolling resistance [N]."""
+    drawn = {"object_mass": mass, "ground_friction": friction, "rolling_resistance": rolling}
+    seconds, values = DT * len(signals), {name: np.array([value]) for name, value in drawn.items()}
+    return Outcome(signals, seconds, fallen=False, dropped=False, finished=True, drawn=values)
 
 
 def trace(steps: int = 400) -> Trace:

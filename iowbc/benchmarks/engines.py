@@ -47,18 +47,18 @@ class Agreement:
         return bool(abs(self.engines[0] - self.engines[1]) <= self.tolerance)
 
 
-def main(folder: Path, *, say: Callable[[str], None] = print) -> list[Agreement]:
+def main(folder: Path) -> list[Agreement]:
     """Runs every experiment, prints the table and returns it. Raises UsageError where Drake is not installed.
 
     `folder`: of the robot.
     """
     robot = load_robot(folder)
-    say(f"{'':62}{'MuJoCo':>10}{'Drake':>10}{'law':>10}")
+    print(f"{'':62}{'MuJoCo':>10}{'Drake':>10}{'law':>10}")
     rows = []
     for experiment in (free_fall, arm_pendulum, step_responses, static_load, crate_threshold, swinging_box):
         for row in experiment(robot):
             law = "" if np.isnan(row.law) else f"{row.law:.4g}"
-            say(f"{f'{row.name} [{row.unit}]':62}{row.engines[0]:10.4g}{row.engines[1]:10.4g}{law:>10}")
+            print(f"{f'{row.name} [{row.unit}]':62}{row.engines[0]:10.4g}{row.engines[1]:10.4g}{law:>10}")
             rows.append(row)
     return rows
 

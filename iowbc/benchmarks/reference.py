@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,6 @@ def main(
     *,
     workers: Sequence[int] = (),
     turns: int = 3,
-    say: Callable[[str], None] = print,
 ) -> dict[str, float]:
     """Measures, prints the table, returns every figure by name (rates in kept labels a second).
 
@@ -38,8 +37,8 @@ def main(
     cores = available_cores()
     counts = sorted(set(workers) or {1, 2, cores})
     drawn = SamplePlan(load_robot(folder), recipe.rg, recipe.seed).drawn
-    say(f"{recipe.name}: {cores} cores, kept labels a second")
-    say(f"{'method':10}{'workers':>10}{'labels/s':>12}{'a core':>12}{'scaling':>12}{'kept':>8}")
+    print(f"{recipe.name}: {cores} cores, kept labels a second")
+    print(f"{'method':10}{'workers':>10}{'labels/s':>12}{'a core':>12}{'scaling':>12}{'kept':>8}")
     figures: dict[str, float] = {}
     for method in SAMPLES:
         rg = recipe.rg.model_copy(update={"method": method})
@@ -47,7 +46,7 @@ def main(
         for count, (rate, a_core, kept) in zip(counts, measured.max(axis=0).tolist(), strict=True):
             figures |= {f"{method}_{count}": rate, f"{method}_a_core_{count}": a_core}
             scaling = figures[f"{method}_scaling_{count}"] = counts[0] * rate / figures[f"{method}_{counts[0]}"]
-            say(f"{method:10}{count:>10}{rate:>12.1f}{a_core:>12.1f}{scaling:>12.2f}{kept:>8.0%}")
+            print(f"{method:10}{count:>10}{rate:>12.1f}{a_core:>12.1f}{scaling:>12.2f}{kept:>8.0%}")
     return figures
 
 

@@ -1,7 +1,7 @@
 """`iowbc bench sim`: the vector environment against a bare loop of `mj_step`, and against usual vector environments."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -34,7 +34,6 @@ def main(
     workers: Sequence[int] = (),
     turns: int = 15,
     others: bool = True,
-    say: Callable[[str], None] = print,
 ) -> dict[str, float]:
     """Measures, prints the tables, returns every figure by name (rates in environment steps a second, times in ms).
 
@@ -47,25 +46,25 @@ def main(
     counts = sorted(set(workers) or {1, 2, cores})
     with benchmark_world(recipe, scene) as specification:
         recipe = specification.recipe
-        say(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
+        print(f"{recipe.name}: scene {scene}, {environments} environments a worker, {cores} cores")
         parts = step_breakdown(Setup(specification, environments, recipe.seed), PERIODS, turns // 2 + 1)
-        say(f"{'':34}{'steps/s':>10}{'of bare':>10}")
+        print(f"{'':34}{'steps/s':>10}{'of bare':>10}")
         figures: dict[str, float] = {}
         for count in counts:
             setup = Setup(specification, count * environments, recipe.seed)
-            figures |= _against_bare(setup, count, turns, environments * parts["reset"], say)
+            figures |= _against_bare(setup, count, turns, environments * parts["reset"])
             if others:
-                figures |= _others(specification, scene, count, figures[f"vector_env_{count}"], say)
+                figures |= _others(specification, scene, count, figures[f"vector_env_{count}"])
         parts["transfer"] = figures[f"transfer_ms_{counts[-1]}"]
         total = sum(parts[name] for name in (*PARTS, "transfer"))
-        say(f"a step of {environments} environments: {total:.2f} ms")
+        print(f"a step of {environments} environments: {total:.2f} ms")
         for name in (*PARTS, "transfer"):
-            say(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
-        say(f"  an episode's end adds {parts['reset']:.2f} ms")
+            print(f"  {name:14}{parts[name]:8.3f} ms {100 * parts[name] / total:6.1f} %")
+        print(f"  an episode's end adds {parts['reset']:.2f} ms")
         return figures | {f"step_{name}_ms": value for name, value in parts.items()}
 
 
-def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Callable[[str], None]) -> dict[str, float]:
+def _against_bare(setup: Setup, count: int, turns: int, resets: float) -> dict[str, float]:
     """Rates of the bare loop and of the vector environment in turn, with `count` processes.
 
     `resets`: time in which all environments of a worker begin an episode, one after another [ms].
@@ -81,9 +80,9 @@ def _against_bare(setup: Setup, count: int, turns: int, resets: float, say: Call
     ratio = float(np.median(pairs[:, 1] / pairs[:, 0]))
     a_step = 1e-3 * resets / (EPISODE * setup.specification.recipe.task.control_frequency)
     spread = 1.0 / (1.0 + a_step * rates[1] / setup.count)
-    say(f"{f'bare mj_step loop, {count} process(es)':34}{rates[0]:10.0f}{1.0:10.2f}")
-    say(f"{f'vector environment, {count} worker(s)':34}{rates[1]:10.0f}{ratio:10.2f}")
-    say(f"{f'  with a reset every {EPISODE:g} s':34}{rates[1] * spread:10.0f}{ratio * spread:10.2f}")
+    print(f"{f'bare mj_step loop, {count} process(es)':34}{rates[0]:10.0f}{1.0:10.2f}")
+    print(f"{f'vector environment, {count} worker(s)':34}{rates[1]:10.0f}{ratio:10.2f}")
+    print(f"{f'  with a reset every {EPISODE:g} s':34}{rates[1] * spread:10.0f}{ratio * spread:10.2f}")
     return {
         f"bare_{count}": float(rates[0]),
         f"vector_env_{count}": float(rates[1]),
@@ -104,9 +103,7 @@ def _rate(env: VectorEnv) -> float:
     return float(env.num_envs * PERIODS / (time.perf_counter() - begin))
 
 
-def _others(
-    specification: Specification, scene: str, count: int, own: float, say: Callable[[str], None]
-) -> dict[str, float]:
+def _others(specification: Specification, scene: str, count: int, own: float) -> dict[str, float]:
     """Rates of the usual vector environments, the best of five: one environment a process, `count` processes."""
     make = partial(Environment, scene, specification.recipe, specification.robot, specification.rg)
     width = load_robot(specification.robot).support.size
@@ -127,5 +124,6 @@ def _others(
         finally:
             env.close()
         rate = figures[f"{name}_{count}"] = max(rates)
-        say(f"{f'{label}, {count} process(es)':34}{rate:10.0f}{'':12}vector environment {own / rate:.1f} times as fast")
+        name = f"{label}, {count} process(es)"
+        print(f"{name:34}{rate:10.0f}{'':12}vector environment {own / rate:.1f} times as fast")
     return figures

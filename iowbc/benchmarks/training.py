@@ -1,7 +1,6 @@
 """`iowbc bench train`: the teacher's training against stable-baselines3's PPO over SubprocVecEnv, turn by turn."""
 
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -33,7 +32,6 @@ def main(
     scene: str = "lift",
     turns: int = 6,
     others: int | None = None,
-    say: Callable[[str], None] = print,
 ) -> dict[str, float]:
     """Measures, prints a table, returns every figure by name (rates in environment steps a second, times in s).
 
@@ -45,7 +43,7 @@ def main(
     with benchmark_world(recipe, scene) as specification:
         recipe, settings = specification.recipe, specification.recipe.teacher
         samples, count = settings.environments * settings.rollout, cores if others is None else others
-        say(f"{recipe.name}: scene {scene}, networks {list(settings.hidden)}, {settings.environments} environments")
+        print(f"{recipe.name}: scene {scene}, networks {list(settings.hidden)}, {settings.environments} environments")
         environments = VectorEnv(specification, num_envs=settings.environments, workers=cores, seed=recipe.seed)
         mirrors = environments.layout.mirror, action_mirror(load_robot(specification.robot))
         other = _plain(specification, scene, count, samples) if count else None
@@ -68,13 +66,13 @@ def main(
                 other.env.close()
     best = int(np.argmax(rates))
     found = {"train": rates[best]} | {f"seconds_{part}": rows[best][place] for place, part in enumerate(PARTS)}
-    say(f"{'this training':34}{rates[best]:10.0f} steps/s")
+    print(f"{'this training':34}{rates[best]:10.0f} steps/s")
     for part, seconds in zip(PARTS, rows[best], strict=True):
-        say(f"  {part:32}{1e3 * seconds:10.0f} ms an update {100 * seconds / sum(rows[best]):6.1f} %")
+        print(f"  {part:32}{1e3 * seconds:10.0f} ms an update {100 * seconds / sum(rows[best]):6.1f} %")
     if other is not None:
         found |= {"sb3": max(other_rates), "ratio": float(np.median(np.divide(rates, other_rates)))}
-        say(f"{f'SB3 PPO, SubprocVecEnv of {count}':34}{found['sb3']:10.0f} steps/s")
-        say(f"this training is {found['ratio']:.1f} times as fast")
+        print(f"{f'SB3 PPO, SubprocVecEnv of {count}':34}{found['sb3']:10.0f} steps/s")
+        print(f"this training is {found['ratio']:.1f} times as fast")
     return found
 
 

@@ -121,8 +121,7 @@ def drake_version() -> str | None:
 
 def _play(recipe: Recipe, workers: int) -> "pd.DataFrame":
     """The trials of a suite with the controller that it names."""
-    from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import Protocol, evaluated_world
+    from iowbc.evaluation.trials.protocol import Protocol, evaluated_policy, evaluated_world
     from iowbc.robot.description import robot_folder
     from iowbc.task.specification import Specification
 

@@ -96,12 +96,12 @@ def play(
 
     try:
         with filming(console, request.video) as progress:
-            shown = play_episode(source, request, progress=progress)
+            episode, outcome, pictures = play_episode(source, request, progress=progress)
     except Interrupted as stopped:
         console.print(str(stopped), markup=False, highlight=False)
         return
-    made = f"; {request.video} has {shown.frames} pictures" if request.video else ""
-    tell(console, f"{shown.outcome.ending} after {shown.outcome.seconds:.1f} of {shown.duration:.1f} s{made}")
+    made = f"; {request.video} has {pictures} pictures" if request.video else ""
+    tell(console, f"{outcome.ending} after {outcome.seconds:.1f} of {episode.duration:.1f} s{made}")
 
 
 def play_on_web(store: Store, console: Console, word: str, stage: str | None, request: PlayRequest, port: int) -> None:
@@ -162,7 +162,7 @@ def _game(store: Store, console: Console, skill: Artifact, request: PlayRequest)
     """The games of a skill, beginning with the first task of the requested scene. Raises `UsageError`."""
     from iowbc.learning.storage import read_teacher
     from iowbc.live.game import GameRequest, GameSession
-    from iowbc.skill.student import load_student
+    from iowbc.skill.lower_layer import load_student
 
     recipe = Recipe.model_validate(skill.recipe)
     generator, student = (input_of(store, skill, name) for name in ("rg-fit", policy_stage(recipe)))

@@ -141,9 +141,8 @@ def evaluated_actor(store: Store, artifact: Artifact, trials: "pd.DataFrame | No
     """The actor of an artifact of `eval`; `trials`: its table, if it is read already. Raises `UsageError`."""
     import pandas as pd
 
-    from iowbc.evaluation.acting import evaluated_policy
     from iowbc.evaluation.side_by_side import Actor
-    from iowbc.evaluation.trials.protocol import evaluated_world
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
 
     if trials is None and not (artifact.folder / TRIALS).is_file():
         raise UsageError(f"{artifact.folder} has none: its recipe asks for a probe alone")

@@ -14,16 +14,17 @@ from iowbc.deploy.controller import Controller
 from iowbc.deploy.session import Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.metrics import Measure, trial_metrics
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
-from iowbc.evaluation.trials.rollout import Acting, play_episodes, play_in
-from iowbc.evaluation.trials.table import carried_along, measure_of, met
+from iowbc.evaluation.trials.metrics import trial_metrics
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
+from iowbc.evaluation.trials.rollout import play_episodes, play_in
+from iowbc.evaluation.trials.table import carried_along
 from iowbc.evaluation.trials.trace import Outcome
+from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE
-from iowbc.robot.description import load_robot
+from iowbc.robot.description import Robot, load_robot
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -85,14 +86,13 @@ def acceptance_episodes(recipe: Recipe) -> list[Episode]:
     if not settings.acceptance:
         duration = settings.golden_steps / recipe.task.control_frequency
         script = command_script([Segment(duration=duration, ramp=0.0)], commands)
-        return [Condition(FREE, script, UNDISTURBED).episode(0.0, recipe.seed)]
-    return [
-        condition.episode(asked.mass, asked.seed + number)
-        for asked in settings.acceptance
-        for fixed in [UNDISTURBED | {"partner_share": asked.partner_share}]
-        for condition in [Condition(asked.scene, command_script(asked.sequence, commands), fixed)]
-        for number in range(asked.trials)
-    ]
+        return [planned_episode(FREE, script, 0.0, recipe.seed, UNDISTURBED)]
+    found = []
+    for asked in settings.acceptance:
+        script, fixed = command_script(asked.sequence, commands), UNDISTURBED | {"partner_share": asked.partner_share}
+        seeds = range(asked.seed, asked.seed + asked.trials)
+        found += [planned_episode(asked.scene, script, asked.mass, seed, fixed) for seed in seeds]
+    return found
 
 
 def try_out(
@@ -108,7 +108,7 @@ def try_out(
         return policy, _each_judged(world, episodes, play_in(environment, policy, interrupted))
 
 
-def try_out_network(world: Specification, policy: Acting, interrupted: Callable[[], bool]) -> list[Accepted]:
+def try_out_network(world: Specification, policy: Policy, interrupted: Callable[[], bool]) -> list[Accepted]:
     """Let the policy that was exported play the same trials, as it was trained. Raises Interrupted when interrupted."""
     episodes = acceptance_episodes(world.recipe)
     return _each_judged(world, episodes, play_episodes(world, episodes, policy, workers=0, interrupted=interrupted))
@@ -116,19 +116,14 @@ def try_out_network(world: Specification, policy: Acting, interrupted: Callable[
 
 def _each_judged(world: Specification, episodes: list[Episode], outcomes: list[Outcome]) -> list[Accepted]:
     """The result of each `export.acceptance`."""
-    trials = iter(zip(episodes, outcomes, strict=True))
-    measure = measure_of(world.recipe, load_robot(world.robot))
+    trials, robot = iter(zip(episodes, outcomes, strict=True)), load_robot(world.robot)
     asked = world.recipe.export.acceptance
-    return [judged(world.recipe, measure, one, list(itertools.islice(trials, one.trials))) for one in asked]
+    return [judged(world.recipe, robot, one, list(itertools.islice(trials, one.trials))) for one in asked]
 
 
-def judged(recipe: Recipe, measure: Measure, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
+def judged(recipe: Recipe, robot: Robot, asked: Acceptance, trials: list[tuple[Episode, Outcome]]) -> Accepted:
     """The trials that pass: survived, weight in the hands, object not lost, way covered."""
-    metrics = [
-        trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
-        for episode, outcome in trials
-        if episode.script is not None
-    ]
+    metrics = [trial_metrics(recipe, robot, episode, outcome) for episode, outcome in trials]
     survived = [outcome.survived for _, outcome in trials]
     return Accepted(
         asked,
@@ -146,7 +141,7 @@ def golden_episode(recipe: Recipe) -> Episode:
     sequence = [
         Segment.model_validate({"duration": duration, "ramp": RAMP * duration, **part}) for part in GOLDEN_PARTS
     ]
-    return Condition(FREE, command_script(sequence, recipe.task.commands), UNDISTURBED).episode(0.0, recipe.seed)
+    return planned_episode(FREE, command_script(sequence, recipe.task.commands), 0.0, recipe.seed, UNDISTURBED)
 
 
 def golden_inputs(world: Specification, exported: Path, interrupted: Callable[[], bool]) -> list[Values]:

@@ -15,9 +15,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 from iowbc.errors import NoRenderer
 from iowbc.evaluation.trials.plan import Trial
-from iowbc.evaluation.trials.rollout import Acting, in_batch, play_in
+from iowbc.evaluation.trials.rollout import in_batch, play_in
 from iowbc.evaluation.trials.table import replayed
 from iowbc.evaluation.trials.trace import Outcome
+from iowbc.learning.acting import Policy
 from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.sim.rendering.renderer import SceneRenderer
 from iowbc.task.specification import Specification
@@ -87,7 +88,7 @@ def command_line(signals: dict[str, Any], seconds: float) -> str:
 
 def film_episode(
     environment: VectorEnv,
-    policy: Acting,
+    policy: Policy,
     add: Callable[[Frame], None],
     video: Video,
     title: str,
@@ -122,7 +123,7 @@ def film_episode(
 
 def film_trial(
     world: Specification,
-    policy: Acting,
+    policy: Policy,
     row: "pd.Series[Any]",
     add: Callable[[Frame], None],
     video: Video,
@@ -151,7 +152,7 @@ class TrainingFilms:
         path = self.folder / f"{part * planned // self.parts:010}_steps.mp4"
         return None if path.exists() else path
 
-    def make(self, path: Path, policy: Acting, say: Callable[[str], None]) -> bool:
+    def make(self, path: Path, policy: Policy, say: Callable[[str], None]) -> bool:
         """Plays the trial and films it; where nothing can be drawn it says so once, and none is due any more."""
         title = f"{self.trial.case}, {self.trial.mass:g} kg, after {int(path.name.partition('_')[0]):,} steps"
         episodes = (self.trial.episode,)

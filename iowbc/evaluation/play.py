@@ -15,11 +15,11 @@ from iowbc.errors import Interrupted, NoDisplay, require_known
 from iowbc.evaluation.exported import ExportedPolicy, exported_world
 from iowbc.evaluation.films import film_episode, written_film
 from iowbc.evaluation.play_request import PlayRequest
-from iowbc.evaluation.trials.plan import Condition, command_script, held_fixed, sequence_for
+from iowbc.evaluation.trials.plan import command_script, held_fixed, planned_episode, sequence_for
 from iowbc.evaluation.trials.protocol import evaluated_world
-from iowbc.evaluation.trials.rollout import Acting, play_in
+from iowbc.evaluation.trials.rollout import play_in
 from iowbc.evaluation.trials.trace import Outcome
-from iowbc.learning.acting import load_policy, unfinished_policy
+from iowbc.learning.acting import Policy, load_policy, unfinished_policy
 from iowbc.recipe.evaluation.evaluation import Evaluation
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
@@ -61,26 +61,16 @@ def exported_source(folder: Path) -> Source:
     return Source(exported_world(folder), folder)
 
 
-@dataclass(frozen=True)
-class PlayedEpisode:
-    """The end of the episode that was shown."""
-
-    outcome: Outcome
-    duration: float
-    """Time that the episode was to last [s]."""
-    frames: int
-    """Pictures of the film; 0 in the viewer."""
-
-
 def play(
     source: Source,
     request: PlayRequest,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float, float], None] = lambda seconds, duration: None,
-) -> PlayedEpisode:
+) -> tuple[Episode, Outcome, int]:
     """Play one episode; in the viewer, or with `request.video` into that mp4 file (no display needed).
 
-    progress: receives how much of a film is drawn, and how long it is to be [s].
+    Returns the episode, its outcome, and the pictures of the film; 0 in the viewer. progress: receives how much of a
+    film is drawn, and how long it is to be [s].
 
     Raises NoDisplay, ContractBroken for a damaged export, Interrupted when interrupted or when the viewer was closed.
     """
@@ -91,7 +81,7 @@ def play(
     with closing(source.environment(episode)) as environment:
         policy = open_policy(source, environment)
         if request.video is None:
-            return PlayedEpisode(play_in_viewer(environment, policy, interrupted), episode.duration, 0)
+            return episode, play_in_viewer(environment, policy, interrupted), 0
         settings = request.video_settings or recipe.eval.video.model_copy(update={"duration": episode.duration})
         title = f"{recipe.name}: {episode.scene}, {request.object_mass:g} kg, seed {request.seed}"
         with written_film(request.video, settings.fps) as add:
@@ -104,7 +94,7 @@ def play(
                 interrupted,
                 lambda seconds: progress(seconds, episode.duration),
             )
-        return PlayedEpisode(outcome, episode.duration, frames)
+        return episode, outcome, frames
 
 
 def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
@@ -112,10 +102,10 @@ def requested_episode(recipe: Recipe, request: PlayRequest) -> Episode:
     require_known(request.scene, "scene", recipe.simulation.scenes.names)
     script = command_script(sequence_for(recipe, request.scene, request.sequence), recipe.task.commands)
     fixed = held_fixed(request.partner_share, disturbed=request.disturbances)
-    return Condition(request.scene, script, fixed).episode(request.object_mass, request.seed)
+    return planned_episode(request.scene, script, request.object_mass, request.seed, fixed)
 
 
-def open_policy(source: Source, environment: VectorEnv) -> Acting:
+def open_policy(source: Source, environment: VectorEnv) -> Policy:
     """The policy of a source: an exported controller where there is a contract, else a network."""
     if (source.policy / exported_folder.CONTRACT).is_file():
         return ExportedPolicy(Controller.load(source.policy, robots=environment.num_envs), environment)
@@ -133,7 +123,7 @@ def require_display() -> None:
         )
 
 
-def play_in_viewer(environment: VectorEnv, policy: Acting, interrupted: Callable[[], bool]) -> Outcome:
+def play_in_viewer(environment: VectorEnv, policy: Policy, interrupted: Callable[[], bool]) -> Outcome:
     """One episode in real time in a window. Raises Interrupted when the window is closed."""
     import mujoco.viewer  # needs a window system as soon as it is imported
 

@@ -14,9 +14,9 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import StandardScaler
 
 from iowbc.errors import StageFailed
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
-from iowbc.evaluation.trials.rollout import Acting, play_episodes
-from iowbc.learning.acting import StudentPolicy
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
+from iowbc.evaluation.trials.rollout import play_episodes
+from iowbc.learning.acting import Policy, StudentPolicy
 from iowbc.recipe.recipe import Recipe
 from iowbc.rollouts.history import History
 from iowbc.task.episodes import Episode
@@ -50,7 +50,7 @@ class ProbeReadings:
 class Listener:
     """Lets a policy act, and keeps what it sees at every so many control steps."""
 
-    def __init__(self, policy: Acting, environments: int, every: int, length: int) -> None:
+    def __init__(self, policy: Policy, environments: int, every: int, length: int) -> None:
         """`length`: of the history, where the policy has none."""
         self.policy, self.every = policy, every
         self.student = policy.network if isinstance(policy, StudentPolicy) else None
@@ -96,14 +96,16 @@ def probe_episodes(recipe: Recipe) -> list[Episode]:
     held = ({} if recipe.eval.disturbances else dict(UNDISTURBED)) | probe.fixed
     if probe.partner_share is not None:
         held["partner_share"] = probe.partner_share
-    condition = Condition(probe.scene, command_script(probe.sequence, recipe.task.commands), held)
-    masses = np.linspace(*probe.masses, probe.trials).tolist()
-    return [condition.episode(mass, probe.seed + number) for number, mass in enumerate(masses)]
+    script, masses = command_script(probe.sequence, recipe.task.commands), np.linspace(*probe.masses, probe.trials)
+    return [
+        planned_episode(probe.scene, script, mass, probe.seed + number, held)
+        for number, mass in enumerate(masses.tolist())
+    ]
 
 
 def read(
     world: Specification,
-    policy: Acting,
+    policy: Policy,
     *,
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,

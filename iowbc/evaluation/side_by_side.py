@@ -13,7 +13,7 @@ import pandas as pd
 from PIL import Image
 
 from iowbc.evaluation.films import Frame, film_trial, filmed, written_film
-from iowbc.evaluation.trials.rollout import Acting
+from iowbc.learning.acting import Policy
 from iowbc.task.specification import Specification
 
 TRIAL = ["suite", "case", "mass", "impulse", "trial"]
@@ -26,7 +26,7 @@ class Actor:
 
     world: Specification
     """World of its trials."""
-    policy: Acting
+    policy: Policy
     trials: pd.DataFrame
     """Its long table."""
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from safetensors.torch import load_file, save_file
 
+from iowbc.errors import StageFailed
 from iowbc.learning.networks import StudentNetwork, TeacherNetwork
 
 Network = TeacherNetwork | StudentNetwork
@@ -56,3 +57,14 @@ def read_teacher(folder: Path, name: str) -> TeacherNetwork:
     network, _ = read_network(folder, name)
     assert isinstance(network, TeacherNetwork)
     return network
+
+
+def load_student_network(folder: Path) -> tuple[StudentNetwork, dict[str, Any]]:
+    """The student in a stage's artifact. Raises StageFailed for a policy that is none."""
+    network, about = load_network(folder)
+    if not isinstance(network, StudentNetwork):
+        raise StageFailed(
+            f"{folder} holds no student: a policy that needs privileged observations can neither run on a robot nor "
+            "act below a skill; name an artifact of `distill`, or add that stage to the recipe"
+        )
+    return network, about

@@ -18,17 +18,23 @@ from iowbc.live.panel import LAST_SEED, Button, ControlPanel, table_row
 from iowbc.live.track import PAST, WINDOW, Played, Track, track_of
 from iowbc.robot import rotations
 from iowbc.sim.rendering.forces import Force
-from iowbc.skill.films import path_lines
-from iowbc.skill.game import COUNTED, TransportGame
+from iowbc.skill.batch import GameBatch
+from iowbc.skill.game import COUNTED, NOMINAL, TransportGame
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import PERSON, Plan, Rule
-from iowbc.skill.student import Student
-from iowbc.skill.trained import acted
+from iowbc.skill.situation import turned
+from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification
 
 TIME_LIMIT = 600.0
 """Time limit of a game [s]: a person looks about first."""
 ROBOTS: dict[str, Rule | None] = {"skill": None, "admittance follower": "follow", "stands": "stand"}
 """Robots that a person can compare: the trained skill, and the rule of one without."""
+PATH, WALL = (0.1, 0.35, 0.8, 1.0), (0.55, 0.2, 0.15, 1.0)
+HEIGHT = 0.01
+"""Of lines above the ground [m]."""
+EVERY = 4
+"""Points of a path from one corner of its line to the next: 0.2 m."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +73,12 @@ class GameSession(Played):
         self.reset()
 
     def reset(self) -> None:
-        self._seen = self._game.reset().observations["robot"]
+        self._seen = self._game.reset()
         batch, state = self._game.batch, self._lower.simulation.state
         self._steps, self._grip, batch.hand[:] = 0, None, np.nan
         away = self._lower.simulation.partner.at - state.object_position
         handle = rotations.rotate_inverse(state.object_quaternion, away)[0]
-        self.marks = GameMarks(tuple(path_lines(batch, 0)), handle)
+        self.marks = GameMarks(tuple(_path_lines(batch)), handle)
         self._recorder = self._recorder or MomentRecorder(self._lower, self._signals)
         mass = self._lower.simulation.drawn["object_mass"][0]
         title = f"{self.request.task}, {mass:.0f} kg"
@@ -84,11 +90,8 @@ class GameSession(Played):
             return
         batch = self._game.batch
         if self._steps % batch.substeps == 0:
-            network = self._skill if ROBOTS[self.request.robot] is None else None
-            sizes = self._game.action_sizes
-            self._game.act(
-                {"robot": acted(network, self._seen, sizes["robot"]), "human": np.zeros((1, sizes["human"]))}
-            )
+            networks = NOMINAL | {"robot": self._skill if ROBOTS[self.request.robot] is None else None}
+            self._game.act(mean_actions(networks, self._seen.observations, self._game.action_sizes))
             batch.decide()
         batch.control()
         self._steps += 1
@@ -96,7 +99,7 @@ class GameSession(Played):
         if self._steps % batch.substeps == 0:
             batch.conclude()
             outcome = self._game.outcome()
-            self._seen = outcome.observed.observations["robot"]
+            self._seen = outcome.observed
             if outcome.terminated[0] or outcome.truncated[0]:
                 self.track.ending = next((name for name in COUNTED[:-1] if outcome.figures[name][0]), "touched")
 
@@ -179,3 +182,16 @@ class GamePanel(ControlPanel):
         ]
         body = "".join(table_row(*row) for row in rows)
         return f"<div style='padding:0 1em;font-size:0.8em'><table>{body}</table></div>"
+
+
+def _path_lines(batch: GameBatch) -> list[tuple[Array, tuple[float, ...]]]:
+    """The path of the first game and its walls in the world, points (k, 3) [m] with a colour each."""
+    points, walls = batch.paths.outline(int(batch.drawn.task[0]))
+    lines = [(points[::EVERY], PATH)]
+    for wall in walls:
+        present = np.isfinite(wall[:, 0])
+        pieces = np.split(np.arange(len(wall)), np.flatnonzero(np.diff(present)) + 1)
+        lines += [(wall[piece][[*range(0, len(piece), EVERY), -1]], WALL) for piece in pieces if present[piece[0]]]
+    heading, start = batch.origin.heading[0], batch.origin.position[0, :2]
+    moved = [(turned(line, np.full(len(line), heading)) + start, colour) for line, colour in lines]
+    return [(np.column_stack([line, np.full(len(line), HEIGHT)]), colour) for line, colour in moved]

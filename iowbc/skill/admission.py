@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from iowbc.arrays import Array, Mask
-from iowbc.skill.game import TransportGame, nominal, play_once
+from iowbc.skill.game import NOMINAL, TransportGame, play_once
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import ABSENT, CLOCK, Plan, Rule
-from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 SOLVED, UNSOLVED = 0.8, 0.2
@@ -69,7 +69,7 @@ def admissions(
         for seed in range(trials)
     ]
     with TransportGame(specification, student, n=len(plans), workers=workers, plans=plans) as game:
-        figures = play_once(game, nominal(game))
+        figures = play_once(game, NOMINAL)
 
     def means(name: str, own: Mask) -> dict[str, float]:
         rows: Array = figures[name][own].astype(np.float64).reshape(len(PAIRS), trials).mean(axis=1)

@@ -1,6 +1,5 @@
 """The games of one process: decisions of robot and human, control steps below them, rewards and endings."""
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,8 +71,6 @@ class GameBatch:
         """Where persons have their hands, which pull the handle there, world frame, (n, 3) [m]; NaN lets go."""
         self.now: Situation
         """The games after the last control step."""
-        self.watch: Callable[[], None] = lambda: None
-        """Called after every control step."""
 
     def reset(self, seeds: Keys | None = None, agent_share: float = 0.0) -> None:
         """Begins the first episode everywhere, the same one each time; with seeds (n,) all that is random starts anew
@@ -116,7 +113,6 @@ class GameBatch:
         self._hands.add(simulation.target, simulation.measured.joint_position, simulation.measured.joint_velocity)
         self.now = self._situation(self.now.covered)
         self._costs += self._costs_now()
-        self.watch()
 
     def conclude(self) -> None:
         """Reward and endings of the decision just made; begins anew where a game has ended."""
@@ -225,8 +221,8 @@ class GameBatch:
         touched = np.zeros(self.n, np.bool_)
         for corner in range(len(CORNERS)):
             at = now.position[:, :2] + turned(self._corners[:, corner], now.yaw)
-            place = self.paths.place(task, at, now.covered)
-            touched |= np.abs(place.lateral) > self.paths.half_width(task, place.covered)
+            covered, lateral = self.paths.place(task, at, now.covered)
+            touched |= np.abs(lateral) > self.paths.half_width(task, covered)
         return touched
 
     def _observe(self, time: str) -> None:

@@ -8,22 +8,25 @@ import numpy as np
 
 from iowbc.arrays import Array, Keys, Mask
 from iowbc.errors import Interrupted
+from iowbc.learning.networks import TeacherNetwork
 from iowbc.skill.batch import GameBatch
 from iowbc.skill.figures import FIGURES
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.observation import sizes
 from iowbc.skill.plan import KINDS, Plan
 from iowbc.skill.setup import GameSetup
-from iowbc.skill.student import Student
+from iowbc.skill.trained import mean_actions
 from iowbc.task.specification import Specification
 from iowbc.task.vector.worker import Message
 from iowbc.task.vector.workers import InProcess, WorkerProcesses, Workers
 
 PATIENCE = 60.0
 """Time for a decision of all games before a worker counts as hung [s]."""
+ROBOT, HUMAN = "robot", "human"
 COUNTED = ("success", "fallen", "dropped", "strayed", "diverged", "time_out", "known")
 
-
-Actions = Mapping[str, Array]
+NOMINAL = {ROBOT: None, HUMAN: None}
+"""The policies of `play_once` of a robot with its nominal command, and of a human of the actions who stands."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class GameOutcome:
 class TransportGame:
     """n games. What comes of them follows from seed and game, however many workers there are."""
 
-    agents = ("robot", "human")
+    agents = (ROBOT, HUMAN)
 
     def __init__(
         self,
@@ -165,23 +168,19 @@ class TransportGame:
         self.close()
 
 
-def nominal(game: TransportGame) -> Callable[[Observed], Actions]:
-    """Zero actions: the robot's nominal command, and a human of the actions who stands."""
-    still = {agent: np.zeros((game.n, size), np.float32) for agent, size in game.action_sizes.items()}
-    return lambda observed: still
-
-
 def play_once(
-    game: TransportGame, act: Callable[[Observed], Actions], interrupted: Callable[[], bool] = lambda: False
+    game: TransportGame,
+    networks: Mapping[str, TeacherNetwork | None],
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> dict[str, Array]:
-    """Figures of the first episode of every game, (n,) by name, in the order of the games. `act` gives the actions for
-    what is observed. Raises Interrupted once `interrupted()` is true."""
+    """Figures of the first episode of every game, (n,) by name, in the order of the games, with the mean actions of
+    policies by agent; see `mean_actions`. Raises Interrupted once `interrupted()` is true."""
     observed, decision = game.reset(), 0
     rows: dict[int, dict[str, Array]] = {}
     while len(rows) < game.n:
         if interrupted():
             raise Interrupted(f"stopped after {decision / game.decision_rate:.0f} s of {game.n} games")
-        outcome = game.step(act(observed))
+        outcome = game.step(mean_actions(networks, observed.observations, game.action_sizes))
         observed, decision = outcome.observed, decision + 1
         for place, row in enumerate(outcome.figures["environment"].tolist()):
             rows.setdefault(row, {name: values[place] for name, values in outcome.figures.items()})

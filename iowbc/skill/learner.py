@@ -16,9 +16,8 @@ from iowbc.learning.policy import VALUE_GAIN
 from iowbc.learning.ppo import adapted, explained_variance
 from iowbc.learning.rollout import advantages
 from iowbc.recipe.skill.learning import SkillLearning
-from iowbc.skill.game import Observed
-from iowbc.skill.markov_game import HUMAN, ROBOT, Game
-from iowbc.skill.trained import Trained, acted
+from iowbc.skill.game import HUMAN, ROBOT, Observed, TransportGame
+from iowbc.skill.trained import Trained, mean_actions
 
 Array = NDArray[np.float32]
 
@@ -34,7 +33,7 @@ class SkillTraining:
     the episodes in which it acts; the others have scripted humans.
     """
 
-    def __init__(self, settings: SkillLearning, game: Game, seed: int) -> None:
+    def __init__(self, settings: SkillLearning, game: TransportGame, seed: int) -> None:
         torch.manual_seed(seed)
         self.settings, self.game, self.seed = settings, game, seed
         self.steps, self.planned = 0, settings.steps
@@ -242,8 +241,8 @@ class SkillTraining:
         observed, found = self.game.reset(), []
         for _ in range(decisions):
             found.append(observed.observations[ROBOT])
-            seen, sizes = observed.observations, self.game.action_sizes
-            actions = {name: acted(agent.network, seen[name], sizes[name]) for name, agent in self.agents.items()}
+            networks = {name: agent.network for name, agent in self.agents.items()}
+            actions = mean_actions(networks, observed.observations, self.game.action_sizes)
             observed = self.game.step(actions).observed
         return np.concatenate(found)
 

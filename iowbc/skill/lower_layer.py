@@ -1,7 +1,8 @@
 """The lower layer of the game: environments with the frozen student at the control frequency."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from iowbc.arrays import Array, Indices, Keys
 from iowbc.control.command import nominal_command
 from iowbc.rollouts.blocks import in_blocks
 from iowbc.rollouts.history import History
-from iowbc.skill.student import Student
+from iowbc.rollouts.policies import HistoryPolicy
 from iowbc.task.batch import Batch
 from iowbc.task.episodes import Episode
 from iowbc.task.judge import Judgement
@@ -17,6 +18,26 @@ from iowbc.task.motion import Motion
 from iowbc.task.specification import Specification
 from iowbc.task.vector.setup import Setup
 from iowbc.task.vector.shared import private_buffers
+
+
+@dataclass(frozen=True)
+class Student:
+    """A student and the length of its history."""
+
+    policy: HistoryPolicy
+    history: int
+    """Observations in H_t."""
+    observation: int
+    """Size of the part of s_t that it sees."""
+
+
+def load_student(folder: Path) -> Student:
+    """The student in the artifact of `distill`. Raises StageFailed for a policy that is none."""
+    from iowbc.learning.as_numpy import student_policy
+    from iowbc.learning.storage import load_student_network
+
+    network, about = load_student_network(folder)
+    return Student(student_policy(network), int(about["architecture"]["history"]), network.observation)
 
 
 class LowerLayer(Batch):

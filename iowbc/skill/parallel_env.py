@@ -8,8 +8,8 @@ from pettingzoo import ParallelEnv
 
 from iowbc.arrays import Array
 from iowbc.skill.game import TransportGame
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import AGENT, Plan
-from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 Values = dict[str, Any]

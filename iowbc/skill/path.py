@@ -1,7 +1,6 @@
 """Paths of transport tasks as points at equal distances, and where objects are on them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,16 +12,6 @@ SPACING = 0.05
 WINDOW = 10
 """Points before and behind the last place among which the next one is sought: no object moves so far in a decision,
 and a path that comes near itself is not left for its other part."""
-
-
-@dataclass(frozen=True)
-class PlaceOnPath:
-    """Objects on their paths."""
-
-    covered: Array
-    """Way along the path, (n,) [m]."""
-    lateral: Array
-    """Distance from the path, positive to its left, (n,) [m]."""
 
 
 class Paths:
@@ -38,8 +27,9 @@ class Paths:
         self.length = np.array([sum(stretch.length for stretch in path) for path in paths])
         """(paths,) [m]."""
 
-    def place(self, path: Indices, position: Array, around: Array) -> PlaceOnPath:
-        """Places of positions (n, 2) [m] near the way `around` (n,) [m] on paths (n,)."""
+    def place(self, path: Indices, position: Array, around: Array) -> tuple[Array, Array]:
+        """Places of positions (n, 2) [m] near the way `around` (n,) [m] on paths (n,): way along the path, and distance
+        from it, positive to its left, (n,) [m]."""
         centre = np.round(around / SPACING).astype(np.int64)
         near = (centre[:, None] + np.arange(-WINDOW, WINDOW + 1)).clip(0, self._last[path, None])
         away = position[:, None] - self.points[path[:, None], near]
@@ -48,7 +38,7 @@ class Paths:
         index, away = near[rows, nearest], away[rows, nearest]
         cosine, sine = np.cos(self._heading[path, index]), np.sin(self._heading[path, index])
         covered = index * SPACING + (cosine * away[:, 0] + sine * away[:, 1]).clip(-SPACING, SPACING)
-        return PlaceOnPath(covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0])
+        return covered.clip(0.0, self.length[path]), cosine * away[:, 1] - sine * away[:, 0]
 
     def heading(self, path: Indices, covered: Array) -> Array:
         """The path's heading at a way along it, (n,) [rad]; beyond the end that of the end."""

@@ -69,7 +69,7 @@ def situation(
     position = origin.turned(state.object_position - origin.position)
     forward, up = (rotate(state.object_quaternion, np.tile(axis, (simulation.n, 1))) for axis in np.eye(3)[::2])
     yaw = wrapped(np.arctan2(forward[:, 1], forward[:, 0]) - origin.heading)
-    place = paths.place(path, position[:, :2], covered)
+    covered, lateral = paths.place(path, position[:, :2], covered)
     return Situation(
         path=path,
         position=position,
@@ -81,11 +81,11 @@ def situation(
         handle_velocity=origin.turned(state.handle_velocity),
         heading=wrapped(moved.heading - origin.heading),
         base=origin.turned(state.base_position - origin.position),
-        covered=place.covered,
-        lateral=place.lateral,
-        yaw_error=wrapped(yaw - paths.heading(path, place.covered)),
-        height_error=position[:, 2] - paths.height(path, place.covered),
-        left=paths.length[path] - place.covered,
+        covered=covered,
+        lateral=lateral,
+        yaw_error=wrapped(yaw - paths.heading(path, covered)),
+        height_error=position[:, 2] - paths.height(path, covered),
+        left=paths.length[path] - covered,
     )
 
 

@@ -15,6 +15,8 @@ from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import HIDDEN_GAIN
 from iowbc.recipe.skill.learning import SkillLearning
 
+Values = NDArray[np.float32]
+
 
 class Trained:
     """A network that learns, with the running statistics of its inputs and its optimiser."""
@@ -71,9 +73,16 @@ class Trained:
         self.rate = float(arrays["rate"][0])
 
 
-def acted(network: TeacherNetwork | None, observation: NDArray[np.float32], size: int) -> NDArray[np.float32]:
-    """The mean action of a policy, (n, size), within its bounds; zero without one."""
-    if network is None:
-        return np.zeros((len(observation), size), np.float32)
-    with torch.inference_mode():
-        return np.asarray(network(torch.from_numpy(observation)).clamp(-1.0, 1.0).numpy())
+def mean_actions(
+    networks: Mapping[str, TeacherNetwork | None], observations: Mapping[str, Values], sizes: Mapping[str, int]
+) -> dict[str, Values]:
+    """The mean action of each agent's policy, (n, size), within its bounds; zero, the nominal one, without a policy."""
+    found: dict[str, Values] = {}
+    for agent, network in networks.items():
+        seen = observations[agent]
+        if network is None:
+            found[agent] = np.zeros((len(seen), sizes[agent]), np.float32)
+            continue
+        with torch.inference_mode():
+            found[agent] = network(torch.from_numpy(seen)).clamp(-1.0, 1.0).numpy()
+    return found

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from iowbc.evaluation.trials.plan import Trial
     from iowbc.evaluation.trials.protocol import Batches
-    from iowbc.evaluation.trials.rollout import Acting
+    from iowbc.learning.acting import Policy
     from iowbc.pipeline.cluster.spread import NodeSpread
     from iowbc.task.specification import Specification
 
@@ -58,8 +58,7 @@ def run(job: Job) -> None:
     """Play all trials; leave `trials.parquet`, `probe.parquet`, tables, figures, films and a summary."""
     import torch
 
-    from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import evaluated_world
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores, and the policy is small
@@ -78,7 +77,7 @@ def run(job: Job) -> None:
     job.summarize(metrics)
 
 
-def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
+def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
     """Play the trials whose errors are measured, report and film them; the figures to show at the end of a run."""
     from iowbc.errors import NoRenderer
     from iowbc.evaluation.films import film_trial, filmed, written_film
@@ -113,7 +112,7 @@ def measure(job: Job, world: "Specification", policy: "Acting") -> dict[str, flo
     return headline(summary)
 
 
-def probe(job: Job, world: "Specification", policy: "Acting") -> dict[str, float]:
+def probe(job: Job, world: "Specification", policy: "Policy") -> dict[str, float]:
     """Read the object's mass from what the policy sees, and report it; R² and error of each source."""
     from iowbc.evaluation.probe import inferred_masses, read
     from iowbc.evaluation.report.probe import write_probe
@@ -162,8 +161,7 @@ def play_batch(
     """Play one batch; its file."""
     import torch
 
-    from iowbc.evaluation.acting import evaluated_policy
-    from iowbc.evaluation.trials.protocol import evaluated_world, played
+    from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world, played
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as in the stage

@@ -35,10 +35,11 @@ def run(job: Job) -> None:
     from iowbc.export import golden
     from iowbc.export.folder import write_folder
     from iowbc.learning.acting import policy_of
+    from iowbc.learning.storage import load_student_network
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # as on the robot, where the controller has one thread
-    rg, (student, about) = job.inputs.get("rg-fit"), _student(job.inputs[policy_stage(job.recipe)])
+    rg, (student, about) = job.inputs.get("rg-fit"), load_student_network(job.inputs[policy_stage(job.recipe)])
     graph = _graph(job, student, about)
     sources = {stage: folder.name for stage, folder in job.inputs.items()} | {"export": job.key}
     statement = write_folder(job.out, graph, job.recipe, rg, sources)
@@ -76,20 +77,6 @@ def run(job: Job) -> None:
         differ = metrics[f"errors_differ/{place}"]
         job.report.say(f"{each.sentence}; its errors differ from the torch student's by {differ:.2%} at most")
     _require_gates(job.recipe.export, differences, policy.largest_difference, played)
-
-
-def _student(source: Path) -> "tuple[StudentNetwork, dict[str, Any]]":
-    """The student of a stage's artifact, and its description. Raises StageFailed where there is none."""
-    from iowbc.learning.networks import StudentNetwork
-    from iowbc.learning.storage import load_network
-
-    network, about = load_network(source)
-    if not isinstance(network, StudentNetwork):
-        raise StageFailed(
-            f"{source} holds no student: a policy that needs privileged observations cannot run on a robot; "
-            "add the stage `distill` to the recipe, or leave `export` out of its stages"
-        )
-    return network, about
 
 
 def _graph(job: Job, student: "StudentNetwork", about: Mapping[str, Any]) -> "ControllerGraph":

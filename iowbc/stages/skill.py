@@ -38,10 +38,9 @@ def run(job: Job) -> None:
 
     from iowbc.export.skill import write_skill
     from iowbc.learning.storage import save_network
-    from iowbc.skill.game import TransportGame
+    from iowbc.skill.game import ROBOT, TransportGame
     from iowbc.skill.learner import SkillTraining
-    from iowbc.skill.markov_game import ROBOT
-    from iowbc.skill.student import load_student
+    from iowbc.skill.lower_layer import load_student
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the networks are small, and the simulation has the cores

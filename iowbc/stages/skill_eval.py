@@ -64,10 +64,9 @@ def run(job: Job) -> None:
     from iowbc.pipeline.store.runs import read_yaml
     from iowbc.results.picture import write_figure
     from iowbc.results.table import write_table
-    from iowbc.skill.evaluation.games import GameEvaluation, cases, on_controller
+    from iowbc.skill.evaluation.games import on_controller, planned_games, play_batches
     from iowbc.skill.evaluation.tables import figure, headline, tables
-    from iowbc.skill.game import TransportGame
-    from iowbc.skill.student import load_student
+    from iowbc.skill.lower_layer import load_student
     from iowbc.task.specification import Specification
 
     torch.set_num_threads(1)  # the result must not depend on the machine's cores
@@ -80,18 +79,12 @@ def run(job: Job) -> None:
         folder, rg = job.inputs[f"{label}/distill"], job.inputs[f"{label}/rg-fit"]
         task, other = Recipe.model_validate(read_yaml(folder / RECIPE)).task, load_student(folder)
         lower[label] = on_controller(world, label, task, other, rg), other
-    evaluation = GameEvaluation(
-        lambda label, plans: TransportGame(*lower[label], n=len(plans), workers=job.workers, seed=0, plans=plans),
-        human,
-        skill.eval.games,
-        job.work,
-        job.interrupted,
-    )
-    planned, competing = cases(skill, human is not None), _competitors(job)
+    planned, competing = planned_games(skill, human is not None), _competitors(job)
     rows: list[pd.DataFrame] = []
     done = 0
     for competitor in competing:
-        for batch in evaluation.batches(competitor, planned):
+        asked = (skill.eval, competitor, human, planned, lower[competitor.controller])
+        for batch in play_batches(*asked, job.workers, job.work, job.interrupted):
             rows.append(batch)
             done += len(batch)
             job.report.progress(done, len(planned) * len(competing), f"{competitor.label} {competitor.training}")

@@ -63,6 +63,7 @@ def run(job: Job) -> None:
     import torch
 
     from iowbc.control.action import action_mirror
+    from iowbc.evaluation.films import TrainingFilms
     from iowbc.learning.computing import prepare_process
     from iowbc.learning.history_environments import HistoryEnvironments
     from iowbc.learning.storage import save_network
@@ -86,8 +87,8 @@ def run(job: Job) -> None:
         open_ones.enter_context(closing(environments))
         score, films = None, None
         if settings.check.every is not None:
-            check = open_ones.enter_context(check_of(world, job.workers))
-            score, films = check.play, _films(check, job)
+            check = open_ones.enter_context(closing(check_of(world, job.workers)))
+            score, films = check.play, TrainingFilms(check.world, check.middle, job.work / VIDEOS, settings.check.films)
         rows = environments
         if settings.history is not None:
             rows = HistoryEnvironments(environments, environments.layout.state.size, settings.history.length)
@@ -153,15 +154,6 @@ def check_of(world: "Specification", workers: int) -> "QuickEvaluation":
     ]
     trials = trials or quick_trials(own, "lift", (0.0,), check.trials, check.seed)
     return QuickEvaluation(own, trials, check=check, workers=min(workers, len(trials)))
-
-
-def _films(check: "QuickEvaluation", job: Job) -> "TrainingFilms | None":
-    parts = job.recipe.teacher.check.films
-    if not parts:
-        return None
-    from iowbc.evaluation.films import TrainingFilms
-
-    return TrainingFilms(check.world, check.middle, job.work / VIDEOS, parts)
 
 
 def _film(job: Job, training: "TeacherTraining", films: "TrainingFilms") -> None:

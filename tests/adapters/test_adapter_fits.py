@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.adapters.adapter import Adapter, require_fitting, scaled
-from iowbc.adapters.robot import robot_of
+from iowbc.adapters.source import robot_of
 from iowbc.errors import StageFailed
 from iowbc.robot.description import Robot, load_robot
 

@@ -22,9 +22,8 @@ from iowbc.adapters.source import load_adapter, policy_digest
 from iowbc.cli import app
 from iowbc.commands.bench_carry import SUITES, carry, suite_digest
 from iowbc.control.references import ReferenceLayer
-from iowbc.evaluation.acting import evaluated_policy
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script, planned_sweeps
-from iowbc.evaluation.trials.protocol import evaluated_world
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode, planned_sweeps
+from iowbc.evaluation.trials.protocol import evaluated_policy, evaluated_world
 from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.recipe.evaluation.sequences import WALKING
 from iowbc.recipe.reading.loading import load_recipe
@@ -87,7 +86,7 @@ def test_the_stage_plays_it_without_any_trained_policy(file: Path, tmp_path: Pat
 def test_its_robot_has_its_gains_and_starts_in_its_posture(file: Path) -> None:
     world = evaluated_world(Specification(recipe(file), robot_folder("g1")))
     script = command_script(WALKING, world.recipe.task.commands)
-    episode = Condition("lift", script, UNDISTURBED).episode(0.0, 5)
+    episode = planned_episode("lift", script, 0.0, 5, UNDISTURBED)
     (outcome,) = play_episodes(world, [replace(episode, duration=0.1)], evaluated_policy(world, None), workers=0)
     assert world.robot != robot_folder("g1")
     assert yaml.safe_load((world.robot / "robot.yaml").read_text())["joints"]["knee"]["kp"] == 100.0
@@ -104,7 +103,7 @@ def test_arms_of_its_own_go_to_the_posture_that_it_asks_for(file: Path, arms: st
     asked = asked.model_copy(update={"eval": asked.eval.model_copy(update={"public": public})})
     world = evaluated_world(Specification(asked, robot_folder("g1")))
     script = command_script(WALKING, world.recipe.task.commands)
-    episodes = tuple(Condition("lift", script).episode(mass, 5) for mass in (0.0, 1.0))
+    episodes = tuple(planned_episode("lift", script, mass, 5) for mass in (0.0, 1.0))
     environment = VectorEnv(world, num_envs=2, workers=0, seed=0, episodes=episodes)
     policy, seen = evaluated_policy(world, None), environment.reset()
     policy.reset(np.ones(2, np.bool_))
@@ -119,7 +118,7 @@ def test_arms_of_its_own_go_to_the_posture_that_it_asks_for(file: Path, arms: st
 def test_a_trial_is_the_same_whichever_it_is_played_with(file: Path) -> None:
     world = evaluated_world(Specification(recipe(file), robot_folder("g1")))
     script = command_script(WALKING, world.recipe.task.commands)
-    two = [replace(Condition("lift", script, {}).episode(1.0, 6000 + number), duration=0.4) for number in range(2)]
+    two = [replace(planned_episode("lift", script, 1.0, 6000 + number), duration=0.4) for number in range(2)]
     together = play_episodes(world, two, PolicyInBatch(evaluated_policy(world, None), 4, np.arange(2)), workers=0)
     alone = PolicyInBatch(evaluated_policy(world, None), 4, np.array([1]))
     (second,) = play_episodes(world, two[1:], alone, workers=0)

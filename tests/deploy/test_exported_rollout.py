@@ -14,7 +14,7 @@ from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import SETTLE, STEP
 from iowbc.deploy.session import open_session, run
 from iowbc.evaluation.exported import ExportedPolicy
-from iowbc.evaluation.trials.plan import Condition, command_script
+from iowbc.evaluation.trials.plan import command_script, planned_episode
 from iowbc.evaluation.trials.rollout import play_in
 from iowbc.export.golden import played, stacked
 from iowbc.export.graph import ControllerGraph
@@ -54,7 +54,7 @@ class Both:
 def driven(recipe: Recipe, robot: Robot, rg: Path, graph: ControllerGraph, exported: Path) -> Both:
     script = command_script(SEQUENCE, recipe.task.commands)
     episodes = tuple(
-        Condition(scene, script).episode(mass, seed=3) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
+        planned_episode(scene, script, mass, 3) for scene, mass in (("lift", 4.0), ("free", 0.0), ("push", 20.0))
     )
     environment = VectorEnv(Specification(recipe, robot.folder, rg), num_envs=3, workers=0, seed=0, episodes=episodes)
     controller = Controller.load(exported, robots=3)

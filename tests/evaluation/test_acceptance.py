@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_trials import MEASURE, script, trace
+from made_up_trials import DT, RECIPE, ROBOT, script, trace
 
 from iowbc.evaluation.acceptance import Accepted, judged
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.export import Acceptance
-from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import GRAVITY
 from iowbc.task.episodes import Episode
 
@@ -26,7 +25,7 @@ def played(
     signals = trace(STEPS)
     grip, path = signals.grip_force.copy(), signals.base_position.copy()
     grip[:, [2, 5]] = -0.5 * in_hands * MASS * GRAVITY
-    path[:, 0] = covered * WALK[0] * MEASURE.control_frequency**-1 * np.arange(STEPS)
+    path[:, 0] = covered * WALK[0] * DT * np.arange(STEPS)
     moved = replace(signals, grip_force=grip, base_position=path, object_position=np.add(path, [0.3, beside, 1.0]))
     values = {"object_mass": MASS, "ground_friction": 1.0, "rolling_resistance": 0.0}
     drawn = {name: np.array([value]) for name, value in values.items()}
@@ -37,7 +36,7 @@ def played(
 
 def accepted(*trials: tuple[Episode, Outcome], minimum: int = 1) -> Accepted:
     asked = Acceptance(trials=len(trials), minimum=minimum, sequence=(Segment(duration=8.0),))
-    return judged(Recipe(name="x"), MEASURE, asked, list(trials))
+    return judged(RECIPE, ROBOT, asked, list(trials))
 
 
 def test_weight_on_the_thighs_is_not_accepted() -> None:

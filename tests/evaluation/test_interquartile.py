@@ -10,7 +10,7 @@ from iowbc.evaluation.report.differences import difference_table, paired
 from iowbc.evaluation.report.error_tables import error_table, paper_table
 from iowbc.evaluation.report.interquartile import blocks, figures, improvement, interquartile_table
 from iowbc.evaluation.report.report import report_tables
-from iowbc.evaluation.report.statistics import interquartile_mean, percentile_interval
+from iowbc.evaluation.report.statistics import bootstrapped, interquartile_mean
 from iowbc.results.table import latex, markdown
 
 
@@ -30,7 +30,7 @@ def test_the_interquartile_mean_is_that_of_the_middle_half() -> None:
 
 def test_an_interval_may_reach_to_infinity_without_becoming_no_number() -> None:
     values = np.r_[np.ones(1900), np.full(100, np.inf)]
-    assert percentile_interval(values) == (1.0, np.inf)
+    assert bootstrapped(2.0, values) == (2.0, 1.0, np.inf)
 
 
 def test_all_trainings_play_the_same_masses_and_failures_are_worse_than_any_error() -> None:

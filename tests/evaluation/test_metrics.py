@@ -4,17 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_trials import DT, GAIT_STEPS, MEASURE, script, trace
+from made_up_trials import DT, GAIT_STEPS, RECIPE, ROBOT, outcome, script, trace
 
 from iowbc.evaluation.trials.errors import ERRORS, error_norm, moving_average
-from iowbc.evaluation.trials.metrics import Met, jerk, second_difference, trial_metrics
+from iowbc.evaluation.trials.metrics import jerk, second_difference, trial_metrics
 from iowbc.evaluation.trials.trace import Trace
 from iowbc.robot.rotations import wrapped
 from iowbc.task.commands.script import CommandScript
+from iowbc.task.episodes import Episode
 
 
 def metrics_of(signals: Trace, commands: CommandScript | None = None) -> dict[str, float]:
-    return trial_metrics(signals, commands or script(), MEASURE, Met())
+    commands = commands or script()
+    return trial_metrics(RECIPE, ROBOT, Episode("free", 0, commands.duration, script=commands), outcome(signals))
 
 
 def test_a_perfect_trial_has_no_error() -> None:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, Trial, command_script
+from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, command_script, planned_episode
 from iowbc.evaluation.trials.rollout import play_episodes
-from iowbc.evaluation.trials.table import measure_of, trial_row
+from iowbc.evaluation.trials.table import trial_row
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.segment import Segment
 from iowbc.recipe.recipe import Recipe
@@ -44,11 +44,14 @@ def played(recipe: Recipe) -> dict[str, tuple[Trial, Outcome]]:
     script = command_script([Segment(duration=0.8, ramp=0.0, velocity=(0.3, 0.0, 0.0))], recipe.task.commands)
     leader = {"partner_share": 0.5, "partner_behaviour": float(BEHAVIOURS.index("leader"))}
     conditions = {
-        "impedance": Condition("lift", script, CALM | {"partner_share": 0.0}, pull=PULL),
-        "compliance": Condition("lift", script, CALM | leader),
-        "map": Condition("push", script, CALM | {"partner_share": 0.0}),
+        "impedance": ("lift", {"partner_share": 0.0}, PULL),
+        "compliance": ("lift", leader, None),
+        "map": ("push", {"partner_share": 0.0}, None),
     }
-    trials = [Trial(kind, kind, kind, 4.0, 0, one.episode(4.0, 7)) for kind, one in conditions.items()]
+    trials = [
+        Trial(kind, kind, kind, 4.0, 0, planned_episode(scene, script, 4.0, 7, CALM | fixed, pull=pull))
+        for kind, (scene, fixed, pull) in conditions.items()
+    ]
     world = Specification(recipe, robot_folder("g1"), None)
     outcomes = play_episodes(world, [trial.episode for trial in trials], Action(0.2), workers=0)
     return {trial.kind: (trial, outcome) for trial, outcome in zip(trials, outcomes, strict=True)}
@@ -68,7 +71,7 @@ def test_a_pull_is_recorded_as_the_force_on_the_object(played: dict[str, tuple[T
 def test_the_row_of_a_pull_has_an_impedance_and_no_partner(
     recipe: Recipe, played: dict[str, tuple[Trial, Outcome]]
 ) -> None:
-    row = trial_row(recipe, measure_of(recipe, load_robot(robot_folder("g1"))), *played["impedance"])
+    row = trial_row(recipe, load_robot(robot_folder("g1")), *played["impedance"])
     assert (row["pull_frequency"], row["pull_direction"]) == (FREQUENCY, "left")
     assert row["impedance_magnitude"] > 2 * np.pi * FREQUENCY * 2.0, "the object alone has 4 kg"
     assert np.isnan([row["E_v_partner"], row["handle_force_p95"], row["partner_work"]]).all()
@@ -79,7 +82,7 @@ def test_the_row_of_a_partner_has_its_force_its_work_and_its_motion(
 ) -> None:
     trial, outcome = played["compliance"]
     trace = outcome.trace
-    row = trial_row(recipe, measure_of(recipe, load_robot(robot_folder("g1"))), trial, outcome)
+    row = trial_row(recipe, load_robot(robot_folder("g1")), trial, outcome)
     assert row["handle_force_peak"] == pytest.approx(np.hypot(*trace.partner_force[:, :2].T).max())
     assert np.isfinite(row["partner_work"])
     assert np.any(trace.partner_velocity)
@@ -94,7 +97,7 @@ def test_the_action_is_recorded_in_radians_and_has_no_second_difference_where_it
     robot = load_robot(robot_folder("g1"))
     trial, outcome = played["map"]
     assert outcome.trace.action == pytest.approx(np.tile(0.2 * robot.action_scale, (len(outcome.trace), 1)))
-    row = trial_row(recipe, measure_of(recipe, robot), trial, outcome)
+    row = trial_row(recipe, robot, trial, outcome)
     assert row["action_second_difference"] == pytest.approx(0.0, abs=1e-9)
     assert row["foot_force_peak"] >= outcome.trace.foot_load.max()
     assert 0.0 <= row["pressure_margin"] < 0.03

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_trials import DT, trace
+from made_up_trials import DT, outcome, trace
 
-from iowbc.evaluation.trials.metrics import Met, trial_metrics
+from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import (
     Trial,
     case_trials,
@@ -17,15 +17,15 @@ from iowbc.evaluation.trials.plan import (
     push_trials,
 )
 from iowbc.evaluation.trials.protocol import evaluated_world
-from iowbc.evaluation.trials.table import measure_of, succeeded
-from iowbc.evaluation.trials.trace import Trace
+from iowbc.evaluation.trials.table import succeeded
+from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import GRAVITY, load_robot, robot_folder
 from iowbc.task.specification import Specification
 
 FULL = Path(__file__).parents[2] / "recipes" / "full.yaml"
 RECIPE = evaluated_world(Specification(load_recipe(FULL).recipe, robot_folder("g1"))).recipe
-MEASURE = measure_of(RECIPE, load_robot(robot_folder("g1")))
+ROBOT = load_robot(robot_folder("g1"))
 SUITES = {
     "sweeps": [trial for sweep in planned_sweeps(RECIPE) for trial in sweep.named()],
     "cases": list(case_trials(RECIPE)),
@@ -35,7 +35,7 @@ SUITES = {
 }
 
 
-def statue(trial: Trial, joints: int) -> tuple[Trace, Met]:
+def statue(trial: Trial) -> Outcome:
     """What is recorded of a robot that stands in the nominal posture for the whole trial, with the object's weight in
     its hands, where it trembles by a tenth of a millimetre, or its palms at a crate that they do not push."""
     steps = round(trial.episode.duration / DT)
@@ -51,10 +51,10 @@ def statue(trial: Trial, joints: int) -> tuple[Trace, Met]:
         torso_pitch=np.full(steps, commands.nominal_pitch),
         object_position=ahead,
         grip_force=grips,
-        joint_torque=np.zeros((steps, joints)),
-        joint_saturation=np.zeros((steps, joints)),
+        joint_torque=np.zeros((steps, len(ROBOT.joints))),
+        joint_saturation=np.zeros((steps, len(ROBOT.joints))),
     )
-    return recorded, Met(held_weight=carried, ground_friction=0.5, rolling_resistance=38.0, pull=trial.episode.pull)
+    return outcome(recorded, trial.mass, friction=0.5, rolling=38.0)
 
 
 @pytest.mark.parametrize("suite", SUITES)
@@ -63,9 +63,7 @@ def test_a_statue_fails_every_suite(suite: str) -> None:
     assert cells
     passed = []
     for trial in cells.values():
-        assert trial.episode.script is not None
-        recorded, met = statue(trial, len(MEASURE.efforts))
-        metrics = trial_metrics(recorded, trial.episode.script, MEASURE, met) | {"seconds": trial.episode.duration}
+        metrics = trial_metrics(RECIPE, ROBOT, trial.episode, statue(trial)) | {"seconds": trial.episode.duration}
         if succeeded(RECIPE.eval.success, trial.kind, metrics, blocked=trial.case == "blocked crate"):
             passed.append((trial.suite, trial.case, trial.mass))
     assert not passed
@@ -73,9 +71,7 @@ def test_a_statue_fails_every_suite(suite: str) -> None:
 
 def test_what_a_statue_lacks_is_motion_and_push_alone() -> None:
     (trial, *_) = SUITES["sweeps"]
-    recorded, met = statue(trial, len(MEASURE.efforts))
-    assert trial.episode.script is not None
-    metrics = trial_metrics(recorded, trial.episode.script, MEASURE, met) | {"seconds": trial.episode.duration}
+    metrics = trial_metrics(RECIPE, ROBOT, trial.episode, statue(trial)) | {"seconds": trial.episode.duration}
     moved = metrics | {"transport_robot": 1.0, "transport_object": 1.0}
     assert succeeded(RECIPE.eval.success, trial.kind, moved)
     stagnating = {"E_alpha": 0.1, "E_h": 0.01, "push_force_share": 0.6, "foot_slip": 0.5, "seconds": 10.0}

@@ -217,10 +217,10 @@ def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
         video=film,
         video_settings=Video(width=96, height=64, fps=10),
     )
-    shown = play(exported_source(done.out), request)
-    assert shown.outcome.ending in ("finished", "fell", "dropped")
-    assert shown.duration == pytest.approx(0.3)
-    assert 1 <= shown.frames <= 4
+    episode, outcome, pictures = play(exported_source(done.out), request)
+    assert outcome.ending in ("finished", "fell", "dropped")
+    assert episode.duration == pytest.approx(0.3)
+    assert 1 <= pictures <= 4
     assert film.stat().st_size > 500
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
 

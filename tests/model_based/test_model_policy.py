@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 from stage_jobs import make_job
 
-from iowbc.evaluation.acting import evaluated_policy
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
+from iowbc.evaluation.trials.protocol import evaluated_policy
 from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
 from iowbc.recipe.evaluation.sequences import STANDING
 from iowbc.recipe.recipe import Recipe
@@ -37,7 +37,7 @@ RECIPE = Recipe.model_validate(
 
 def episodes(world: Specification, mass: float, count: int) -> list[Episode]:
     script = command_script(STANDING, world.recipe.task.commands)
-    return [Condition("lift", script, UNDISTURBED).episode(mass, 6000 + number) for number in range(count)]
+    return [planned_episode("lift", script, mass, 6000 + number, UNDISTURBED) for number in range(count)]
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot, robot_folder
 from iowbc.rollouts.policies import HistoryEncoder, HistoryPolicy, Layers, Linear, Normal
 from iowbc.skill.game import TransportGame
-from iowbc.skill.student import Student
+from iowbc.skill.lower_layer import Student
 from iowbc.task.specification import Specification
 
 HISTORY, WIDTH = 3, 8

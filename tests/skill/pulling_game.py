@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Keys
-from iowbc.skill.game import GameOutcome, Observed
-from iowbc.skill.markov_game import HUMAN, ROBOT
+from iowbc.skill.game import HUMAN, ROBOT, GameOutcome, Observed
 
 PERIOD, FRICTION, DECISIONS = 0.2, 0.6, 25
 

@@ -10,10 +10,14 @@ import torch
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.learning.networks import TeacherNetwork
+from iowbc.recipe.skill.evaluation import SkillEvaluation
 from iowbc.results.table import markdown
-from iowbc.skill.evaluation.games import Competitor, GameCase, GameEvaluation, cases
+from iowbc.skill.evaluation.games import Competitor, planned_games, play_batches
 from iowbc.skill.evaluation.tables import COLUMNS, estimate, figure, headline, improvement, tables, worst_partner
+from iowbc.skill.game import TransportGame
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import Plan
+from iowbc.task.specification import Specification
 
 
 def games(forces: dict[str, dict[str, float]], trainings: int = 2, episodes: int = 6) -> pd.DataFrame:
@@ -82,42 +86,43 @@ def test_tables_by_mass_keep_partners_apart_and_compare_the_same_mass() -> None:
 
 def test_every_combination_is_planned_once_and_nobody_follows_a_follower(make) -> None:  # type: ignore[no-untyped-def]
     skill = make().setup.skill
-    planned = cases(skill, learnt_human=True)
+    planned = planned_games(skill, learnt_human=True)
     kinds = (*skill.partners.training, *skill.partners.held_out, "agent")
     assert len(planned) == len(skill.tasks.names) * (2 * len(kinds) - 1) * skill.eval.episodes
-    assert not [case for case in planned if case.plan.partner == "follower" and not case.plan.known]
-    assert {case.plan.mass for case in planned if case.plan.task == "lift_straight"} == {13.5}
-    named = cases(make(changes={"skill.eval.masses": {"lift": (0.5, 20.0)}}).setup.skill, learnt_human=False)
-    masses = {task: {case.plan.mass for case in named if case.plan.task == task} for task in skill.tasks.names}
+    assert not [case for case in planned if case.partner == "follower" and not case.known]
+    assert {case.mass for case in planned if case.task == "lift_straight"} == {13.5}
+    named = planned_games(make(changes={"skill.eval.masses": {"lift": (0.5, 20.0)}}).setup.skill, learnt_human=False)
+    masses = {task: {case.mass for case in named if case.task == task} for task in skill.tasks.names}
     assert masses["lift_slalom"] == {0.5, 20.0}
     assert masses["push_straight"] == {65.0}
 
 
-def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    kinds = ("path", "agent")
-    planned = [
-        GameCase(Plan("lift_straight", kind, False, mass=12.0, seed=3), number) for number, kind in enumerate(kinds)
-    ]
+def test_all_competitors_play_the_same_episodes_and_finished_batches_are_kept(
+    world: Specification, student: Student, tmp_path: Path
+) -> None:
+    settings = SkillEvaluation(games=1, seed=3)
+    planned = [Plan("lift_straight", kind, False, mass=12.0, seed=3 + n) for n, kind in enumerate(("path", "agent"))]
     stop = False
 
-    def evaluation() -> GameEvaluation:
-        return GameEvaluation(lambda controller, plans: make(len(plans), plans=plans), None, 1, tmp_path, lambda: stop)
+    def played_by(competitor: Competitor) -> pd.DataFrame:
+        asked = (settings, competitor, None, planned, (world, student))
+        return pd.concat(play_batches(*asked, 0, tmp_path, lambda: stop))
 
     torch.manual_seed(0)
-    size = make(1).observation_sizes["robot"]
+    with TransportGame(world, student, n=1) as game:
+        size = game.observation_sizes["robot"]
     robot = TeacherNetwork(size, 11, [8], "elu", 5.0)
     own, rival = Competitor("MAPPO", "own", None, robot), Competitor("follower", "", "follow", None)
-    played = {one.label: pd.concat(evaluation().batches(one, planned)) for one in (own, rival)}
+    played = {one.label: played_by(one) for one in (own, rival)}
     for rows in played.values():
         assert rows["partner"].tolist() == ["path", "agent"]
         assert rows["episode"].tolist() == [0, 1]
         np.testing.assert_allclose(rows["mass"], 12.0)
     assert not np.allclose(played["MAPPO"]["partner_force_p90"], played["follower"]["partner_force_p90"])
     stop = True
-    again = pd.concat(evaluation().batches(own, planned))
-    pd.testing.assert_frame_equal(again, played["MAPPO"])
+    pd.testing.assert_frame_equal(played_by(own), played["MAPPO"])
     with pytest.raises(Interrupted):
-        list(evaluation().batches(Competitor("other", "", "lead", None), planned))
+        played_by(Competitor("other", "", "lead", None))
     stop = False
     with pytest.raises(StageFailed, match=f"observes 3 numbers, this game shows {size}"):
-        list(evaluation().batches(Competitor("x", "", None, TeacherNetwork(3, 11, [8], "elu", 5.0)), planned))
+        played_by(Competitor("x", "", None, TeacherNetwork(3, 11, [8], "elu", 5.0)))

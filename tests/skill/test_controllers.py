@@ -14,8 +14,8 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import load_robot
 from iowbc.skill.evaluation.games import on_controller
 from iowbc.skill.game import TransportGame
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import Plan
-from iowbc.skill.student import Student
 from iowbc.task.specification import Specification
 
 BLIND = {"task.observation.observe_object": False}

@@ -23,8 +23,8 @@ from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import robot_folder
 from iowbc.skill.game import TransportGame
+from iowbc.skill.lower_layer import load_student
 from iowbc.skill.plan import Plan
-from iowbc.skill.student import load_student
 from iowbc.task.specification import Specification
 
 ROOT = Path(__file__).parents[2]

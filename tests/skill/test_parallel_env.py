@@ -2,7 +2,7 @@
 
 import pytest
 
-from iowbc.skill.student import Student
+from iowbc.skill.lower_layer import Student
 from iowbc.task.specification import Specification
 
 pettingzoo = pytest.importorskip("pettingzoo", reason="the extra `games` is not installed")

@@ -29,14 +29,14 @@ def test_a_place_is_the_way_along_the_path_and_the_distance_to_its_left(paths: P
     way, left = 1.0, 0.2
     angle = way / 2.0
     inside = np.array([[(2.0 - left) * math.sin(angle), 2.0 - (2.0 - left) * math.cos(angle)]])
-    place = paths.place(ONE, inside, np.array([0.8]))
-    assert place.covered[0] == pytest.approx(way, abs=0.01)
-    assert place.lateral[0] == pytest.approx(left, abs=1e-3)
+    covered, lateral = paths.place(ONE, inside, np.array([0.8]))
+    assert covered[0] == pytest.approx(way, abs=0.01)
+    assert lateral[0] == pytest.approx(left, abs=1e-3)
 
 
 def test_a_place_stays_on_the_stretch_it_was_on(paths: Paths) -> None:
     near_the_start = np.array([[0.1, 0.0]])
-    assert paths.place(ONE, near_the_start, np.array([4.0])).covered[0] > 3.0
+    assert paths.place(ONE, near_the_start, np.array([4.0]))[0][0] > 3.0
 
 
 def test_height_rises_along_a_stretch_and_walls_end_with_theirs(paths: Paths) -> None:
@@ -50,5 +50,5 @@ def test_height_rises_along_a_stretch_and_walls_end_with_theirs(paths: Paths) ->
 def test_a_path_ends_at_its_own_end_beside_longer_ones(paths: Paths) -> None:
     short = np.ones(1, np.int64)
     assert paths.point(short, np.array([5.0]))[0] == pytest.approx([0.3, 0.0])
-    assert paths.place(short, np.array([[2.0, 0.0]]), np.array([0.3])).covered[0] == pytest.approx(0.3)
+    assert paths.place(short, np.array([[2.0, 0.0]]), np.array([0.3]))[0][0] == pytest.approx(0.3)
     assert SPACING < 0.3

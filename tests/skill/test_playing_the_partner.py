@@ -14,7 +14,7 @@ from iowbc.live.game import GamePanel, GameRequest, GameSession
 from iowbc.live.page import SETTLED, Page
 from iowbc.live.server import serving
 from iowbc.sim.rendering import appearance
-from iowbc.skill.student import Student
+from iowbc.skill.lower_layer import Student
 from iowbc.task.specification import Specification
 
 ABOVE = np.array([-1.0, -1.5, 1.5])

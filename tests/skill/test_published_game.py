@@ -1,18 +1,14 @@
-"""The tasks with the published student: admission, and a film."""
+"""The tasks with the published student are admitted."""
 
 import json
 from pathlib import Path
 
-import imageio.v2
 import pytest
 
-from iowbc.recipe.evaluation.evaluation import Video
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import robot_folder
 from iowbc.skill.admission import admissions
-from iowbc.skill.films import film_game
-from iowbc.skill.plan import Plan
-from iowbc.skill.student import Student, load_student
+from iowbc.skill.lower_layer import Student, load_student
 from iowbc.task.specification import Specification
 
 PUBLISHED = Path("runs/published")
@@ -44,13 +40,3 @@ def test_a_pair_that_knows_the_path_solves_what_a_robot_alone_and_a_pair_that_ig
 ) -> None:
     for task in admissions(world, student, trials=2, workers=2, tasks=("push_corridor", "lift_slalom")):
         assert task.problems == ()
-
-
-@pytest.mark.slow
-def test_a_game_is_filmed_with_its_path(world: Specification, student: Student, tmp_path: Path) -> None:
-    video = Video(width=160, height=128, fps=5, duration=2.0)
-    figures = film_game(world, student, Plan("lift_straight", "path", True, seed=1), tmp_path / "game.mp4", video)
-    assert figures["task"].tolist() == ["lift_straight"]
-    with imageio.v2.get_reader(tmp_path / "game.mp4") as film:
-        assert film.count_frames() == 11
-        assert film.get_data(5).std() > 10.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from changes import with_changes
 
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
+from iowbc.evaluation.trials.plan import UNDISTURBED, command_script, planned_episode
 from iowbc.evaluation.trials.protocol import evaluated_world
 from iowbc.recipe.evaluation.sequences import STANDING
 from iowbc.recipe.reading.loading import load_recipe
@@ -24,7 +24,7 @@ PLAYED_AS = {"lift_arms": ("lift", "squeeze"), "tyre_arms": ("tyre",), "push_arm
 def arm_targets(recipe: Recipe, folder: Path, robot: Robot, scene: str) -> Any:
     """Targets of the arms' joint controllers at the start of a trial in a scene, (14,) [rad]."""
     script = command_script(STANDING, recipe.task.commands)
-    episode = Condition(scene, script, UNDISTURBED).episode(1.0, 0)
+    episode = planned_episode(scene, script, 1.0, 0, UNDISTURBED)
     if getattr(recipe.simulation.scenes, scene).object is None:
         episode.fixed.pop("object_mass")
     environment = VectorEnv(Specification(recipe, folder), num_envs=1, workers=0, seed=0, episodes=(episode,))

@@ -7,7 +7,6 @@ worlds: trial k is the same world at every mass, and a training the same policy.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,7 @@ from iowbc.evaluation.report.aggregate import TRAINING, variants_of, with_traini
 from iowbc.evaluation.report.captions import in_common
 from iowbc.evaluation.report.columns import HEADS, STANDS_STILL, asks_for_transport
 from iowbc.evaluation.report.error_tables import SWEPT
-from iowbc.evaluation.report.statistics import RESAMPLES, interquartile_mean, percentile_interval
+from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
 from iowbc.evaluation.trials.errors import ERRORS, error_norm
 from iowbc.results.table import ABSENT, FAILS, Table, heads
 
@@ -30,14 +29,6 @@ Values = NDArray[np.float64]
 Block = Mapping[str, Values]
 """Trials of a variant in one suite, by seed of the training: (masses or cases, trials, figures) by `FIGURES`; infinite
 errors where a trial was not survived."""
-
-
-class Bootstrapped(NamedTuple):
-    """A figure with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
 
 
 def interquartile_table(trials: pd.DataFrame) -> Table | None:
@@ -56,7 +47,7 @@ def interquartile_table(trials: pd.DataFrame) -> Table | None:
                 rows.append((str(suite), name, str(len(part)), str(count), *_cells(estimates)))
                 numbers.append({"suite": suite, "variant": name, "seeds": len(part), "trials": count})
                 for key, one in estimates.items():
-                    numbers[-1] |= {key: one.value, f"{key}_low": one.low, f"{key}_high": one.high}
+                    numbers[-1] |= one.named(key)
         if found:
             still = {name: float(interquartile_mean(within[f"still_{name}"].to_numpy(np.float64))) for name in ERRORS}
             achieved = "none" if asks_for_transport(within) else ABSENT
@@ -101,10 +92,9 @@ def figures(block: Block) -> dict[str, Bootstrapped]:
     drawn, worlds = _drawn(values.shape[0], values.shape[2])
     resampled = values[drawn[:, :, None], :, worlds[:, None, :]].reshape(RESAMPLES, -1, len(FIGURES))
     flat = values.reshape(-1, len(FIGURES))
-    found = {"success": _bootstrapped(flat[:, 0].mean(), resampled[..., 0].mean(axis=1))}
+    found = {"success": bootstrapped(flat[:, 0].mean(), resampled[..., 0].mean(axis=1))}
     for place, name in enumerate(ERRORS, 1):
-        whole = float(interquartile_mean(flat[:, place]))
-        found[name] = _bootstrapped(whole, interquartile_mean(resampled[..., place]))
+        found[name] = bootstrapped(interquartile_mean(flat[:, place]), interquartile_mean(resampled[..., place]))
     return found
 
 
@@ -121,11 +111,7 @@ def improvement(block: Block, reference: Block) -> Bootstrapped:
         others[:, None, None, :, None],
         worlds[:, None, None, None, :],
     ]
-    return _bootstrapped(wins.mean(), resampled.mean(axis=(1, 2, 3, 4)))
-
-
-def _bootstrapped(value: float, resampled: Values) -> Bootstrapped:
-    return Bootstrapped(float(value), *percentile_interval(resampled))
+    return bootstrapped(wins.mean(), resampled.mean(axis=(1, 2, 3, 4)))
 
 
 def _drawn(trainings: int, trials: int, seed: int = 0) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -6,6 +6,7 @@ they are clusters, and what counts is how many worlds there are.
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,10 +116,22 @@ def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(stats.trim_mean(values, 0.25, axis=-1), np.float64)
 
 
-def percentile_interval(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Bootstrap interval from a statistic's values over resamples (n,), which may be infinite."""
-    low, high = np.quantile(values, ENDS, method="nearest")
-    return float(low), float(high)
+class Bootstrapped(NamedTuple):
+    """A statistic with its interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def named(self, name: str) -> dict[str, float]:
+        """Its columns in a table of numbers."""
+        return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
+
+
+def bootstrapped(value: float | NDArray[np.float64], resampled: NDArray[np.float64]) -> Bootstrapped:
+    """A statistic with its interval from its values over resamples (n,), which may be infinite."""
+    low, high = np.quantile(resampled, ENDS, method="nearest")
+    return Bootstrapped(float(value), float(low), float(high))
 
 
 def root_mean_square(true: NDArray[np.float64], inferred: NDArray[np.float64]) -> float:

@@ -1,8 +1,5 @@
 """From the signals of a trial to its row of figures."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 
 from iowbc.arrays import Array
@@ -11,77 +8,47 @@ from iowbc.evaluation.trials import errors
 from iowbc.evaluation.trials.feet import foot_metrics, ground_metrics
 from iowbc.evaluation.trials.impedance import impedance_metrics
 from iowbc.evaluation.trials.interaction import interaction_metrics, load_metrics, push_metrics
-from iowbc.evaluation.trials.trace import Trace
+from iowbc.evaluation.trials.trace import Outcome, Trace
 from iowbc.evaluation.trials.transport import beside, commanded_path, covered
-from iowbc.recipe.task.commands import Commands
-from iowbc.recipe.task.joint_references import GaitPrior
-from iowbc.task.commands.script import CommandScript
-from iowbc.task.episodes import PlannedPull
+from iowbc.recipe.recipe import Recipe
+from iowbc.robot.description import GRAVITY, Robot
+from iowbc.task.episodes import Episode
 
 
-@dataclass(frozen=True)
-class Measure:
-    """Settings of the measurement, the same for all trials of an evaluation."""
-
-    control_frequency: float
-    """[Hz]."""
-    gait: GaitPrior
-    commands: Commands
-    least_weight: float
-    """Weight on the robot under which the hands' part of it has no value [N]."""
-    foot_load: float
-    """Vertical force from which a foot counts as loaded [N]."""
-    push_part: float
-    """Part of the largest possible force that counts as pushing."""
-    efforts: Mapping[str, float]
-    """Torque limit of each joint by name, in the order of the signals [N·m]."""
-
-    @property
-    def window(self) -> int:
-        """Control steps of one gait period, over which v_sys is averaged."""
-        return round(self.control_frequency / self.gait.frequency)
-
-
-@dataclass(frozen=True)
-class Met:
-    """Drawn conditions of a trial on which its metrics depend."""
-
-    held_weight: float = 0.0
-    """Of the object in the hands [N]; 0 without."""
-    ground_friction: float = 1.0
-    """Coefficient between feet and ground."""
-    rolling_resistance: float = np.inf
-    """Of a pushed object [N]."""
-    pull: PlannedPull | None = None
-    """Sinusoidal force on the object."""
-
-
-def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Met) -> dict[str, float]:
+def trial_metrics(recipe: Recipe, robot: Robot, episode: Episode, outcome: Outcome) -> dict[str, float]:
     """Everything that is measured in a trial.
 
     The paper's errors are against the command as given: over the whole trial (`E_v`), over the part in which
     steps are asked for (`E_v_moving`), against the command as clamped to what is feasible (`E_v_clamped`), and, from
     the script alone, for a robot that stands still (`still_E_v`, `still_E_v_moving`). `E_v_raw` is without averaging,
     `E_v_raw_moving` over the part in which steps are asked for. `transport_robot`, `_object`: parts of the commanded
-    way, of length `commanded_distance`, that they cover; `object_beside`: see `beside` [m].
+    way, of length `commanded_distance`, that they cover; `object_beside`: see `beside` [m]. Raises ValueError for an
+    episode without a command sequence or without a single step.
     """
-    if len(trace) == 0:
-        raise ValueError("a trial without a single step has no metrics")
+    task, asked, script, trace = recipe.task, recipe.eval, episode.script, outcome.trace
+    if script is None or len(trace) == 0:
+        raise ValueError("a trial without a command sequence or without a single step has no metrics")
+    gait, window = task.references.gait, round(task.control_frequency / task.references.gait.frequency)
+    kind = getattr(recipe.simulation.scenes, episode.scene).kind
+    mass, friction, rolling = (
+        float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")
+    )
+    held_weight = GRAVITY * mass if kind == "lift" else 0.0
+    resistance = rolling if kind == "push" else np.inf
     whole = script.at(trace.dt * np.arange(round(script.duration / trace.dt)))
     given = script.at(trace.dt * np.arange(len(trace)))
-    moving = wants_to_move(given, measure.gait)
-    deviations = errors.deviations_from_given(trace, given, measure.window)
-    still = errors.deviations_standing_still(whole, measure.commands, trace.dt)
+    moving = wants_to_move(given, gait)
+    deviations = errors.deviations_from_given(trace, given, window)
+    still = errors.deviations_standing_still(whole, task.commands, trace.dt)
     raw = errors.velocity_deviation(trace.system_velocity, given, 1)
     directions, length = commanded_path(whole, errors.start_heading(trace), trace.dt)
     walked = float(np.sum(np.linalg.norm(np.diff(trace.base_position[:, :2], axis=0), axis=1)))
     has_object = bool(np.any(trace.object_position))
-    still_errors = still.means() | still.means("_moving", wants_to_move(whole, measure.gait))
-    push = (met.ground_friction, met.rolling_resistance, measure.push_part)
+    still_errors = still.means() | still.means("_moving", wants_to_move(whole, gait))
     return {
         **deviations.means(),
         **deviations.means("_moving", moving),
-        **errors.deviations_from_clamped(trace, measure.window).means("_clamped"),
+        **errors.deviations_from_clamped(trace, window).means("_clamped"),
         **{f"still_{name}": value for name, value in still_errors.items()},
         "E_v_raw": float(np.mean(raw)),
         "E_v_raw_moving": float(np.mean(raw[moving])) if moving.any() else np.nan,
@@ -92,26 +59,26 @@ def trial_metrics(trace: Trace, script: CommandScript, measure: Measure, met: Me
         if has_object
         else np.nan,
         "distance": walked,
-        **foot_metrics(trace, measure.foot_load, walked),
-        **ground_metrics(trace, measure.foot_load, met.ground_friction),
-        **load_metrics(trace, met.held_weight, measure.least_weight),
-        **interaction_metrics(trace, measure.window),
-        **push_metrics(trace, directions, measure.window, *push),
-        **impedance_metrics(trace, met.pull),
-        **effort_metrics(trace, measure.efforts),
+        **foot_metrics(trace, asked.foot_load, walked),
+        **ground_metrics(trace, asked.foot_load, friction),
+        **load_metrics(trace, held_weight, asked.success.least_weight),
+        **interaction_metrics(trace, window),
+        **push_metrics(trace, directions, window, friction, resistance, asked.success.push_force),
+        **impedance_metrics(trace, episode.pull),
+        **effort_metrics(trace, robot),
     }
 
 
-def effort_metrics(trace: Trace, efforts: Mapping[str, float]) -> dict[str, float]:
+def effort_metrics(trace: Trace, robot: Robot) -> dict[str, float]:
     """Costs of the trial: torques, energy, forces at hands and partner, jerk of torso and object, of the action the
     root mean square of its second difference over a control period and the support joints [rad].
 
-    efforts: torque limits by joint [N·m]. `torque_rms/<joint>`: root mean square of a joint's torque as a part of its
-    limit, and `torque_rms`, the largest of them.
+    `torque_rms/<joint>`: root mean square of a joint's torque as a part of its limit, and `torque_rms`, the largest of
+    them.
     """
     grips = np.linalg.norm(trace.grip_force.reshape(-1, 2, 3), axis=2)
     peak, saturated = np.abs(trace.joint_torque).max(axis=0), trace.joint_saturation.mean(axis=0)
-    effort = np.sqrt(np.mean(np.square(trace.joint_torque), axis=0)) / np.array([*efforts.values()])
+    effort = np.sqrt(np.mean(np.square(trace.joint_torque), axis=0)) / robot.effort
     return {
         "saturation": float(np.mean(trace.saturation)),
         "saturation_peak": float(np.max(trace.saturation)),
@@ -127,7 +94,7 @@ def effort_metrics(trace: Trace, efforts: Mapping[str, float]) -> dict[str, floa
         **{
             f"{name}/{joint}": float(value)
             for name, values in (("peak_torque", peak), ("saturated", saturated), ("torque_rms", effort))
-            for joint, value in zip(efforts, values, strict=True)
+            for joint, value in zip(robot.joints, values, strict=True)
         },
     }
 

@@ -3,7 +3,8 @@
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
 
 from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.recipe.evaluation.evaluation import Evaluation
@@ -100,22 +101,19 @@ def trial_seed(evaluation: Evaluation, number: int) -> int:
     return SPLITS[evaluation.split] + evaluation.seed + number
 
 
-@dataclass(frozen=True)
-class Condition:
-    """The conditions that trials at any mass share."""
-
-    scene: str
-    script: CommandScript
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    """Randomised quantities that are held, by name."""
-    push: PlannedPush | None = None
-    pull: PlannedPull | None = None
-
-    def episode(self, mass: float, seed: int) -> Episode:
-        """A mass of 0 is played in the scene without an object; what is not fixed is drawn."""
-        held = dict(self.fixed) if mass == 0 else {**self.fixed, "object_mass": mass}
-        scene = FREE if mass == 0 else self.scene
-        return Episode(scene, seed, self.script.duration, held, self.script, self.push, self.pull)
+def planned_episode(
+    scene: str,
+    script: CommandScript,
+    mass: float,
+    seed: int,
+    fixed: Mapping[str, float] = MappingProxyType({}),
+    push: PlannedPush | None = None,
+    pull: PlannedPull | None = None,
+) -> Episode:
+    """A trial with an object of a mass [kg], 0 in the scene without one; `fixed`: quantities that are held, by name.
+    All else is drawn."""
+    held = dict(fixed) if mass == 0 else {**fixed, "object_mass": mass}
+    return Episode(FREE if mass == 0 else scene, seed, script.duration, held, script, push, pull)
 
 
 def _cell(
@@ -134,13 +132,13 @@ def _cell(
 ) -> Iterator[Trial]:
     """One cell of the tables: trials that differ in their seeds alone.
 
-    place: kind, suite and case; mass: of the object [kg]; fixed, push, pull: see `Condition`; sequence: commands of its
-    own, see `script_for`; trials: their number, by default `eval.trials`; impulse: of the push [N·s].
+    place: kind, suite and case; mass: of the object [kg]; fixed, push, pull: see `planned_episode`; sequence: its own
+    commands, see `script_for`; trials: their number, by default `eval.trials`; impulse: of the push [N·s].
     """
     for number in range(trials or recipe.eval.trials):
         seed = trial_seed(recipe.eval, number)
         script = script_for(recipe, scene, seed, sequence, repetitions)
-        episode = Condition(scene, script, fixed, push, pull).episode(mass, seed)
+        episode = planned_episode(scene, script, mass, seed, fixed, push, pull)
         yield Trial(*place, mass, number, episode, impulse)
 
 

@@ -17,9 +17,10 @@ from iowbc.evaluation.trials.plan import (
     planned_sweeps,
     push_trials,
 )
-from iowbc.evaluation.trials.rollout import Acting, PolicyInBatch, play_episodes
-from iowbc.evaluation.trials.table import measure_of, trial_row
+from iowbc.evaluation.trials.rollout import PolicyInBatch, play_episodes
+from iowbc.evaluation.trials.table import trial_row
 from iowbc.files import newest_checked, write_checked
+from iowbc.learning.acting import Policy, load_policy
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.scene_names import with_scenes
 from iowbc.recipe.task.joint_references import Grasps, Loads
@@ -64,6 +65,22 @@ def _with_trial_scenes(recipe: Recipe) -> Recipe:
     )
 
 
+def evaluated_policy(world: Specification, folder: Path | None) -> Policy:
+    """The policy that `eval.policy` names: a trained one, the model-based rival, or a public controller; `folder`: the
+    artifact of the stage that trained it, where one did."""
+    if folder is not None:
+        return load_policy(folder)
+    robot, recipe = load_robot(world.robot), world.recipe
+    if recipe.eval.public is not None:
+        from iowbc.adapters.policy import AdaptedPolicy
+        from iowbc.adapters.source import load_adapter
+
+        return AdaptedPolicy(recipe.eval.public, load_adapter(recipe.eval.public), robot, recipe.task)
+    from iowbc.model_based.policy import ModelPolicy
+
+    return ModelPolicy(robot, recipe)
+
+
 Batches = Mapping[str, Sequence[Trial]]
 """Trials that are played together, by the name of their batch."""
 
@@ -77,7 +94,7 @@ class Protocol:
     def __init__(
         self,
         world: Specification,
-        policy: Acting,
+        policy: Policy,
         *,
         work: Path,
         workers: int,
@@ -153,7 +170,7 @@ class Protocol:
 
 def played(
     world: Specification,
-    policy: Acting,
+    policy: Policy,
     trials: Sequence[Trial],
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,
@@ -163,8 +180,8 @@ def played(
     recipe, size, places = world.recipe, world.recipe.eval.batch, np.arange(len(trials))
     in_batch, episodes = PolicyInBatch(policy, size, places), [trial.episode for trial in trials]
     outcomes = play_episodes(world, episodes, in_batch, workers=workers, interrupted=interrupted, progress=progress)
-    measure = measure_of(recipe, load_robot(world.robot))
-    rows = [trial_row(recipe, measure, trial, outcome) for trial, outcome in zip(trials, outcomes, strict=True)]
+    robot = load_robot(world.robot)
+    rows = [trial_row(recipe, robot, trial, outcome) for trial, outcome in zip(trials, outcomes, strict=True)]
     return pd.DataFrame(rows).assign(batch_size=size, batch_row=places).to_parquet(index=False)
 
 

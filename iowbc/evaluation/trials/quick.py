@@ -1,15 +1,15 @@
 """A small fixed evaluation that a training repeats, to tell its better policies from its worse."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
 
 from iowbc.evaluation.trials.errors import ERRORS
-from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, Trial, script_for
-from iowbc.evaluation.trials.rollout import Acting, play_in
-from iowbc.evaluation.trials.table import measure_of, trial_row
+from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, planned_episode, script_for
+from iowbc.evaluation.trials.rollout import play_in
+from iowbc.evaluation.trials.table import trial_row
+from iowbc.learning.acting import Policy
 from iowbc.recipe.teacher import Check
 from iowbc.robot.description import load_robot
 from iowbc.task.specification import Specification
@@ -32,16 +32,16 @@ def quick_trials(world: Specification, scene: str, masses: Sequence[float], coun
     `seed`: of the first trial, as the recipe says it, which makes it one of the development split.
     """
     scripts = [script_for(world.recipe, scene, seed + number) for number in range(count)]
-    conditions = [Condition(scene, script, UNDISTURBED | {"partner_share": 0.0}) for script in scripts]
+    fixed = UNDISTURBED | {"partner_share": 0.0}
     return [
-        Trial("quick", "quick", scene, mass, number, condition.episode(mass, seed + number))
+        Trial("quick", "quick", scene, mass, number, planned_episode(scene, script, mass, seed + number, fixed))
         for mass in masses
-        for number, condition in enumerate(conditions)
+        for number, script in enumerate(scripts)
     ]
 
 
-class QuickEvaluation(AbstractContextManager["QuickEvaluation"]):
-    """Plays the same trials with one policy after another. Use as a context manager, or `close` it."""
+class QuickEvaluation:
+    """Plays the same trials with one policy after another; `close` it."""
 
     def __init__(
         self, world: Specification, trials: Sequence[Trial], *, check: Check | None = None, workers: int = 0
@@ -49,7 +49,7 @@ class QuickEvaluation(AbstractContextManager["QuickEvaluation"]):
         """`check`: see `figures`; `workers`: processes, on which no figure depends; 0 steps the trials in this one."""
         self._check = check or Check()
         self.world, self.trials, self.recipe = world, tuple(trials), world.recipe
-        self._measure = measure_of(world.recipe, load_robot(world.robot))
+        self._robot = load_robot(world.robot)
         episodes = [trial.episode for trial in trials]
         self._environment = VectorEnv(world, num_envs=len(episodes), workers=workers, seed=0, episodes=episodes)
 
@@ -58,11 +58,11 @@ class QuickEvaluation(AbstractContextManager["QuickEvaluation"]):
         """The one in the middle: with as many trials of each load, one of a middling load."""
         return self.trials[(len(self.trials) - 1) // 2]
 
-    def play(self, policy: Acting) -> dict[str, float]:
+    def play(self, policy: Policy) -> dict[str, float]:
         """Means over all trials, see `figures`, and over those of each load: `push_30_kg/survived`, `…/E_v`."""
         outcomes = zip(self.trials, play_in(self._environment, policy), strict=True)
         rows = [
-            trial_row(self.recipe, self._measure, trial, outcome)
+            trial_row(self.recipe, self._robot, trial, outcome)
             | {"upright": outcome.seconds / trial.episode.duration, "load": f"{trial.case}_{trial.mass:g}_kg"}
             for trial, outcome in outcomes
         ]
@@ -71,9 +71,6 @@ class QuickEvaluation(AbstractContextManager["QuickEvaluation"]):
             own = figures([row for row in rows if row["load"] == load], self._check)
             found |= {f"{load}/{name}": own[name] for name in BY_LOAD}
         return found
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Ends the environments."""

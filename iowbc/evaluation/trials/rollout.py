@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from iowbc.arrays import Array
 from iowbc.errors import Interrupted
 from iowbc.evaluation.trials.trace import Outcome, Trace
+from iowbc.learning.acting import Policy
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -23,20 +24,10 @@ ASK_EVERY = 25
 """Control steps between two questions whether to stop."""
 
 
-class Acting(Protocol):
-    """What drives the environments; `iowbc.learning.acting.Policy` is one."""
-
-    def reset(self, which: NDArray[np.bool_]) -> None:
-        """Forget the past of the marked environments, shape (n,)."""
-
-    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Residual action (n, 15) from s_t (n, S) and s_priv (n, P)."""
-
-
 def play_episodes(
     world: Specification,
     episodes: Sequence[Episode],
-    policy: Acting,
+    policy: Policy,
     *,
     workers: int,
     interrupted: Callable[[], bool] = lambda: False,
@@ -55,7 +46,7 @@ def play_episodes(
 
 def play_in(
     environment: VectorEnv,
-    policy: Acting,
+    policy: Policy,
     interrupted: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda seconds: None,
     look: Callable[[float], None] = lambda seconds: None,
@@ -120,7 +111,7 @@ class PolicyInBatch:
     its sweep it is played with.
     """
 
-    def __init__(self, policy: Acting, size: int, places: NDArray[np.int64]) -> None:
+    def __init__(self, policy: Policy, size: int, places: NDArray[np.int64]) -> None:
         """`places` (n,): the environments' rows in the batch of `size`."""
         self.policy, self.size, self.places = policy, size, places
 
@@ -136,6 +127,6 @@ class PolicyInBatch:
         return batch
 
 
-def in_batch(policy: Acting, row: "pd.Series[Any]") -> PolicyInBatch:
+def in_batch(policy: Policy, row: "pd.Series[Any]") -> PolicyInBatch:
     """The policy as it acted in the trial of a row of the long table, for that trial alone."""
     return PolicyInBatch(policy, int(row["batch_size"]), np.array([int(row["batch_row"])]))

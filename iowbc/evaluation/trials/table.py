@@ -7,51 +7,22 @@ import numpy as np
 import pandas as pd
 
 from iowbc.arrays import Array
-from iowbc.evaluation.trials.metrics import Measure, Met, trial_metrics
+from iowbc.evaluation.trials.metrics import trial_metrics
 from iowbc.evaluation.trials.plan import Trial
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.recipe.evaluation.evaluation import Success
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
-from iowbc.robot.description import GRAVITY, Robot
+from iowbc.robot.description import Robot
 from iowbc.task.episodes import Episode
 
 COMPLIANCE, STAGNATION = "compliance", "stagnation"
 
 
-def measure_of(recipe: Recipe, robot: Robot) -> Measure:
-    """Settings of the measurement of a recipe's trials."""
-    task = recipe.task
-    return Measure(
-        control_frequency=task.control_frequency,
-        gait=task.references.gait,
-        commands=task.commands,
-        least_weight=recipe.eval.success.least_weight,
-        foot_load=recipe.eval.foot_load,
-        push_part=recipe.eval.success.push_force,
-        efforts=dict(zip(robot.joints, robot.effort.tolist(), strict=True)),
-    )
-
-
-def met(recipe: Recipe, episode: Episode, outcome: Outcome) -> Met:
-    """Drawn conditions of a trial."""
-    kind = getattr(recipe.simulation.scenes, episode.scene).kind
-    drawn = {name: float(outcome.drawn[name][0]) for name in ("object_mass", "ground_friction", "rolling_resistance")}
-    return Met(
-        held_weight=GRAVITY * drawn["object_mass"] if kind == "lift" else 0.0,
-        ground_friction=drawn["ground_friction"],
-        rolling_resistance=drawn["rolling_resistance"] if kind == "push" else np.inf,
-        pull=episode.pull,
-    )
-
-
-def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) -> dict[str, Any]:
+def trial_row(recipe: Recipe, robot: Robot, trial: Trial, outcome: Outcome) -> dict[str, Any]:
     """One row of the long table: what was tried, how it ended, the metrics, everything drawn, and how to replay it."""
     episode, fixed = trial.episode, trial.episode.fixed
-    if episode.script is None:
-        raise ValueError(f"trial {trial.suite} {trial.case} has no command sequence to measure it by")
-    metrics = trial_metrics(outcome.trace, episode.script, measure, met(recipe, episode, outcome))
-    metrics["seconds"] = outcome.seconds
+    metrics = trial_metrics(recipe, robot, episode, outcome) | {"seconds": outcome.seconds}
     alive = survived(recipe.eval.success, outcome)
     return {
         "variant": recipe.eval.label,
@@ -67,7 +38,7 @@ def trial_row(recipe: Recipe, measure: Measure, trial: Trial, outcome: Outcome) 
         "seed": episode.seed,
         "duration": episode.duration,
         "height": recipe.rg.height,
-        "gait_period": 1.0 / measure.gait.frequency,
+        "gait_period": 1.0 / recipe.task.references.gait.frequency,
         "partner_share": fixed.get("partner_share", np.nan),
         "pull_frequency": np.nan if episode.pull is None else episode.pull.frequency,
         "pull_direction": "" if episode.pull is None else episode.pull.direction,

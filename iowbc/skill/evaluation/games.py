@@ -2,25 +2,24 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from pydantic import ValidationError
 
-from iowbc.arrays import Array
 from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.recipe import Recipe
+from iowbc.recipe.skill.evaluation import SkillEvaluation
 from iowbc.recipe.skill.skill import Skill
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import load_robot
-from iowbc.skill.game import Observed, TransportGame, play_once
+from iowbc.skill.game import HUMAN, ROBOT, TransportGame, play_once
+from iowbc.skill.lower_layer import Student
 from iowbc.skill.plan import AGENT, Plan, Rule
-from iowbc.skill.student import Student
-from iowbc.skill.trained import acted
 from iowbc.task.specification import Specification
 
 OF_CONTROLLER = ("control_frequency", "commands", "references", "action")
@@ -41,15 +40,7 @@ class Competitor:
     """Label of the controller that it commands; empty for that of the recipe."""
 
 
-@dataclass(frozen=True)
-class GameCase:
-    """An episode that every competitor plays."""
-
-    plan: Plan
-    episode: int
-
-
-def cases(skill: Skill, learnt_human: bool) -> list[GameCase]:
+def planned_games(skill: Skill, learnt_human: bool) -> list[Plan]:
     """All episodes of an evaluation. `learnt_human`: whether there is one to play with."""
     asked, kinds = skill.eval, skill.partners
     partners = asked.partners or (*kinds.training, *kinds.held_out, *([AGENT] if learnt_human else []))
@@ -61,66 +52,53 @@ def cases(skill: Skill, learnt_human: bool) -> list[GameCase]:
         low, high = task.mass
         masses = asked.masses.get(task.scene) or [low + load * (high - low) for load in asked.loads]
         for mass, episode in itertools.product(masses, range(asked.episodes)):
-            found.append(GameCase(Plan(name, partner, known, mass=mass, seed=asked.seed + episode), episode))
+            found.append(Plan(name, partner, known, mass=mass, seed=asked.seed + episode))
     return found
 
 
-class GameEvaluation:
-    """Plays competitors in batches of games; a batch that is finished is kept in `work`."""
+def play_batches(
+    settings: SkillEvaluation,
+    competitor: Competitor,
+    human: TeacherNetwork | None,
+    planned: Sequence[Plan],
+    controller: tuple[Specification, Student],
+    workers: int,
+    work: Path,
+    interrupted: Callable[[], bool],
+) -> Iterator[pd.DataFrame]:
+    """Rows of a competitor's episodes, batch by batch; one that is finished is kept in `work`.
 
-    def __init__(
-        self,
-        make: Callable[[str, Sequence[Plan]], TransportGame],
-        human: TeacherNetwork | None,
-        games: int,
-        work: Path,
-        interrupted: Callable[[], bool],
-    ) -> None:
-        """`make`: games of plans on the controller with a label; `human`: the learnt one, the same for every
-        competitor; `games`: in a batch."""
-        self._make, self._human, self._games, self._work, self._interrupted = make, human, games, work, interrupted
+    `human`: the learnt one, the same for every competitor; `controller`: the one that the competitor commands, and its
+    world; `workers`: see `TransportGame`. Raises Interrupted where the job is asked to stop.
+    """
+    for begin in range(0, len(planned), settings.games):
+        batch = planned[begin : begin + settings.games]
+        place = f"{competitor.label} {competitor.training} {begin} {len(batch)}"
+        path = work / f"{place.replace('/', '-').replace(' ', '_')}.parquet"
+        if not path.is_file():
+            plans = [replace(plan, rule=competitor.rule) for plan in batch]
+            with TransportGame(*controller, n=len(plans), workers=workers, plans=plans) as game:
+                _require_fitting(competitor, game.observation_sizes[ROBOT])
+                figures = play_once(game, {ROBOT: competitor.robot, HUMAN: human}, interrupted)
+            rows = pd.DataFrame(figures).assign(
+                label=competitor.label,
+                training=competitor.training,
+                episode=np.array([plan.seed for plan in batch]) - settings.seed,
+                partner=[plan.partner for plan in batch],
+                known=[plan.known for plan in batch],
+            )
+            partial = path.with_suffix(".part")
+            rows.to_parquet(partial, index=False)
+            partial.rename(path)
+        yield pd.read_parquet(path)
 
-    def batches(self, competitor: Competitor, planned: Sequence[GameCase]) -> Iterator[pd.DataFrame]:
-        """Rows of the episodes, batch by batch, those of one length together.
 
-        Raises Interrupted where the job is asked to stop; finished batches are kept.
-        """
-        for begin in range(0, len(planned), self._games):
-            batch = planned[begin : begin + self._games]
-            place = f"{competitor.label} {competitor.training} {begin} {len(batch)}"
-            path = self._work / f"{place.replace('/', '-').replace(' ', '_')}.parquet"
-            if not path.is_file():
-                rows = self._played(competitor, batch)
-                partial = path.with_suffix(".part")
-                rows.to_parquet(partial, index=False)
-                partial.rename(path)
-            yield pd.read_parquet(path)
-
-    def _played(self, competitor: Competitor, planned: Sequence[GameCase]) -> pd.DataFrame:
-        """The first episode of a game of each case."""
-        plans = [replace(case.plan, rule=competitor.rule) for case in planned]
-        with closing(self._make(competitor.controller, plans)) as game:
-            size = game.observation_sizes["robot"]
-            if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
-                text = f"that skill observes {own} numbers, this game shows {size}"
-                advice = "train it with the same `skill` section and code"
-                raise StageFailed(f"skill.eval.others.{competitor.label}: {text}; {advice}")
-            networks = {"robot": competitor.robot, "human": self._human}
-
-            def act(observed: Observed) -> dict[str, Array]:
-                return {
-                    agent: acted(network, observed.observations[agent], game.action_sizes[agent])
-                    for agent, network in networks.items()
-                }
-
-            figures = play_once(game, act, self._interrupted)
-        return pd.DataFrame(figures).assign(
-            label=competitor.label,
-            training=competitor.training,
-            episode=[case.episode for case in planned],
-            partner=[case.plan.partner for case in planned],
-            known=[case.plan.known for case in planned],
-        )
+def _require_fitting(competitor: Competitor, size: int) -> None:
+    """Raises StageFailed where a skill observes something else than the games show."""
+    if competitor.robot is not None and (own := len(competitor.robot.normalizer.mean)) != size:
+        text = f"that skill observes {own} numbers, this game shows {size}"
+        advice = "train it with the same `skill` section and code"
+        raise StageFailed(f"skill.eval.others.{competitor.label}: {text}; {advice}")
 
 
 def on_controller(world: Specification, label: str, own: Task, student: Student, rg: Path | None) -> Specification:

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from iowbc.evaluation.report.statistics import RESAMPLES, interquartile_mean, percentile_interval
+from iowbc.evaluation.report.statistics import RESAMPLES, Bootstrapped, bootstrapped, interquartile_mean
 from iowbc.results.picture import COLOURS
 from iowbc.results.table import ABSENT, Cell, Table, heads
 
@@ -64,7 +64,7 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", kind: str) -
                     str(own["training"].nunique()),
                     str(len(own)),
                     _cell(found[FORCE], ".1f"),
-                    f"{found['worst'][0]:.1f}",
+                    f"{found['worst'].value:.1f}",
                     ABSENT if chance is None else _cell(chance, ".2f"),
                     _cell(tuple(100.0 * value for value in found["success"]), ".0f"),
                     *(_cell(found[figure], form) for figure, (_, form) in list(COLUMNS.items())[1:]),
@@ -72,8 +72,8 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", kind: str) -
                 )
             )
             numbers.append({"group": title, "label": label, "episodes": len(own)})
-            for figure, ends in (found | ({} if chance is None else {"P": chance})).items():
-                numbers[-1] |= dict(zip((figure, f"{figure}_low", f"{figure}_high"), ends, strict=True))
+            for figure, one in (found | ({} if chance is None else {"P": chance})).items():
+                numbers[-1] |= one.named(figure)
     shown = [head for head, _ in COLUMNS.values()]
     columns = heads(
         *("Games", "Skill", "Trainings", "Episodes", shown[0], "Worst partner [N]", "P", "Success [%]"),
@@ -89,15 +89,15 @@ def _table(name: str, games: pd.DataFrame, group: "pd.Series[str]", kind: str) -
     return Table(name, caption, columns, rows, pd.DataFrame(numbers))
 
 
-def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> tuple[float, float, float]:
-    """Interquartile mean, or the mean where `whole`, with the ends of its interval."""
+def estimate(games: pd.DataFrame, figure: str, whole: bool = False) -> Bootstrapped:
+    """Interquartile mean, or the mean where `whole`."""
     values = by_training(games, figure)
     drawn = values[_resamples(*values.shape)].reshape(RESAMPLES, -1)
 
     def mean(rows: Values) -> Values:
         return np.asarray(rows.mean(axis=-1)) if whole else interquartile_mean(rows)
 
-    return float(mean(values.ravel())), *percentile_interval(mean(drawn))
+    return bootstrapped(mean(values.ravel()), mean(drawn))
 
 
 def by_training(games: pd.DataFrame, figure: str) -> Values:
@@ -108,19 +108,19 @@ def by_training(games: pd.DataFrame, figure: str) -> Values:
     return wide.to_numpy(np.float64)
 
 
-def worst_partner(games: pd.DataFrame) -> tuple[float, float, float]:
-    """The greatest interquartile mean of the force of one partner, with the ends of its interval."""
+def worst_partner(games: pd.DataFrame) -> Bootstrapped:
+    """The greatest interquartile mean of the force of one partner."""
     found = [estimate(own, FORCE) for _, own in games.groupby("partner")]
-    return max(found, key=lambda ends: ends[0])
+    return max(found, key=lambda one: one.value)
 
 
-def improvement(first: pd.DataFrame, other: pd.DataFrame) -> tuple[float, float, float]:
-    """Probability that the first has the smaller force in the same episode, ties half, with its interval."""
+def improvement(first: pd.DataFrame, other: pd.DataFrame) -> Bootstrapped:
+    """Probability that the first has the smaller force in the same episode, ties half."""
     own, theirs = by_training(first, FORCE), by_training(other, FORCE)
     wins = (own[:, None] < theirs[None]) + 0.5 * (own[:, None] == theirs[None])
     flat = wins.reshape(-1, wins.shape[-1])
     drawn = flat[_resamples(*flat.shape)].mean(axis=(1, 2))
-    return float(wins.mean()), *percentile_interval(drawn)
+    return bootstrapped(wins.mean(), drawn)
 
 
 @cache
@@ -144,7 +144,7 @@ def headline(games: pd.DataFrame) -> dict[str, float]:
         name = f"{label}/{'known' if known else 'human_only'}".replace(" ", "_")
         values: Mapping[str, float] = {
             "partner_force_p90": float(interquartile_mean(own[FORCE].to_numpy(np.float64))),
-            "worst_partner": worst_partner(own)[0],
+            "worst_partner": worst_partner(own).value,
             "success": float(own[SUCCESS].mean()),
         }
         found |= {f"{name}/{figure}": value for figure, value in values.items()}
