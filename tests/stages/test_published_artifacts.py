@@ -35,6 +35,7 @@ PUBLISHED_TO = {
     "drake": "eval",
     "experts/late_lift": "teacher",
     "experts/quick": "distill",
+    "experts/wide": "teacher",
     "transport": "skill-eval",
     "transport_all": "skill-eval",
     "transport_controllers": "skill-eval",
