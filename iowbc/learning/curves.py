@@ -7,6 +7,7 @@ from typing import Any
 
 from iowbc.files import write_whole
 from iowbc.learning.curve_titles import title_of
+from iowbc.results.frame import write_frame
 
 TABLE, FIGURE = "tables/learning_curves.parquet", "figures/learning_curves.png"
 """Files of them in an artifact."""
@@ -49,7 +50,7 @@ class Curves:
 
         table = pd.DataFrame(self.rows, columns=list(dict.fromkeys(name for row in self.rows for name in row)))
         table = table.astype({name: "float32" for name in table.columns if name != "step"})
-        table.to_parquet(path, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+        write_frame(table, path)
 
     @staticmethod
     def restore(table: Path, path: Path) -> None:

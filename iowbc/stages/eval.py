@@ -11,6 +11,7 @@ from iowbc.pipeline.stage import Job, Presentation, Stage
 from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
+from iowbc.results.frame import write_frame
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def measure(job: Job, world: "Specification", policy: "Policy") -> dict[str, flo
         elsewhere=None if job.spread is None else partial(play_everywhere, job.spread, recipe, read_by_trials(job)),
     )
     trials = protocol.run()
-    trials.to_parquet(job.out / "trials.parquet", index=False)
+    write_frame(trials, job.out / "trials.parquet")
     summary = write_report(trials, job.out, recipe.eval.success.capacity_rate)
     (job.out / "videos").mkdir()
     try:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from iowbc.pipeline.stage import Borrowed, Job, Presentation, Stage
 from iowbc.recipe.recipe import Recipe
+from iowbc.results.frame import write_frame
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 from iowbc.stages.skill import GAME
 
@@ -89,7 +90,7 @@ def run(job: Job) -> None:
             done += len(batch)
             job.report.progress(done, len(planned) * len(competing), f"{competitor.label} {competitor.training}")
     games = pd.concat(rows, ignore_index=True)
-    games.to_parquet(job.out / "games.parquet", index=False)
+    write_frame(games, job.out / "games.parquet")
     for table in tables(games, skill.partners.held_out):
         write_table(table, job.out / "tables")
     write_figure(figure(games), job.out / "figures" / "skill_partners.png")
