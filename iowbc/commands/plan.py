@@ -54,11 +54,11 @@ def plan(
     from iowbc.commands.sweep import SweepRequest, plan_sweep
 
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
-    request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
+    console = stdout_console()
     if as_sweep or file is not None:
-        plan_sweep(SweepRequest(request, file, None), console, as_json)
+        plan_sweep(SweepRequest(recipe, overrides or (), Runs(runs), asked, file), console, as_json)
     else:
-        print_plan(request, console, as_json)
+        print_plan(Request(recipe, overrides or (), Runs(runs), asked), console, as_json)
 
 
 def print_plan(request: Request, console: Console, as_json: bool = False) -> None:

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from iowbc.errors import Problem, RecipeError
+from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.planner import Planner, Plans, planner_for
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.digests import folder_digest
@@ -30,14 +30,15 @@ class Request:
     overrides: Sequence[str]
     runs: Runs
     options: Options
-    verb: str = "run"
-    """The command: `run` or `sweep`."""
-    further: Sequence[str] = ()
-    """Words of the command line that only `iowbc sweep` knows."""
 
-    def command(self, forced: Sequence[str]) -> str:
+    @property
+    def beginning(self) -> list[str]:
+        """First words of the command."""
+        return ["iowbc", "run", self.word]
+
+    def command(self, forced: Sequence[str] = ()) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
-        words = ["iowbc", self.verb, self.word, *self.further]
+        words = self.beginning
         words += [word for override in self.overrides for word in ("--set", override)]
         for one in fields(Options):
             value = getattr(replace(self.options, force=frozenset(forced)), one.name)
@@ -66,7 +67,7 @@ def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
 
     try:
         folder = robot_folder(loaded.recipe.robot)
-    except FileNotFoundError as error:
+    except UsageError as error:
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
     try:
         robot = _robot(folder, folder_digest(folder))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from iowbc.commands import completion, options
+from iowbc.commands import options
 from iowbc.commands.lookup import named, record_sweep
-from iowbc.commands.needs import require_training
 from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import print_json, shown_path, stdout_console, tell
@@ -24,10 +23,9 @@ from iowbc.pipeline.console.board import Board
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import RunRecord, sweep_record
-from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.sweep import MOST_POINTS, Point, Sweep, load_sweep
 from iowbc.results.table import drawn, markdown
@@ -42,25 +40,22 @@ MANY = 100
 
 
 @dataclass(frozen=True)
-class SweepRequest:
-    """A call of `iowbc sweep`."""
+class SweepRequest(Request):
+    """A call of `iowbc sweep`. An override of several values varies one."""
 
-    recipe: Request
-    """Recipe and what holds for all points; `--set` of several values varies one."""
     file: Path | None
     """File that says what is varied besides."""
-    jobs: int | None
+    jobs: int | None = None
     """Points that run at the same time; empty: one here, as many as there are cores on a cluster."""
     most: int = MOST_POINTS
     """Points at most."""
 
     @property
-    def command(self) -> str:
-        """The command that goes on with this sweep."""
-        further = ["--from", str(self.file)] if self.file else []
-        further += ["--jobs", str(self.jobs)] if self.jobs else []
-        further += ["--points", str(self.most)] if self.most != MOST_POINTS else []
-        return replace(self.recipe, verb="sweep", further=further).command([])
+    def beginning(self) -> list[str]:
+        words = ["iowbc", "sweep", self.word]
+        words += ["--from", str(self.file)] if self.file else []
+        words += ["--jobs", str(self.jobs)] if self.jobs else []
+        return words + (["--points", str(self.most)] if self.most != MOST_POINTS else [])
 
 
 def sweep(
@@ -71,7 +66,7 @@ def sweep(
             "--set",
             help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
             metavar="A.B.C=VALUES",
-            autocompletion=completion.paths,
+            autocompletion=options.complete_paths,
         ),
     ] = None,
     file: options.SweepFile = None,
@@ -91,10 +86,8 @@ def sweep(
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Run a sweep, or print its plan; exits with the code of the run."""
-    request = Request(
-        recipe, overrides or (), Runs(runs), Options(until, frozenset(), workers, engine, address, on_code_change)
-    )
-    asked = SweepRequest(request, file, jobs, points)
+    settings = Options(until, frozenset(), workers, engine, address, on_code_change)
+    asked = SweepRequest(recipe, overrides or (), Runs(runs), settings, file, jobs, points)
     if dry_run:
         plan_sweep(asked, stdout_console(), as_json)
         return
@@ -104,11 +97,11 @@ def sweep(
 
 def ready(asked: SweepRequest) -> tuple[Sweep, list[Planner]]:
     """The points of a sweep, and the planner of each. Raises `RecipeError` for all that is wrong before any runs."""
-    if asked.recipe.options.force:
+    if asked.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
-        raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
-    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file, asked.most, _tell_count)
-    return found, [prepared(point.loaded, asked.recipe.runs, asked.recipe.options) for point in found.points]
+        raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
+    found = load_sweep(asked.word, asked.overrides, asked.file, asked.most, _tell_count)
+    return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
 
 
 def _tell_count(count: int) -> None:
@@ -119,10 +112,7 @@ def _tell_count(count: int) -> None:
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
     """Raises `UsageError` where points begin from what another recipe has not made yet: they would all wait for it."""
     missing = [origin for one in planners for origin in in_order(one)[:-1]]
-    first = [
-        replace(asked, verb="run", word=str(origin.loaded.file), overrides=(), options=origin.options).command([])
-        for origin in missing
-    ]
+    first = [Request(str(one.loaded.file), (), asked.runs, one.options).command() for one in missing]
     if first:
         lines = "\n  ".join(dict.fromkeys(first))
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
@@ -151,9 +141,9 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
     """
     found, planners = ready(asked)
-    _require_origins(asked.recipe, planners)
-    runs, execution = asked.recipe.runs, planners[0].loaded.recipe.execution
-    require_training("sweep")
+    _require_origins(asked, planners)
+    runs, execution = asked.runs, planners[0].loaded.recipe.execution
+    options.require_extra("train", "iowbc sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
     record_sweep(found, folder)
@@ -163,7 +153,7 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
     record: RunRecord | None = None
     try:
         with (
-            requested_cluster(asked.recipe.options, execution) as cluster,
+            requested_cluster(asked.options, execution) as cluster,
             StopRequest(shown=console.is_terminal and not quiet) as stop,
         ):
             if cluster is not None:
@@ -176,7 +166,7 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
             tasks = []
             for planner in planners:
                 loaded = planner.loaded
-                request = replace(asked.recipe, word=str(loaded.file), overrides=loaded.overrides)
+                request = Request(str(loaded.file), loaded.overrides, runs, asked.options)
                 run = partial(run_recipe, planner, request, stop=stop, within=origin, cluster=cluster, workers=workers)
                 tasks.append(PointRun(loaded.recipe.name, folder / LOGS / f"{loaded.recipe.name}.log", run))
             logs = {task.name: task.log for task in tasks}
@@ -246,4 +236,4 @@ def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -
         said.print(f"  {name}: {failure} (log {shown_path(log)})", markup=False, highlight=False)
     if code != DONE:
         head = "interrupted; to go on:" if code == INTERRUPTED else "what is finished is kept; after a remedy:"
-        said.print(f"{head}\n{asked.command}", markup=False, highlight=False)
+        said.print(f"{head}\n{asked.command()}", markup=False, highlight=False)

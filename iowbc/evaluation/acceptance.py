@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.deploy.controller import Controller
-from iowbc.deploy.session import Values
+from iowbc.deploy.controller import Controller, Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import Measure, trial_metrics
@@ -19,7 +18,7 @@ from iowbc.evaluation.trials.plan import UNDISTURBED, Condition, command_script
 from iowbc.evaluation.trials.rollout import Acting, play_episodes, play_in
 from iowbc.evaluation.trials.table import carried_along, measure_of, met
 from iowbc.evaluation.trials.trace import Outcome
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE

@@ -18,7 +18,7 @@ from mcap.writer import Writer
 from iowbc.deploy.controller import Controller
 from iowbc.errors import Damaged, UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.limits import SafetyLimits
+from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record, from_cdr, to_cdr
 

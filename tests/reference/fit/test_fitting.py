@@ -13,9 +13,8 @@ from iowbc.errors import Interrupted
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import Fit, FitGates, ReferenceGenerator, SmoothnessCheck
 from iowbc.reference.fit.fitting import FitData, fit
-from iowbc.reference.fit.gates import judge_fit
+from iowbc.reference.fit.gates import Jumps, judge_fit, measure_jumps
 from iowbc.reference.fit.preparation import split_by_group
-from iowbc.reference.fit.smoothness import Jumps, measure_jumps
 from iowbc.reference.fit.task_error import TaskErrors, TaskKinematics
 from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.sample import Sample
