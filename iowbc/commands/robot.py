@@ -242,9 +242,8 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
 
     folder = exported_folder(what)
     controller = Controller.load(folder)
-    replayed = replay(log, folder)
-    end = "all bit for bit the same" if not replayed.different else f"{replayed.different} differ"
-    tell(console, f"{replayed.turns} commands replayed, {end}")
+    turns, different = replay(log, folder)
+    tell(console, f"{turns} commands replayed, {f'{different} differ' if different else 'all bit for bit the same'}")
     for topic, _, data in read_messages(log):
         if topic in ("event", "timing"):
             tell(console, f"  {json.loads(data)['text']}")

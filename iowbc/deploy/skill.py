@@ -70,7 +70,7 @@ def read_skill_contract(folder: Path) -> SkillContract:
     """The contract of an exported skill that is whole and unchanged. Raises ContractBroken."""
     contract = parsed(SkillContract, folder / CONTRACT, "skill")
     require_sealed(contract.files, folder / CONTRACT, *FILES)
-    require_unchanged(contract.files, folder)
+    require_unchanged({name: contract.files[name] for name in FILES}, folder)
     return contract
 
 

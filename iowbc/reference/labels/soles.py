@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import PostureProblem
-from iowbc.reference.labels.sample import mean_stance
+from iowbc.reference.labels.support_model import mean_stance
 from iowbc.robot.description import Robot
 
 
