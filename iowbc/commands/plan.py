@@ -51,14 +51,14 @@ def plan(
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Print what would run of a recipe or a study, or of a sweep."""
-    from iowbc.commands.sweep import SweepRequest, plan_sweep
+    from iowbc.commands.sweep import plan_sweep
 
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
-    console = stdout_console()
+    request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
     if as_sweep or file is not None:
-        plan_sweep(SweepRequest(recipe, overrides or (), Runs(runs), asked, file), console, as_json)
+        plan_sweep(request, file, console, as_json)
     else:
-        print_plan(Request(recipe, overrides or (), Runs(runs), asked), console, as_json)
+        print_plan(request, console, as_json)
 
 
 def print_plan(request: Request, console: Console, as_json: bool = False) -> None:

@@ -30,15 +30,14 @@ class Request:
     overrides: Sequence[str]
     runs: Runs
     options: Options
-
-    @property
-    def beginning(self) -> list[str]:
-        """First words of the command."""
-        return ["iowbc", "run", self.word]
+    verb: str = "run"
+    """The command: `run` or `sweep`."""
+    further: Sequence[str] = ()
+    """Words of the command line that only `iowbc sweep` knows."""
 
     def command(self, forced: Sequence[str] = ()) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
-        words = self.beginning
+        words = ["iowbc", self.verb, self.word, *self.further]
         words += [word for override in self.overrides for word in ("--set", override)]
         for one in fields(Options):
             value = getattr(replace(self.options, force=frozenset(forced)), one.name)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,25 +38,6 @@ MANY = 100
 """Number of points from which it is printed before planning, which takes a while."""
 
 
-@dataclass(frozen=True)
-class SweepRequest(Request):
-    """A call of `iowbc sweep`. An override of several values varies one."""
-
-    file: Path | None
-    """File that says what is varied besides."""
-    jobs: int | None = None
-    """Points that run at the same time; empty: one here, as many as there are cores on a cluster."""
-    most: int = MOST_POINTS
-    """Points at most."""
-
-    @property
-    def beginning(self) -> list[str]:
-        words = ["iowbc", "sweep", self.word]
-        words += ["--from", str(self.file)] if self.file else []
-        words += ["--jobs", str(self.jobs)] if self.jobs else []
-        return words + (["--points", str(self.most)] if self.most != MOST_POINTS else [])
-
-
 def sweep(
     recipe: options.RecipeFile,
     overrides: Annotated[
@@ -87,20 +67,26 @@ def sweep(
 ) -> None:
     """Run a sweep, or print its plan; exits with the code of the run."""
     settings = Options(until, frozenset(), workers, engine, address, on_code_change)
-    asked = SweepRequest(recipe, overrides or (), Runs(runs), settings, file, jobs, points)
+    further = ["--from", str(file)] if file else []
+    further += ["--jobs", str(jobs)] if jobs else []
+    further += ["--points", str(points)] if points != MOST_POINTS else []
+    request = Request(recipe, overrides or (), Runs(runs), settings, "sweep", further)
     if dry_run:
-        plan_sweep(asked, stdout_console(), as_json)
+        plan_sweep(request, file, stdout_console(), as_json, points)
         return
     with outlasting_readers():
-        raise typer.Exit(run_sweep(asked, stdout_console(), quiet))
+        raise typer.Exit(run_sweep(request, file, jobs, points, stdout_console(), quiet))
 
 
-def ready(asked: SweepRequest) -> tuple[Sweep, list[Planner]]:
-    """The points of a sweep, and the planner of each. Raises `RecipeError` for all that is wrong before any runs."""
+def ready(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
+    """The points of a sweep, `most` at most, and the planner of each; `file` says what is varied besides.
+
+    Raises `RecipeError` for all that is wrong before any runs.
+    """
     if asked.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
         raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
-    found = load_sweep(asked.word, asked.overrides, asked.file, asked.most, _tell_count)
+    found = load_sweep(asked.word, asked.overrides, file, most, _tell_count)
     return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
 
 
@@ -118,9 +104,11 @@ def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def plan_sweep(asked: SweepRequest, console: Console, as_json: bool = False) -> None:
+def plan_sweep(
+    asked: Request, file: Path | None, console: Console, as_json: bool = False, most: int = MOST_POINTS
+) -> None:
     """Print a row for each point of a sweep with what would run, and all together. Raises `RecipeError`."""
-    sweep, planners = ready(asked)
+    sweep, planners = ready(asked, file, most)
     found = planned(planners)
     if as_json:
         data = [_data(point, found[point.name]) for point in sweep.points]
@@ -135,12 +123,17 @@ def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 
-def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
+def run_sweep(
+    asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool = False
+) -> int:
     """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
+
+    file, most: see `ready`. jobs: points that run at the same time; if empty one here, on a cluster as many as there
+    are cores.
 
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
     """
-    found, planners = ready(asked)
+    found, planners = ready(asked, file, most)
     _require_origins(asked, planners)
     runs, execution = asked.runs, planners[0].loaded.recipe.execution
     options.require_extra("train", "iowbc sweep")
@@ -158,7 +151,7 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
         ):
             if cluster is not None:
                 said.print(cluster.text, highlight=False)
-            jobs, workers = _shared_out(planners, asked, cluster)
+            jobs, workers = _shared_out(planners, jobs, cluster)
             if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
                 record = sweep_record(runs, found, execution)
                 record.send()
@@ -188,11 +181,11 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
     return code
 
 
-def _shared_out(planners: Sequence[Planner], asked: SweepRequest, cluster: "Cluster | None") -> tuple[int, int]:
+def _shared_out(planners: Sequence[Planner], jobs: int | None, cluster: "Cluster | None") -> tuple[int, int]:
     """Points that run at the same time, and each one's part of the cores, for those that do not say what they want."""
     cores = available_cores() if cluster is None else cluster.cores
     actors = max(one.loaded.recipe.execution.rollout_actors or 1 for one in planners)
-    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
+    jobs = jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
     most = cores if cluster is None else cluster.largest
     return jobs, max(1, min(most, cores // jobs))
 
@@ -225,7 +218,7 @@ def _conclude(
         tell(console, f"next:\n  iowbc compare {found.name}")
 
 
-def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -> None:
+def _tell_rest(asked: Request, endings: Endings, folder: Path, code: int) -> None:
     """Say on standard error what failed, and how to go on."""
     said = Console(stderr=True, soft_wrap=True)
     failed = {name: ending.failure for name, ending in endings.items() if ending.state == "failed"}
