@@ -91,6 +91,12 @@ def read_limited(path: Path, largest: int) -> bytes:
     return content
 
 
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's bytes, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def synchronise(path: Path) -> None:
     """Return once the content of a file, or the names in a folder, are on disk."""
     descriptor = os.open(path, os.O_RDONLY)

@@ -13,7 +13,7 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.observation import ObservationLayout, observation_layout
 from iowbc.control.references import ReferenceLayer
-from iowbc.deploy.session import Values
+from iowbc.deploy.controller import Values
 from iowbc.deploy.timing import INPUT
 from iowbc.export.folder import write_folder
 from iowbc.export.golden import OUTPUT

@@ -24,7 +24,7 @@ from iowbc.learning.as_numpy import teacher_policy
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import load_teacher, save_network
 from iowbc.pipeline.store.digests import folder_files
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.reference.labels.labelling import LabelTask

@@ -14,8 +14,9 @@ import yaml
 from iowbc.adapters import deploy, holosoma
 from iowbc.adapters.adapter import Adapter, require_fitting
 from iowbc.errors import StageFailed
+from iowbc.files import file_digest
 from iowbc.recipe.beside import OwnFunction
-from iowbc.recipe.evaluation.public import PublicController
+from iowbc.recipe.evaluation.rivals import PublicController
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import DESCRIPTION, Robot, kind_of, side_sign
 from iowbc.task.own_function import load_function
@@ -109,8 +110,7 @@ def policy_path(named: str) -> Path:
 def policy_digest(path: Path) -> str:
     """SHA-256 of a file; of a folder that of the sorted lines `DIGEST  NAME` of all files below it, hexadecimal."""
     if path.is_file():
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return file_digest(path)
     files = [file for file in path.rglob("*") if file.is_file()]
     lines = sorted(f"{policy_digest(file)}  {file.relative_to(path).as_posix()}\n" for file in files)
     return hashlib.sha256("".join(lines).encode()).hexdigest()

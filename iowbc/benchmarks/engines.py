@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot.description import GRAVITY, Robot, load_robot
 from iowbc.sim.shapes import measured

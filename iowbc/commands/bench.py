@@ -6,12 +6,10 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from iowbc.commands import completion, options
-from iowbc.commands.needs import require_training
-from iowbc.errors import IowbcError, UsageError, require_known
-from iowbc.pipeline.store.runs import Runs
+from iowbc.commands import options
+from iowbc.errors import IowbcError, require_known
+from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.tracking.tracker import record_figures
-from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import SCENES
@@ -63,12 +61,7 @@ def rg(recipe: BenchRecipe = None, workers: BenchWorkers = None, runs: options.R
 
 
 def control(
-    what: Annotated[
-        str,
-        typer.Argument(
-            help="Export folder, or the recipe that made it.", metavar="WHAT", autocompletion=completion.ran
-        ),
-    ],
+    what: options.Exported,
     steps: Annotated[int, typer.Option(help="Number of control steps.", min=1)] = 5000,
     skill: Annotated[Path | None, typer.Option(help="Folder of a skill that commands the controller.")] = None,
 ) -> None:
@@ -86,14 +79,10 @@ def engines(
     robot: Annotated[str, typer.Argument(help="Robot, by name or folder.", metavar="ROBOT")] = "g1",
 ) -> None:
     """Compare MuJoCo and Drake. Raises `UsageError`, and `IowbcError` where they differ."""
-    require_training("bench")
+    options.require_extra("train", "iowbc bench")
     from iowbc.benchmarks import engines
 
-    try:
-        folder = robot_folder(robot)
-    except FileNotFoundError as error:
-        raise UsageError(str(error)) from None
-    differing = [row.name for row in engines.main(folder) if not row.agrees]
+    differing = [row.name for row in engines.main(robot_folder(robot)) if not row.agrees]
     if differing:
         raise IowbcError(f"the engines differ by more than expected: {', '.join(differing)}")
 
@@ -104,6 +93,6 @@ def _checked(runs: Path, file: Path | None, scene: str | None = None) -> Recipe 
     recipe = load_recipe(file).recipe if file is not None else None
     if scene is not None:
         require_known(scene, "scene", SCENES if recipe is None else recipe.simulation.scenes.names)
-    require_training("bench")
+    options.require_extra("train", "iowbc bench")
     require_writable_runs(Runs(runs))
     return recipe

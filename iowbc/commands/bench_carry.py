@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from iowbc.commands.needs import require_training
+from iowbc.commands import options
 from iowbc.errors import UsageError
-from iowbc.pipeline.store.digests import data_digest, file_digest
-from iowbc.recipe.reading.finding import recipe_file
-from iowbc.recipe.reading.loading import load_recipe
+from iowbc.files import file_digest
+from iowbc.pipeline.store.digests import data_digest
+from iowbc.recipe.reading.loading import load_recipe, recipe_file
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.section import deciding
 from iowbc.results.table import ABSENT, Cell, Column, Table, heads, markdown, measured
@@ -61,12 +61,12 @@ def carry(
         Literal["mujoco", "both"] | None,
         typer.Option(help="MuJoCo alone, or some cells in Drake, too (default: both where Drake is installed)."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
+    workers: options.Workers = None,
     out: Annotated[Path, typer.Option(help="Output page.", metavar="FILE")] = Path("carry.md"),
 ) -> None:
     """Play the suites and write the page. Raises UsageError, RecipeError, and StageFailed where the controller cannot
     be used."""
-    require_training("bench carry")
+    options.require_extra("train", "iowbc bench carry")
     from iowbc.adapters.source import SHIPPED, policy_digest, policy_path
 
     own, drake = adapter not in SHIPPED, drake_version()

@@ -9,19 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from iowbc.commands import completion, options
+from iowbc.commands import options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
-from iowbc.commands.needs import require_training
 from iowbc.commands.printed import filming, print_json, shown_path, stdout_console, tell
 from iowbc.commands.results import PROBE, TRIALS, evaluated_actor, split_tables, tables_of
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.live_table import sparkline
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import require_whole
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, require_writable
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.writability import require_writable
 from iowbc.report.runs import Group, Run, grouped, metrics_table
 from iowbc.results.table import ABSENT, Table, drawn, heads, markdown, read_tables, write_table
 from iowbc.stages.registry import STAGES
@@ -40,7 +38,7 @@ def compare(
     words: Annotated[
         list[str],
         typer.Argument(
-            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran
+            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=options.complete_ran
         ),
     ],
     output: Annotated[Path | None, typer.Option(help="Output folder (default: runs/compare).")] = None,
@@ -62,7 +60,7 @@ def compare(
     if len(found) < 2 and not members:
         raise UsageError("compare needs two or more recipes, for example `iowbc compare full wbc`")
     output = output or (store.runs.compared / Path(words[0]).stem if members else store.runs.compared)
-    require_training("compare")
+    options.require_extra("train", "iowbc compare")
     require_writable(output, "--output")
     require_whole(store.runs, (run.artifacts["eval"] for run in found if "eval" in run.artifacts))
     record_comparison([run.label for run in found], output)
@@ -96,7 +94,7 @@ def compare(
 def report(
     words: Annotated[
         list[str],
-        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
+        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=options.complete_ran),
     ],
     output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
     log: Annotated[
@@ -108,7 +106,7 @@ def report(
     """Write one HTML file about what the words name, which opens anywhere without a network. Raises `UsageError`."""
     store, console = Store(Runs(runs)), stdout_console()
     if log is not None:
-        from iowbc.commands.robot_log import report_log
+        from iowbc.commands.robot import report_log
 
         report_log(console, words[0], log, output or log.with_suffix(".png"))
         return
@@ -121,7 +119,7 @@ def report(
         )
     if output.suffix != ".html":
         raise UsageError(f"--output {output}: a report is an HTML file; give a name that ends in .html")
-    require_training("report")
+    options.require_extra("train", "iowbc report")
     require_writable(output.parent, "--output")
     require_whole(store.runs, (artifact for run in found for artifact in run.artifacts.values()))
 

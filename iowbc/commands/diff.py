@@ -18,8 +18,7 @@ from iowbc.pipeline.nested import MISSING, differences, nested
 from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
-from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
-from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
 from iowbc.recipe.recipe import Recipe
 from iowbc.report.runs import Run
 

@@ -19,8 +19,7 @@ from rich.text import Text
 from iowbc.commands import options
 from iowbc.commands.printed import stdout_console
 from iowbc.pipeline.console.wording import duration
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.writability import obstacle
+from iowbc.pipeline.store.runs import Runs, obstacle
 from iowbc.processes import available_cores
 
 Verdict = Literal["good", "doubtful", "bad"]

@@ -7,30 +7,30 @@ from typing import Annotated
 
 import typer
 
-from iowbc.commands import completion, options
+from iowbc.commands import options
 from iowbc.commands.lookup import named
-from iowbc.commands.needs import require_training
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.deploy.exported_folder import CONTRACT
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, require_writable
 from iowbc.pipeline.store.store import Store
-from iowbc.pipeline.writability import require_writable
 
 
 def export(
     word: Annotated[
         str,
         typer.Argument(
-            help="Recipe, RECIPE/export, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
+            help="Recipe, RECIPE/export, key, or export folder.",
+            metavar="WHAT",
+            autocompletion=options.complete_artifacts,
         ),
     ],
     folder: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Write the page of what a word names into a folder, and say how to look at it. Raises `UsageError`."""
-    require_training("export")
+    options.require_extra("train", "iowbc export")
     store = Store(Runs(runs))
     exported = exported_folder(store, word)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "scenes.json").is_file():

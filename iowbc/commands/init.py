@@ -9,8 +9,8 @@ import typer
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.errors import UsageError
 from iowbc.files import replacing
-from iowbc.pipeline.writability import require_writable
-from iowbc.recipe.reading.finding import known_files
+from iowbc.pipeline.store.runs import require_writable
+from iowbc.recipe.reading.loading import known_files
 from iowbc.robot.description import robot_folder
 
 
@@ -19,10 +19,7 @@ def init(
     robot: Annotated[str, typer.Option(help="Robot description to copy.")] = "g1",
 ) -> None:
     """Copy what is not there yet, and print it. Raises `UsageError`, also where a file would be replaced."""
-    try:
-        source = robot_folder(robot)
-    except FileNotFoundError as error:
-        raise UsageError(str(error)) from None
+    source = robot_folder(robot)
     origins = {folder / "robots" / source.name: source}
     for path in known_files():
         origins.setdefault(folder / "recipes" / path.name, path)

@@ -17,8 +17,7 @@ from iowbc.pipeline.store.locks import holder
 from iowbc.pipeline.store.runs import Runs, read_json, read_yaml
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import Progress, unfinished
-from iowbc.recipe.reading.finding import SUFFIXES, recipe_file
-from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.reading.loading import SUFFIXES, load_recipe, recipe_file
 from iowbc.recipe.reading.study import load_study
 from iowbc.recipe.recipe import PIPELINE, Recipe
 from iowbc.recipe.sweep import Sweep

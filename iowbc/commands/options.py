@@ -1,13 +1,111 @@
-"""Arguments and options that several commands share."""
+"""Arguments, options and requirements that several commands share, and what a shell offers on Tab."""
 
+import os
+import socket
+from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from iowbc.commands import completion
-from iowbc.commands.needs import PORT
 from iowbc.errors import UsageError
+
+if TYPE_CHECKING:
+    from iowbc.pipeline.store.store import Store
+
+EXTRAS = {
+    "train": (
+        *("crocoddyl", "imageio", "matplotlib", "mlflow", "mujoco", "pandas", "pinocchio", "stable_baselines3"),
+        "torch",
+    ),
+    "web": ("viser",),
+    "robot": ("cyclonedds", "mcap"),
+}
+"""Modules of the larger packages that each extra of iowbc brings; they come together."""
+HOST = "127.0.0.1"
+PORT = 8080
+"""Port of a page where no other is asked for."""
+LAST_PORT = 65_535
+
+
+def require_extra(extra: str, what: str) -> None:
+    """Raises `UsageError` with the command that installs them where packages are missing that `what` needs."""
+    missing = [name for name in EXTRAS[extra] if find_spec(name) is None]
+    if missing:
+        raise UsageError(
+            f"`{what}` needs {', '.join(missing)}, which this installation leaves out: `pip install 'iowbc[{extra}]'` "
+            f"brings {'it' if len(missing) == 1 else 'them'}"
+        )
+
+
+def require_free(port: int) -> None:
+    """Raises `UsageError` with the next port of this machine that is free where this one is taken."""
+    free = next((other for other in range(port, LAST_PORT + 1) if _free(other)), None)
+    if free != port:
+        raise UsageError(f"port {port} is taken; try --port {free or 'with another number'}")
+
+
+def _free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError:
+            return False
+    return True
+
+
+def complete_recipes(incomplete: str) -> list[str]:
+    """Recipes that can be run by name; a path is the shell's own business."""
+    from iowbc.recipe.reading.loading import known_files
+
+    return _beginning(incomplete, (path.stem for path in known_files()))
+
+
+def complete_ran(incomplete: str) -> list[str]:
+    """Recipes that have run, or are published."""
+    from iowbc.commands.lookup import nameable
+
+    return _beginning(incomplete, nameable(_store()))
+
+
+def complete_artifacts(incomplete: str) -> list[str]:
+    """Recipes that have run or are published, `RECIPE/STAGE`, and, once something is typed, keys."""
+    from iowbc.commands.lookup import nameable
+
+    store = _store()
+    known = nameable(store)
+    stages = [f"{name}/{stage}" for name, found in known.items() for stage in found]
+    keys = [found.manifest.key for found in store.artifacts()] if incomplete else []
+    return _beginning(incomplete, [*known, *stages, *keys])
+
+
+def complete_stages(incomplete: str) -> list[str]:
+    """Names of stages."""
+    from iowbc.recipe.recipe import PIPELINE
+
+    return _beginning(incomplete, PIPELINE)
+
+
+def complete_paths(incomplete: str) -> list[str]:
+    """Dotted paths of a recipe's values, with the sign that a value follows."""
+    from iowbc.pipeline.nested import flattened
+    from iowbc.recipe.recipe import Recipe
+
+    return _beginning(incomplete, (f"{path}=" for path in flattened(Recipe(name="any").model_dump(mode="json"))))
+
+
+def _store() -> "Store":
+    from iowbc.pipeline.store.runs import Runs
+    from iowbc.pipeline.store.store import Store
+
+    return Store(Runs(Path(os.environ.get("IOWBC_RUNS", "runs"))))
+
+
+def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+    return sorted({name for name in names if name.startswith(incomplete)})
+
 
 RUNS = Path("runs")
 """Folder of artifacts and tracking data where no other is given."""
@@ -21,26 +119,27 @@ RunsFolder = Annotated[
     ),
 ]
 RecipeFile = Annotated[
-    str, typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes)
+    str, typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=complete_recipes)
 ]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", help="Override a recipe value (repeatable).", metavar="A.B.C=VALUE", autocompletion=completion.paths
+        "--set", help="Override a recipe value (repeatable).", metavar="A.B.C=VALUE", autocompletion=complete_paths
     ),
 ]
 SweepFile = Annotated[
     Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
 ]
 Until = Annotated[
-    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
+    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=complete_stages)
 ]
 Force = Annotated[
     list[str] | None,
     typer.Option(
-        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=completion.stages
+        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=complete_stages
     ),
 ]
+Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
 Engine = Annotated[
     Literal["local", "ray"] | None, typer.Option(help="Execution engine: local processes or a Ray cluster.")
 ]
@@ -56,12 +155,16 @@ Web = Annotated[bool, typer.Option("--web", help="Interactive viewer in the brow
 Port = Annotated[int | None, typer.Option(help="Port of --web (default: 8080).", min=1, max=65535)]
 SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", metavar="SCENE")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Exported = Annotated[
+    str,
+    typer.Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=complete_ran),
+]
 Named = Annotated[
     str,
     typer.Argument(
         help="Recipe (name or file), RECIPE/STAGE, or the first characters of a key.",
         metavar="WHAT",
-        autocompletion=completion.artifacts,
+        autocompletion=complete_artifacts,
     ),
 ]
 

@@ -51,12 +51,12 @@ def plan(
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Print what would run of a recipe or a study, or of a sweep."""
-    from iowbc.commands.sweep import SweepRequest, plan_sweep
+    from iowbc.commands.sweep import plan_sweep
 
     asked = Options(until, frozenset(force or ()), on_code_change=on_code_change)
     request, console = Request(recipe, overrides or (), Runs(runs), asked), stdout_console()
     if as_sweep or file is not None:
-        plan_sweep(SweepRequest(request, file, None), console, as_json)
+        plan_sweep(request, file, console, as_json)
     else:
         print_plan(request, console, as_json)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from iowbc.commands import completion, options
+from iowbc.commands import options
 from iowbc.commands.lookup import (
     in_training,
     input_of,
@@ -20,7 +20,6 @@ from iowbc.commands.lookup import (
     policy_stages,
     world_of,
 )
-from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
 from iowbc.commands.printed import filming, stdout_console, tell
 from iowbc.commands.process import close_on_termination
 from iowbc.commands.request import prepared
@@ -34,8 +33,7 @@ from iowbc.pipeline.store.last_used import recall, require_whole
 from iowbc.pipeline.store.runs import Runs
 from iowbc.pipeline.store.store import Store
 from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.reading.finding import SUFFIXES
-from iowbc.recipe.reading.loading import load_recipe
+from iowbc.recipe.reading.loading import SUFFIXES, load_recipe
 from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import policy_stage
 
@@ -60,7 +58,9 @@ def play(
     word: Annotated[
         str,
         typer.Argument(
-            help="Recipe, RECIPE/STAGE, key, or export folder.", metavar="WHAT", autocompletion=completion.artifacts
+            help="Recipe, RECIPE/STAGE, key, or export folder.",
+            metavar="WHAT",
+            autocompletion=options.complete_artifacts,
         ),
     ],
     stage: Annotated[
@@ -88,7 +88,7 @@ def play(
     if page is not None:
         play_on_web(store, console, word, stage, request, page)
         return
-    require_training("play")
+    options.require_extra("train", "iowbc play")
     close_on_termination()
     source = named_source(store, console, word, stage, request.scene)
 
@@ -108,9 +108,9 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
     """Serve the viewer in the browser until interrupted. Raises `UsageError` where it cannot begin."""
     if request.video is not None:
         raise UsageError("--web and --video exclude each other: open the page, or make a film")
-    require_training("play")
-    require_viewer()
-    require_free(port)
+    options.require_extra("train", "iowbc play")
+    options.require_extra("web", "--web")
+    options.require_free(port)
     close_on_termination()
 
     from iowbc.live.page import Page
@@ -118,8 +118,8 @@ def play_on_web(store: Store, console: Console, word: str, stage: str | None, re
 
     def ready() -> None:
         console.print("Drive it in the browser; Ctrl-C ends it:", highlight=False)
-        tell(console, f"http://{HOST}:{port}")
-        there = f"ssh -L {port}:{HOST}:{port} THIS_MACHINE"
+        tell(console, f"http://{options.HOST}:{port}")
+        there = f"ssh -L {port}:{options.HOST}:{port} THIS_MACHINE"
         console.print(f"(from another machine: {there}, and the same address there)", markup=False, highlight=False)
 
     plan = planned(store, word)
@@ -244,16 +244,18 @@ def named_source(
 
 
 def _whole_source(store: Store, artifact: Artifact) -> "Source":
-    """A stored policy, known to be whole, with its world; an export holds its own reference generator. Raises
-    `UsageError` where that of another is gone or damaged."""
-    from iowbc.evaluation.play import exported_source
+    """A stored policy, known to be whole, with the world that its own recipe describes and the reference generator that
+    it was trained on. Raises `UsageError` where that is gone or damaged."""
+    from iowbc.evaluation.play import Source, exported_source
 
     if artifact.manifest.stage == "export":
         return exported_source(artifact.folder)
     generator = input_of(store, artifact, "rg-fit")
     if generator is not None:
         require_whole(store.runs, [generator])
-    return _source(artifact, generator)
+    world = world_of(artifact.recipe, generator)
+    student = artifact.manifest.stage == "distill" or world.recipe.teacher.history is not None
+    return Source(world.deployed if student else world, artifact.folder)
 
 
 def playable(store: Store, word: str, stage: str | None, plan: Planned = Planned()) -> Artifact:
@@ -267,12 +269,3 @@ def playable(store: Store, word: str, stage: str | None, plan: Planned = Planned
             f"stages that leave one: {', '.join(policy_stages())}; finished: {', '.join(found) or 'none'}"
         )
     return found[stage or ready[0]]
-
-
-def _source(artifact: Artifact, generator: Artifact | None) -> "Source":
-    """A policy with the world that its own recipe describes and the reference generator that it was trained on."""
-    from iowbc.evaluation.play import Source
-
-    world = world_of(artifact.recipe, generator)
-    student = artifact.manifest.stage == "distill" or world.recipe.teacher.history is not None
-    return Source(world.deployed if student else world, artifact.folder)

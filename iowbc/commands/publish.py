@@ -10,10 +10,9 @@ from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.stage_plan import Options
-from iowbc.pipeline.store.publishing import publish as copied
-from iowbc.pipeline.store.publishing import published_size
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.writability import require_writable_runs
+from iowbc.pipeline.store.runs import Runs, require_writable_runs
+from iowbc.pipeline.store.store import publish as copied
+from iowbc.pipeline.store.store import published_size
 
 
 def publish(
@@ -40,7 +39,7 @@ def publish(
     steps = [step for planner in found for step in planner.plan()]
     missing = [step.stage.name for step in steps if not step.cached]
     if missing:
-        raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command([])}")
+        raise UsageError(f"{', '.join(missing)}: not finished for this recipe; to finish: {request.command()}")
     require_writable_runs(request.runs)
     notes = {step.key: step.notes for step in steps}
     made = [step.artifact for step in steps]

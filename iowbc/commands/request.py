@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from iowbc.errors import Problem, RecipeError
+from iowbc.errors import Problem, RecipeError, UsageError
 from iowbc.pipeline.planner import Planner, Plans, planner_for
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.store.digests import folder_digest
@@ -35,7 +35,7 @@ class Request:
     further: Sequence[str] = ()
     """Words of the command line that only `iowbc sweep` knows."""
 
-    def command(self, forced: Sequence[str]) -> str:
+    def command(self, forced: Sequence[str] = ()) -> str:
         """The command that goes on with this run; `forced` stages are still to be made anew."""
         words = ["iowbc", self.verb, self.word, *self.further]
         words += [word for override in self.overrides for word in ("--set", override)]
@@ -66,7 +66,7 @@ def prepared(loaded: LoadedRecipe, runs: Runs, options: Options) -> Planner:
 
     try:
         folder = robot_folder(loaded.recipe.robot)
-    except FileNotFoundError as error:
+    except UsageError as error:
         raise RecipeError([Problem(loaded.place("robot"), f"key 'robot': {error}")]) from None
     try:
         robot = _robot(folder, folder_digest(folder))

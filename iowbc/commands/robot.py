@@ -1,19 +1,18 @@
-"""`iowbc robot` and `iowbc robot-sim`: an exported controller on the robot's bus, and a simulated robot there."""
+"""`iowbc robot`, `robot-sim` and `report EXPORT --log`: a controller on the robot's bus, a simulated robot, a log."""
 
 import signal
 import threading
 from collections.abc import Collection
 from contextlib import ExitStack
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 import typer
 from rich.console import Console
 
-from iowbc.commands import completion, options
-from iowbc.commands.needs import HOST, require_free, require_training, require_viewer
-from iowbc.commands.printed import plain_table, stdout_console, tell
+from iowbc.commands import options
+from iowbc.commands.printed import plain_table, shown_path, stdout_console, tell
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError, require_known
@@ -21,6 +20,7 @@ from iowbc.errors import UsageError, require_known
 if TYPE_CHECKING:
     from iowbc.live.remote_view import RemoteView
     from iowbc.onboard.checks import CheckResult
+    from iowbc.onboard.errors_of_run import LoggedRun
     from iowbc.onboard.process import Clock
     from iowbc.twin.robot import Twin
 
@@ -28,10 +28,6 @@ LISTENING = 3.0
 """For how long the bus is listened to before the checks [s]; the battery's state comes once or twice a second."""
 POLLING = 5
 """Periods of the bus between two looks for a request of the page."""
-What = Annotated[
-    str,
-    typer.Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=completion.ran),
-]
 Network = Annotated[str, typer.Option(help="Network interface: lo for this machine, eth0 or another for a robot.")]
 Domain = Annotated[int, typer.Option(help="DDS domain; the G1's is 0.", min=0, max=230)]
 Scene = Annotated[str, typer.Option(help="Scene, which sets grasp and expected load.", metavar="SCENE")]
@@ -41,14 +37,8 @@ InStep = Annotated[
 Seconds = Annotated[float, typer.Option(help="End after this time [s].", min=0.0)]
 
 
-def require_bus(command: str) -> None:
-    """Raises UsageError where the packages of the extra `robot` are missing."""
-    if missing := [name for name in ("cyclonedds", "mcap") if find_spec(name) is None]:
-        raise UsageError(f"iowbc {command} needs {' and '.join(missing)}; pip install 'iowbc[robot]'")
-
-
 def robot(
-    what: What,
+    what: options.Exported,
     network: Network = "lo",
     domain: Domain = 0,
     scene: Scene = "free",
@@ -65,10 +55,9 @@ def robot(
     seconds: Seconds = float("inf"),
 ) -> None:
     """Check the robot and drive it. Raises UsageError where a check fails."""
-    require_bus("robot")
-    from iowbc.onboard.checks import checks
+    options.require_extra("robot", "iowbc robot")
+    from iowbc.onboard.checks import LIMITS, checks
     from iowbc.onboard.dds import DdsBus
-    from iowbc.onboard.limits import LIMITS
     from iowbc.onboard.log import LogWriter, export_digest
     from iowbc.onboard.machine import Machine
     from iowbc.onboard.operators import Keyboard, OperatorWithPoses, Ranges, Udp, object_poses, operator, single_keys
@@ -142,7 +131,7 @@ def report_checks(console: Console, found: "list[CheckResult]", waived: Collecti
 
 
 def robot_sim(
-    what: What,
+    what: options.Exported,
     network: Network = "lo",
     domain: Domain = 0,
     scene: Scene = "free",
@@ -163,11 +152,11 @@ def robot_sim(
 ) -> None:
     """Simulate a robot on the bus until it is stopped."""
     page = options.page_port(web, port)
-    require_bus("robot-sim")
-    require_training("robot-sim")
+    options.require_extra("robot", "iowbc robot-sim")
+    options.require_extra("train", "iowbc robot-sim")
     if page is not None:
-        require_viewer()
-        require_free(page)
+        options.require_extra("web", "--web")
+        options.require_free(page)
     from iowbc.evaluation.exported import exported_world
     from iowbc.onboard.dds import DdsBus
     from iowbc.onboard.operators import Ranges, pose_port
@@ -197,7 +186,7 @@ def robot_sim(
         from iowbc.live.remote_view import RemoteView
 
         view = RemoteView(twin.simulation, page)
-        tell(console, f"http://{HOST}:{page}")
+        tell(console, f"http://{options.HOST}:{page}")
     bus = DdsBus(network, domain)
     tell(console, f"{controller.contract.robot} in scene {scene}, held by {kind}, on {network}; Ctrl+C ends")
 
@@ -238,3 +227,58 @@ def _show(twin: "Twin", view: "RemoteView") -> None:
     simulation.planned_impulse[0] = asked.pulls["object"] if simulation.state.has_object[0] else 0.0
     held = f", held by {support.kind}" if support.waits else ""
     view.answer(twin.time, (twin.band,), f"{twin.verdict}{held}", support.waits)
+
+
+def report_log(console: Console, what: str, log: Path, output: Path) -> None:
+    """Print what happened, replay the log, and draw it. Raises UsageError."""
+    options.require_extra("robot", "iowbc report --log")
+    options.require_extra("train", "iowbc report --log")
+    if output.suffix != ".png":
+        raise UsageError(f"--output {output}: the figure of a log is a PNG file; give a name that ends in .png")
+    import json
+
+    from iowbc.onboard.errors_of_run import UNITS, read_run
+    from iowbc.onboard.log import read_messages, replay
+
+    folder = exported_folder(what)
+    controller = Controller.load(folder)
+    turns, different = replay(log, folder)
+    tell(console, f"{turns} commands replayed, {f'{different} differ' if different else 'all bit for bit the same'}")
+    for topic, _, data in read_messages(log):
+        if topic in ("event", "timing"):
+            tell(console, f"  {json.loads(data)['text']}")
+    contract = controller.contract
+    run = read_run(log, controller.robot, contract.control_frequency, contract.references.gait.frequency)
+    table = plain_table("error", "mean", "95th percentile", "unit")
+    for name, values in run.deviations().items():
+        table.add_row(name, f"{np.mean(values):.3f}", f"{np.quantile(values, 0.95):.3f}", UNITS[name])
+    console.print(table)
+    _draw_log(run, output)
+    tell(console, f"{shown_path(output)}: command and robot over time")
+
+
+def _draw_log(run: "LoggedRun", path: Path) -> None:
+    """Write the figure as PNG: what was commanded, and what the robot did."""
+    from matplotlib.figure import Figure
+
+    from iowbc.control.command import HEIGHT, PITCH, YAW_RATE
+    from iowbc.results.picture import COLOURS, write_figure
+
+    period = np.diff(run.time, prepend=run.time[0])
+    turned = run.heading[0] + np.cumsum(run.command[:, YAW_RATE] * period)
+    rows = (
+        ("forward velocity [m/s]", run.command[:, 0], run.velocity[:, 0]),
+        ("sideways velocity [m/s]", run.command[:, 1], run.velocity[:, 1]),
+        ("heading [rad]", turned, run.heading),
+        ("pelvis height [m]", run.command[:, HEIGHT], run.height),
+        ("torso pitch [rad]", run.command[:, PITCH], run.pitch),
+    )
+    figure = Figure(figsize=(9.0, 10.0), layout="constrained")
+    axes = figure.subplots(len(rows), 1, sharex=True)
+    for ax, (name, wanted, done) in zip(axes, rows, strict=True):
+        ax.plot(run.time, done, color=COLOURS[0], linewidth=1.0, label="robot")
+        ax.plot(run.time, wanted, color=COLOURS[1], linewidth=1.0, linestyle="--", label="command")
+        ax.set_ylabel(name)
+    axes[0].legend(loc="upper right")
+    axes[-1].set_xlabel("time [s]")
+    write_figure(figure, path)

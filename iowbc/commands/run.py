@@ -10,7 +10,6 @@ from rich.console import Console
 
 from iowbc.commands import options
 from iowbc.commands.compare import compare, film_together
-from iowbc.commands.needs import require_training
 from iowbc.commands.plan import print_plan
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.commands.process import DONE, INTERRUPTED, STAGE_FAILED, RunEnding, outlasting_readers
@@ -23,10 +22,9 @@ from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.runner import Runner, run_here
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import Tracker, backlog, record_figures
-from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
 from iowbc.recipe.reading.loading import LoadedRecipe
 
@@ -42,7 +40,7 @@ def run(
     overrides: options.Overrides = None,
     until: options.Until = None,
     force: options.Force = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)] = None,
+    workers: options.Workers = None,
     engine: options.Engine = None,
     address: options.Address = None,
     dry_run: options.DryRun = False,
@@ -68,7 +66,7 @@ def run_request(request: Request, console: Console, manner: Manner) -> int:
     The variants of a study run in order, up to the first that does not end; then they are compared.
     """
     ready = planners(request)
-    require_training("run")
+    options.require_extra("train", "iowbc run")
     require_writable_runs(request.runs)
     try:
         with (

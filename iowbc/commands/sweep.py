@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from iowbc.commands import completion, options
+from iowbc.commands import options
 from iowbc.commands.lookup import named, record_sweep
-from iowbc.commands.needs import require_training
 from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
 from iowbc.commands.printed import print_json, shown_path, stdout_console, tell
@@ -24,10 +22,9 @@ from iowbc.pipeline.console.board import Board
 from iowbc.pipeline.planner import Planner
 from iowbc.pipeline.stage_plan import Options
 from iowbc.pipeline.stop_request import StopRequest
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.tracking.tracker import RunRecord, sweep_record
-from iowbc.pipeline.writability import require_writable_runs
 from iowbc.processes import available_cores
 from iowbc.recipe.sweep import MOST_POINTS, Point, Sweep, load_sweep
 from iowbc.results.table import drawn, markdown
@@ -41,28 +38,6 @@ MANY = 100
 """Number of points from which it is printed before planning, which takes a while."""
 
 
-@dataclass(frozen=True)
-class SweepRequest:
-    """A call of `iowbc sweep`."""
-
-    recipe: Request
-    """Recipe and what holds for all points; `--set` of several values varies one."""
-    file: Path | None
-    """File that says what is varied besides."""
-    jobs: int | None
-    """Points that run at the same time; empty: one here, as many as there are cores on a cluster."""
-    most: int = MOST_POINTS
-    """Points at most."""
-
-    @property
-    def command(self) -> str:
-        """The command that goes on with this sweep."""
-        further = ["--from", str(self.file)] if self.file else []
-        further += ["--jobs", str(self.jobs)] if self.jobs else []
-        further += ["--points", str(self.most)] if self.most != MOST_POINTS else []
-        return replace(self.recipe, verb="sweep", further=further).command([])
-
-
 def sweep(
     recipe: options.RecipeFile,
     overrides: Annotated[
@@ -71,7 +46,7 @@ def sweep(
             "--set",
             help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
             metavar="A.B.C=VALUES",
-            autocompletion=completion.paths,
+            autocompletion=options.complete_paths,
         ),
     ] = None,
     file: options.SweepFile = None,
@@ -91,24 +66,28 @@ def sweep(
     runs: options.RunsFolder = options.RUNS,
 ) -> None:
     """Run a sweep, or print its plan; exits with the code of the run."""
-    request = Request(
-        recipe, overrides or (), Runs(runs), Options(until, frozenset(), workers, engine, address, on_code_change)
-    )
-    asked = SweepRequest(request, file, jobs, points)
+    settings = Options(until, frozenset(), workers, engine, address, on_code_change)
+    further = ["--from", str(file)] if file else []
+    further += ["--jobs", str(jobs)] if jobs else []
+    further += ["--points", str(points)] if points != MOST_POINTS else []
+    request = Request(recipe, overrides or (), Runs(runs), settings, "sweep", further)
     if dry_run:
-        plan_sweep(asked, stdout_console(), as_json)
+        plan_sweep(request, file, stdout_console(), as_json, points)
         return
     with outlasting_readers():
-        raise typer.Exit(run_sweep(asked, stdout_console(), quiet))
+        raise typer.Exit(run_sweep(request, file, jobs, points, stdout_console(), quiet))
 
 
-def ready(asked: SweepRequest) -> tuple[Sweep, list[Planner]]:
-    """The points of a sweep, and the planner of each. Raises `RecipeError` for all that is wrong before any runs."""
-    if asked.recipe.options.force:
+def ready(asked: Request, file: Path | None, most: int) -> tuple[Sweep, list[Planner]]:
+    """The points of a sweep, `most` at most, and the planner of each; `file` says what is varied besides.
+
+    Raises `RecipeError` for all that is wrong before any runs.
+    """
+    if asked.options.force:
         text = "names a stage that points may share; force it in one of them with `iowbc run`"
-        raise RecipeError([Problem(f"--force {min(asked.recipe.options.force)}", text)])
-    found = load_sweep(asked.recipe.word, asked.recipe.overrides, asked.file, asked.most, _tell_count)
-    return found, [prepared(point.loaded, asked.recipe.runs, asked.recipe.options) for point in found.points]
+        raise RecipeError([Problem(f"--force {min(asked.options.force)}", text)])
+    found = load_sweep(asked.word, asked.overrides, file, most, _tell_count)
+    return found, [prepared(point.loaded, asked.runs, asked.options) for point in found.points]
 
 
 def _tell_count(count: int) -> None:
@@ -119,18 +98,17 @@ def _tell_count(count: int) -> None:
 def _require_origins(asked: Request, planners: Sequence[Planner]) -> None:
     """Raises `UsageError` where points begin from what another recipe has not made yet: they would all wait for it."""
     missing = [origin for one in planners for origin in in_order(one)[:-1]]
-    first = [
-        replace(asked, verb="run", word=str(origin.loaded.file), overrides=(), options=origin.options).command([])
-        for origin in missing
-    ]
+    first = [Request(str(one.loaded.file), (), asked.runs, one.options).command() for one in missing]
     if first:
         lines = "\n  ".join(dict.fromkeys(first))
         raise UsageError(f"the points begin from what is not made yet; first\n  {lines}")
 
 
-def plan_sweep(asked: SweepRequest, console: Console, as_json: bool = False) -> None:
+def plan_sweep(
+    asked: Request, file: Path | None, console: Console, as_json: bool = False, most: int = MOST_POINTS
+) -> None:
     """Print a row for each point of a sweep with what would run, and all together. Raises `RecipeError`."""
-    sweep, planners = ready(asked)
+    sweep, planners = ready(asked, file, most)
     found = planned(planners)
     if as_json:
         data = [_data(point, found[point.name]) for point in sweep.points]
@@ -145,15 +123,20 @@ def _data(point: Point, own: Sequence[PlannedStage]) -> dict[str, Any]:
     return {"point": point.name, "settings": dict(point.settings), "stages": stages}
 
 
-def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int:
+def run_sweep(
+    asked: Request, file: Path | None, jobs: int | None, most: int, console: Console, quiet: bool = False
+) -> int:
     """Run all points; returns the exit code. Raises `RecipeError`, or `UsageError` where something has to run first.
+
+    file, most: see `ready`. jobs: points that run at the same time; if empty one here, on a cluster as many as there
+    are cores.
 
     A point that fails does not stop the others. What is stored is used, and what was left unfinished goes on.
     """
-    found, planners = ready(asked)
-    _require_origins(asked.recipe, planners)
-    runs, execution = asked.recipe.runs, planners[0].loaded.recipe.execution
-    require_training("sweep")
+    found, planners = ready(asked, file, most)
+    _require_origins(asked, planners)
+    runs, execution = asked.runs, planners[0].loaded.recipe.execution
+    options.require_extra("train", "iowbc sweep")
     require_writable_runs(runs)
     folder = runs.sweeps / found.name
     record_sweep(found, folder)
@@ -163,12 +146,12 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
     record: RunRecord | None = None
     try:
         with (
-            requested_cluster(asked.recipe.options, execution) as cluster,
+            requested_cluster(asked.options, execution) as cluster,
             StopRequest(shown=console.is_terminal and not quiet) as stop,
         ):
             if cluster is not None:
                 said.print(cluster.text, highlight=False)
-            jobs, workers = _shared_out(planners, asked, cluster)
+            jobs, workers = _shared_out(planners, jobs, cluster)
             if execution.track and not all(stage.step.cached for own in before.values() for stage in own):
                 record = sweep_record(runs, found, execution)
                 record.send()
@@ -176,7 +159,7 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
             tasks = []
             for planner in planners:
                 loaded = planner.loaded
-                request = replace(asked.recipe, word=str(loaded.file), overrides=loaded.overrides)
+                request = Request(str(loaded.file), loaded.overrides, runs, asked.options)
                 run = partial(run_recipe, planner, request, stop=stop, within=origin, cluster=cluster, workers=workers)
                 tasks.append(PointRun(loaded.recipe.name, folder / LOGS / f"{loaded.recipe.name}.log", run))
             logs = {task.name: task.log for task in tasks}
@@ -198,11 +181,11 @@ def run_sweep(asked: SweepRequest, console: Console, quiet: bool = False) -> int
     return code
 
 
-def _shared_out(planners: Sequence[Planner], asked: SweepRequest, cluster: "Cluster | None") -> tuple[int, int]:
+def _shared_out(planners: Sequence[Planner], jobs: int | None, cluster: "Cluster | None") -> tuple[int, int]:
     """Points that run at the same time, and each one's part of the cores, for those that do not say what they want."""
     cores = available_cores() if cluster is None else cluster.cores
     actors = max(one.loaded.recipe.execution.rollout_actors or 1 for one in planners)
-    jobs = asked.jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
+    jobs = jobs or (1 if cluster is None else max(1, min(cores // actors, len(planners))))
     most = cores if cluster is None else cluster.largest
     return jobs, max(1, min(most, cores // jobs))
 
@@ -235,7 +218,7 @@ def _conclude(
         tell(console, f"next:\n  iowbc compare {found.name}")
 
 
-def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -> None:
+def _tell_rest(asked: Request, endings: Endings, folder: Path, code: int) -> None:
     """Say on standard error what failed, and how to go on."""
     said = Console(stderr=True, soft_wrap=True)
     failed = {name: ending.failure for name, ending in endings.items() if ending.state == "failed"}
@@ -246,4 +229,4 @@ def _tell_rest(asked: SweepRequest, endings: Endings, folder: Path, code: int) -
         said.print(f"  {name}: {failure} (log {shown_path(log)})", markup=False, highlight=False)
     if code != DONE:
         head = "interrupted; to go on:" if code == INTERRUPTED else "what is finished is kept; after a remedy:"
-        said.print(f"{head}\n{asked.command}", markup=False, highlight=False)
+        said.print(f"{head}\n{asked.command()}", markup=False, highlight=False)

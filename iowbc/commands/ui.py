@@ -10,12 +10,10 @@ from typing import Annotated
 import typer
 
 from iowbc.commands import options
-from iowbc.commands.needs import HOST, require_free, require_training
 from iowbc.commands.printed import stdout_console, tell
-from iowbc.pipeline.store.runs import Runs
+from iowbc.pipeline.store.runs import Runs, require_writable_runs
 from iowbc.pipeline.tracking.delivery import client, embedded_uri, experiment, setup_lock
 from iowbc.pipeline.tracking.tracker import backlog, start_sender
-from iowbc.pipeline.writability import require_writable_runs
 from iowbc.recipe.execution import Execution
 from iowbc.stages.registry import STAGES
 
@@ -29,9 +27,9 @@ def ui(
 ) -> None:
     """Serve until interrupted; exits with the server's code. Raises `UsageError` where it cannot begin."""
     runs, console = Runs(folder), stdout_console()
-    require_training("ui")
+    options.require_extra("train", "iowbc ui")
     require_writable_runs(runs)
-    require_free(port)
+    options.require_free(port)
     signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
     uri = embedded_uri(runs)
     with setup_lock(runs):
@@ -41,10 +39,10 @@ def ui(
         mlflow.set_experiment_tag(shown, f"mlflow.sharedViewState.{VIEW}", json.dumps(view()))
     if backlog(runs):
         start_sender(runs)
-    page = f"http://{HOST}:{port}/#/experiments/{shown}/runs?workflowType=machine_learning&viewStateShareKey={VIEW}"
+    page = f"http://{options.HOST}:{port}/#/experiments/{shown}/runs"
     console.print("MLflow's page of the runs, ready in about a quarter of a minute; Ctrl-C ends it:", highlight=False)
-    tell(console, page)
-    command = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(port), "--workers", "1"]
+    tell(console, f"{page}?workflowType=machine_learning&viewStateShareKey={VIEW}")
+    command = [sys.executable, "-m", "mlflow", "server", "--host", options.HOST, "--port", str(port), "--workers", "1"]
     command += ["--backend-store-uri", uri, "--artifacts-destination", runs.tracked_files.absolute().as_uri()]
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
     environment.setdefault("PYTHONWARNINGS", "ignore")  # of MLflow's own code, which a user can do nothing about

@@ -1,13 +1,12 @@
 """The contract of an exported policy: everything that a caller on the robot must know, as JSON beside the graph."""
 
-import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from textwrap import shorten
-from typing import Literal, Self
+from typing import Literal, Self, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -16,12 +15,14 @@ from iowbc.control.feasible_map import FEASIBLE
 from iowbc.control.generator import ARCHITECTURE, WEIGHTS
 from iowbc.deploy.exported_folder import CONTRACT, GENERATOR, ROBOT, SETTLE, STEP
 from iowbc.errors import ContractBroken
+from iowbc.files import file_digest
 from iowbc.recipe.section import Section, sentences
 from iowbc.recipe.simulation.simulation import SensorNoise
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 from iowbc.robot.description import DESCRIPTION
 
+Kind = TypeVar("Kind", bound=Section)
 LARGEST_CONTRACT = 1_000_000
 """Bytes of the largest contract that is read."""
 FORMAT: Literal[4] = 4
@@ -212,16 +213,10 @@ def meanings(section: type[Section], path: str = "") -> dict[str, str]:
     return found
 
 
-def digest(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal digits."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def seal(contract: Contract, folder: Path) -> Contract:
     """Write `contract.json` with the digest of every file that the folder holds now."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / CONTRACT)
-    sealed = contract.model_copy(update={"files": {str(path.relative_to(folder)): digest(path) for path in files}})
+    sealed = contract.model_copy(update={"files": {str(path.relative_to(folder)): file_digest(path) for path in files}})
     (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
     return sealed
 
@@ -238,10 +233,10 @@ def readable(part: Path) -> Iterator[None]:
         raise ContractBroken(f"{part}: cannot be used: {reason}; export again") from error
 
 
-def require_sealed(contract: Contract, folder: Path, *names: str) -> None:
-    """Raises ContractBroken for files that are to be read and that the contract has no digest of."""
-    if unsealed := [name for name in names if name not in contract.files]:
-        raise ContractBroken(f"{folder / CONTRACT}: says nothing of {' and '.join(unsealed)}; export again")
+def require_sealed(files: Collection[str], path: Path, *names: str) -> None:
+    """Raises ContractBroken for files that are to be read and are not among those that the contract at `path` names."""
+    if unsealed := [name for name in names if name not in files]:
+        raise ContractBroken(f"{path}: says nothing of {' and '.join(unsealed)}; export again")
 
 
 def generator_folder(contract: Contract, folder: Path) -> Path | None:
@@ -250,36 +245,45 @@ def generator_folder(contract: Contract, folder: Path) -> Path | None:
     parts = [f"{GENERATOR}/{name}" for name in GENERATOR_FILES]
     if contract.files.keys().isdisjoint(parts):
         return None
-    require_sealed(contract, folder, *parts)
+    require_sealed(contract.files, folder / CONTRACT, *parts)
     return folder / GENERATOR
+
+
+def parsed(kind: type[Kind], path: Path, made_by: str) -> Kind:
+    """The contract in a file that the stage `made_by` wrote. Raises ContractBroken."""
+    if not path.is_file():
+        raise ContractBroken(f"{path.parent}: {path.name} missing; give the folder that `{made_by}` made")
+    if (size := path.stat().st_size) > LARGEST_CONTRACT:
+        raise ContractBroken(f"{path}: has {size:,} bytes, which no contract has; export again")
+    known = kind.model_fields["format"].default
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        wrong = error.errors(include_url=False)
+        later = any(one["loc"] == ("format",) and isinstance(n := one["input"], int) and n > known for one in wrong)
+        if later or all(one["type"] == "extra_forbidden" for one in wrong):  # nothing but entries not known yet
+            text = f"made by a newer version of iowbc than {version('iowbc')}; install that here, or export again"
+            raise ContractBroken(f"{path}: {text} with this one: {error}") from error
+        raise ContractBroken(f"{path}: not a contract of format {known}: {error}; export again") from error
+
+
+def require_unchanged(files: Mapping[str, str], folder: Path) -> None:
+    """Raises ContractBroken where a folder lacks files with these digests, by their paths in it, or has others."""
+    missing = [name for name in files if not (folder / name).is_file()]
+    if missing:
+        raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that was exported")
+    for name, said in files.items():
+        if (found := file_digest(folder / name)) != said:
+            raise ContractBroken(
+                f"{folder / name}: SHA-256 is {found}, the contract says {said}; "
+                "the file was changed or damaged after the export: export again"
+            )
 
 
 def read_contract(folder: Path | str) -> Contract:
     """The contract of an exported folder that is whole and unchanged. Raises ContractBroken."""
     folder = Path(folder)
-    if not (folder / CONTRACT).is_file():
-        raise ContractBroken(f"{folder}: no exported policy, {CONTRACT} missing; give the folder that `export` made")
-    try:
-        if (size := (folder / CONTRACT).stat().st_size) > LARGEST_CONTRACT:
-            raise ContractBroken(f"{folder / CONTRACT}: has {size:,} bytes, which no contract has; export again")
-        contract = Contract.model_validate_json((folder / CONTRACT).read_bytes())
-    except ValidationError as error:
-        wrong = error.errors(include_url=False)
-        later = any(one["loc"] == ("format",) and isinstance(n := one["input"], int) and n > FORMAT for one in wrong)
-        if later or all(one["type"] == "extra_forbidden" for one in wrong):  # nothing but entries not known yet
-            text = f"made by a newer version of iowbc than {version('iowbc')}; install that here, or export again"
-            raise ContractBroken(f"{folder / CONTRACT}: {text} with this one: {error}") from error
-        raise ContractBroken(
-            f"{folder / CONTRACT}: not a contract of format {FORMAT}: {error}; export again"
-        ) from error
-    require_sealed(contract, folder, STEP, SETTLE, f"{ROBOT}/{DESCRIPTION}")
-    missing = [name for name in contract.files if not (folder / name).is_file()]
-    if missing:
-        raise ContractBroken(f"{folder}: {', '.join(missing)} missing; give the whole folder that `export` made")
-    for name, said in contract.files.items():
-        if (found := digest(folder / name)) != said:
-            raise ContractBroken(
-                f"{folder / name}: SHA-256 is {found}, the contract says {said}; "
-                "the file was changed or damaged after the export: export again"
-            )
+    contract = parsed(Contract, folder / CONTRACT, "export")
+    require_sealed(contract.files, folder / CONTRACT, STEP, SETTLE, f"{ROBOT}/{DESCRIPTION}")
+    require_unchanged(contract.files, folder)
     return contract

@@ -7,23 +7,41 @@ targets = controller.step(Measured(...), command)     # every 1 / controller.fre
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import onnxruntime
+from numpy.typing import NDArray
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import HEIGHT
 from iowbc.control.references import both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.deploy.contract import Contract, read_contract, readable, require_sealed
-from iowbc.deploy.exported_folder import ROBOT, SETTLE, STEP, exported_folder
-from iowbc.deploy.guard import TargetGuard
-from iowbc.deploy.plausibility import WIDE, Limits, Plausibility
-from iowbc.deploy.session import Values, open_session, run
+from iowbc.deploy.exported_folder import CONTRACT, ROBOT, SETTLE, STEP, exported_folder
+from iowbc.deploy.guard import WIDE, Limits, Plausibility, TargetGuard
 from iowbc.errors import ContractBroken
 from iowbc.recipe.task.joint_references import Grasps
 from iowbc.robot.description import Robot, load_robot
+
+onnxruntime.disable_telemetry_events()  # where a process had loaded the library before `iowbc` said so
+
+Values = dict[str, NDArray[np.float32]]
+
+
+def open_session(path: Path) -> onnxruntime.InferenceSession:
+    """A session on one thread: the graph is small, and a control loop shares its processor."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.enable_mem_reuse = False  # its planner takes seconds for the iterations of `settle` and saves 10 MB
+    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+
+
+def run(session: onnxruntime.InferenceSession, inputs: Values) -> Values:
+    """Outputs by name; of the inputs those that the graph has."""
+    names = [port.name for port in session.get_outputs()]
+    found: list[Any] = session.run(names, {port.name: inputs[port.name] for port in session.get_inputs()})
+    return dict(zip(names, found, strict=True))
 
 
 @dataclass(frozen=True)
@@ -96,7 +114,7 @@ class Controller:
         contract = read_contract(folder)
         with readable(folder / ROBOT):
             robot = load_robot(folder / ROBOT)
-        require_sealed(contract, folder, f"{ROBOT}/{robot.mjcf.name}")
+        require_sealed(contract.files, folder / CONTRACT, f"{ROBOT}/{robot.mjcf.name}")
         if robot.joints != contract.joints:
             raise ContractBroken(
                 f"{folder / ROBOT}: joints {robot.joints} differ from the contract's {contract.joints}; export again"

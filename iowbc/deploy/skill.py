@@ -5,11 +5,13 @@ command = skill.step(measured)                    # every 1 / controller.frequen
 targets = controller.step(measured, command)
 """
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 import onnxruntime
+from pydantic import Field
 
 from iowbc.arrays import Array, Mask
 from iowbc.control.command import approach, nominal_command, rate_limits
@@ -17,12 +19,59 @@ from iowbc.control.hand_forces import HandForces
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.control.sensors import Measured
 from iowbc.control.skill_command import SkillCommand
-from iowbc.control.skill_observation import WAYPOINTS, YAW, of_object, robot_observation
-from iowbc.deploy.contract import readable
-from iowbc.deploy.controller import Controller, base_grasp
-from iowbc.deploy.session import open_session, run
-from iowbc.deploy.skill_contract import GRAPH, SkillContract, read_skill_contract
+from iowbc.control.skill_observation import SENSED, WAYPOINTS, YAW, of_object, robot_observation
+from iowbc.deploy.contract import parsed, readable, require_sealed, require_unchanged
+from iowbc.deploy.controller import Controller, base_grasp, open_session, run
 from iowbc.errors import ContractBroken
+from iowbc.files import file_digest
+from iowbc.recipe.section import Section
+from iowbc.recipe.skill.skill import RobotAgent
+from iowbc.recipe.task.commands import Commands
+
+GRAPH, CONTRACT, GOLDEN = "skill.onnx", "skill_contract.json", "skill_golden.npz"
+"""Files of an exported skill. The graph maps `observation` (n, size) to `action` (n, 11)."""
+FILES = (GRAPH, GOLDEN)
+
+
+class SkillContract(Section):
+    """Content of `skill_contract.json`."""
+
+    format: Literal[1] = 1
+    """Raised when a reader of the old format would misread the new one."""
+    frequency: float = Field(gt=0)
+    """Decisions a second [Hz]; a whole part of the controller's frequency."""
+    observation: int = Field(ge=1)
+    """Size of the observation: see `iowbc.control.skill_observation.robot_observation`."""
+    sees_object: bool
+    """True where the robot measures the object's pose."""
+    robot: RobotAgent
+    """Admittance, scales of the action, and length of the history of forces."""
+    commands: Commands
+    """Ranges of the command."""
+    sources: dict[str, str]
+    """Artifact keys of the stages that the skill was trained with; `distill` is the controller's student."""
+    versions: dict[str, str]
+    """Of the packages that made the graph."""
+    files: dict[str, str] = Field(default_factory=dict)
+    """SHA-256 of the other files, by name."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        if self.observation != (size := SENSED + 6 * self.robot.history):
+            yield "", f"observation: {self.observation}, with robot.history {self.robot.history} it is {size}"
+
+
+def seal_skill(contract: SkillContract, folder: Path) -> None:
+    """Write the contract with the digests of the files that the folder holds now."""
+    sealed = contract.model_copy(update={"files": {name: file_digest(folder / name) for name in FILES}})
+    (folder / CONTRACT).write_text(sealed.model_dump_json(indent=1) + "\n", encoding="utf-8")
+
+
+def read_skill_contract(folder: Path) -> SkillContract:
+    """The contract of an exported skill that is whole and unchanged. Raises ContractBroken."""
+    contract = parsed(SkillContract, folder / CONTRACT, "skill")
+    require_sealed(contract.files, folder / CONTRACT, *FILES)
+    require_unchanged({name: contract.files[name] for name in FILES}, folder)
+    return contract
 
 
 class Skill:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from iowbc.arrays import Array
-from iowbc.deploy.controller import Controller
-from iowbc.deploy.session import Values
+from iowbc.deploy.controller import Controller, Values
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.errors import ERRORS
 from iowbc.evaluation.trials.metrics import trial_metrics
@@ -20,7 +19,7 @@ from iowbc.evaluation.trials.rollout import play_episodes, play_in
 from iowbc.evaluation.trials.table import carried_along
 from iowbc.evaluation.trials.trace import Outcome
 from iowbc.learning.acting import Policy
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE

@@ -22,7 +22,7 @@ def exported_world(folder: Path) -> Specification:
     """
     controller = Controller.load(folder)
     said = controller.contract
-    contract.require_sealed(said, folder, exported_folder.RECIPE)
+    contract.require_sealed(said.files, folder / exported_folder.CONTRACT, exported_folder.RECIPE)
     path = folder / exported_folder.RECIPE
     try:
         recipe = Recipe.model_validate_json(path.read_bytes())

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from iowbc.errors import UsageError
 from iowbc.recipe.evaluation.evaluation import Video
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.simulation.holding import FREE
 
 HEAVIEST = 1000.0

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iowbc.deploy.session import Values
+from iowbc.deploy.controller import Values
 from iowbc.deploy.timing import INPUT
 
 OUTPUT = "output/"

@@ -7,7 +7,7 @@ from pathlib import Path
 import onnx
 import torch
 
-from iowbc.deploy.session import Values
+from iowbc.deploy.controller import Values
 from iowbc.export.graph import Program
 
 LEADING_AXIS = "robots"

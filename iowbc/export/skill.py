@@ -10,8 +10,8 @@ from torch import Tensor
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND
 from iowbc.deploy.contract import PortEntry
-from iowbc.deploy.session import open_session, run
-from iowbc.deploy.skill_contract import GOLDEN, GRAPH, SkillContract, seal_skill
+from iowbc.deploy.controller import open_session, run
+from iowbc.deploy.skill import GOLDEN, GRAPH, SkillContract, seal_skill
 from iowbc.export.folder import PACKAGES
 from iowbc.export.golden import largest_difference, write_golden
 from iowbc.export.graph import Program

@@ -29,7 +29,7 @@ from iowbc.learning.normalization import Normalization
 from iowbc.learning.policy import ActorCritic
 from iowbc.learning.rollout import Samples, neighbours
 from iowbc.learning.symmetry import MirroredSamples, half_mirrored
-from iowbc.recipe.skill.learning import SkillLearning
+from iowbc.recipe.skill.skill import SkillLearning
 from iowbc.recipe.teacher import Teacher
 from iowbc.rollouts.blocks import block_size
 from iowbc.rollouts.rollout_policies import ExploringPolicy

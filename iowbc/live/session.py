@@ -15,7 +15,7 @@ from iowbc.evaluation.trials.plan import DIRECTIONS
 from iowbc.live.drag import Drag, Pushed, spring_pulls
 from iowbc.live.moment import MomentRecorder
 from iowbc.live.track import PAST, Played, recorded, track_of
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 
 AN_HOUR = (Segment(duration=600.0),) * 6
 """The longest that an episode lasts."""

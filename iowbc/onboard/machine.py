@@ -15,7 +15,7 @@ from iowbc.arrays import Array
 from iowbc.control.sensors import quantities
 from iowbc.deploy.controller import Controller
 from iowbc.onboard import checks, messages
-from iowbc.onboard.limits import LIMITS, SafetyLimits
+from iowbc.onboard.checks import LIMITS, SafetyLimits
 from iowbc.onboard.messages import Record
 from iowbc.onboard.sensors import Sensors
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, HEIGHT, OFFSET, PITCH, YAW_RATE, nominal_command
@@ -164,8 +164,6 @@ class Udp:
             raise UsageError(f"udp:{port}: {error}; choose another port") from error
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
-        self.refused = ""
-        """Fault of the last datagram that could not be read."""
         self._wanted = Wanted(ranges.standing, -np.inf)
 
     def wanted(self, now: float, state: Record | None) -> Wanted:
@@ -173,13 +171,10 @@ class Udp:
         with contextlib.suppress(BlockingIOError):
             while True:
                 data = self._socket.recv(LARGEST_DATAGRAM)
-                try:
+                with contextlib.suppress(ValueError, RecursionError):
                     given = Datagram.model_validate(json.loads(data))
-                except (ValueError, ValidationError, RecursionError) as error:
-                    self.refused = f"{type(error).__name__}: {error}"
-                    continue
-                request = State.DAMPING if request is State.DAMPING else given.request or request
-                self._wanted = self._given(given, now)
+                    request = State.DAMPING if request is State.DAMPING else given.request or request
+                    self._wanted = self._given(given, now)
         last = self._wanted
         return replace(last, request=request)
 

@@ -67,15 +67,12 @@ class Sensors:
         """When the newest state arrived [s]."""
         self.late = 0.0
         """Excess of its delay over the usual one, by the robot's clock [s]."""
-        self.refused = 0
-        """States that were repeated, or older than one before."""
         self._least, self._least_at = np.inf, 0.0
 
     def take(self, states: tuple[Record, ...], now: float) -> None:
         """Takes in what arrived, oldest first, at `now` [s]."""
         for state in states:
             if self._repeated(state):
-                self.refused += 1
                 continue
             found = posture(state, self._joints)
             if self.posture is not None:

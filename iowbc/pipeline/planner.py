@@ -14,8 +14,7 @@ from iowbc.pipeline.store.artifact import Artifact
 from iowbc.pipeline.store.digests import data_digest, folder_digest
 from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import read_progress
-from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in
-from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe
+from iowbc.recipe.reading.loading import SUFFIXES, LoadedRecipe, file_meant_in, load_recipe
 from iowbc.recipe.section import deciding
 
 NOT_WHOLE = "its published artifact leaves out large files"

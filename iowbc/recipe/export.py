@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.section import COSMETIC, LATER, Section
 from iowbc.recipe.simulation.holding import ObjectScene
 

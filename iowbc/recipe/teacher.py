@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
-from iowbc.recipe.evaluation.segment import DrawnScripts, Segment
+from iowbc.recipe.evaluation.sequences import DrawnScripts, Segment
 from iowbc.recipe.ppo import PPO
 from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Encoder, Section, Width, in_order
 from iowbc.recipe.simulation.holding import ObjectScene

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from iowbc.arrays import Array, Indices
-from iowbc.errors import shown
+from iowbc.errors import UsageError, shown
 from iowbc.robot.mjcf import Hinge, Tree, read_tree, small_text
 
 GRAVITY = 9.81
@@ -81,13 +81,13 @@ class Robot:
 def robot_folder(name: str) -> Path:
     """Finds `robots/<name>`: in the current folder, else in the checkout, else in the installed package.
 
-    A name with a slash is the path of a folder. Raises `FileNotFoundError` with the known robots.
+    A name with a slash is the path of a folder. Raises `UsageError` with the known robots.
     """
     if Path(name).name != name and (Path(name) / DESCRIPTION).is_file():
         return Path(name)
     found = robot_folders()
     if name not in found:
-        raise FileNotFoundError(
+        raise UsageError(
             f"no robot {shown(name)}: looked for its robot.yaml in {', '.join(str(root) for root in _roots())}; "
             f"known robots: {', '.join(found) or 'none'}"
         )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from iowbc import counter_random as random
 from iowbc.arrays import Array, Indices, Keys
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot

@@ -8,7 +8,7 @@ from mujoco.batch import Batch, SimulationError
 
 from iowbc.arrays import Array, Indices, Mask, as_slice
 from iowbc.errors import UsageError
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations

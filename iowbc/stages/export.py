@@ -11,7 +11,7 @@ from iowbc.recipe.recipe import Recipe
 from iowbc.stages.inputs import generator_stage, leaves_student, policy_stage
 
 if TYPE_CHECKING:
-    from iowbc.deploy.session import Values
+    from iowbc.deploy.controller import Values
     from iowbc.evaluation.acceptance import Accepted
     from iowbc.export.graph import ControllerGraph
     from iowbc.learning.networks import StudentNetwork
@@ -97,7 +97,7 @@ def _parity(graph: "ControllerGraph", inputs: "Values", out: Path) -> dict[str, 
     from functools import partial
 
     from iowbc.deploy import exported_folder
-    from iowbc.deploy.session import open_session, run
+    from iowbc.deploy.controller import open_session, run
     from iowbc.export import golden
     from iowbc.export.onnx_graph import run_torch
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from iowbc.commands import needs
+from iowbc.commands import options
 from iowbc.commands.play import play_on_web
 from iowbc.errors import UsageError
 from iowbc.evaluation.play_request import PlayRequest
@@ -33,7 +33,7 @@ def test_a_page_is_no_film(tmp_path: Path) -> None:
 
 
 def test_without_viser_the_command_that_installs_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = needs.find_spec
-    monkeypatch.setattr(needs, "find_spec", lambda name: None if name == "viser" else found(name))
+    found = options.find_spec
+    monkeypatch.setattr(options, "find_spec", lambda name: None if name == "viser" else found(name))
     with pytest.raises(UsageError, match=r"pip install 'iowbc\[web\]'"):
         play(tmp_path, 8080)

@@ -9,9 +9,9 @@ import pytest
 
 LEAN = """
 import importlib.util
-from iowbc.commands import needs
+from iowbc.commands import options
 known = importlib.util.find_spec
-needs.find_spec = lambda name: None if name in {"torch", "mujoco", "mlflow"} else known(name)
+options.find_spec = lambda name: None if name in {"torch", "mujoco", "mlflow"} else known(name)
 from iowbc.cli import main
 main()
 """

@@ -17,7 +17,7 @@ root, entered, seen = sys.argv[1], [], []
 
 def room(code):
     name = os.path.relpath(code.co_filename, root)
-    helps = ("/tracking/", "/console/", "digests", "pipeline/code", "pipeline/machine", "pipeline/nested")
+    helps = ("/tracking/", "/console/", "digests", "pipeline/code", "pipeline/nested")
     counts = name.startswith(("cli.py", "commands/", "pipeline/")) and not any(part in name for part in helps)
     return counts and not code.co_name.startswith("<")
 

@@ -6,12 +6,13 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+from pinocchio_states import configuration
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.control.gravity import ArmGravity
+from iowbc.reference.labels.support_model import build_model
 from iowbc.robot import rotations
 from iowbc.robot.description import GRAVITY, Robot
-from iowbc.robot.pinocchio_model import build_model, configuration
 
 ROWS = 20
 TILTS = {"upright": (0.0, 0.0, 0.0), "leaning": (0.0, 0.7, 0.0), "tilted": (0.3, -0.4, 2.0)}

@@ -10,16 +10,15 @@ import torch
 from numpy.typing import NDArray
 
 from iowbc.control.sensors import Measured
-from iowbc.deploy.controller import Controller
+from iowbc.deploy.controller import Controller, open_session, run
 from iowbc.deploy.exported_folder import SETTLE, STEP
-from iowbc.deploy.session import open_session, run
 from iowbc.evaluation.exported import ExportedPolicy
 from iowbc.evaluation.trials.plan import command_script, planned_episode
 from iowbc.evaluation.trials.rollout import play_in
 from iowbc.export.golden import played, stacked
 from iowbc.export.graph import ControllerGraph
 from iowbc.learning.acting import StudentPolicy
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification

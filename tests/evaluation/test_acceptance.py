@@ -8,7 +8,7 @@ from made_up_trials import DT, RECIPE, ROBOT, script, trace
 
 from iowbc.evaluation.acceptance import Accepted, judged
 from iowbc.evaluation.trials.trace import Outcome
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.export import Acceptance
 from iowbc.robot.description import GRAVITY
 from iowbc.task.episodes import Episode

@@ -11,7 +11,7 @@ from iowbc.evaluation.trials.quick import quick_trials
 from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.evaluation.trials.transport import commanded_path
 from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.segment import DrawnScripts
+from iowbc.recipe.evaluation.sequences import DrawnScripts
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.teacher import Check

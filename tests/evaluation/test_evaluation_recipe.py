@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.evaluation.suites import HeavyCase, MassSweep, PushLadder
 from iowbc.recipe.export import Acceptance
 from iowbc.recipe.recipe import Recipe

@@ -8,7 +8,7 @@ from iowbc.evaluation.trials.plan import UNDISTURBED, Trial, command_script, pla
 from iowbc.evaluation.trials.rollout import play_episodes
 from iowbc.evaluation.trials.table import trial_row
 from iowbc.evaluation.trials.trace import Outcome
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.robot.description import load_robot, robot_folder

@@ -8,8 +8,7 @@ from iowbc.control.gait import wants_to_move
 from iowbc.evaluation.paper import TABLES
 from iowbc.evaluation.trials.errors import ERRORS, deviations_standing_still
 from iowbc.evaluation.trials.plan import command_script
-from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING, STAGNATION
+from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING, STAGNATION, Segment
 from iowbc.recipe.task.commands import Commands
 from iowbc.recipe.task.joint_references import References
 

@@ -20,8 +20,7 @@ from iowbc.evaluation.trials.plan import (
     sequence_for,
 )
 from iowbc.evaluation.trials.protocol import batched_by_duration, evaluated_world
-from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
+from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING, Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.partner import BEHAVIOURS
 from iowbc.recipe.task.commands import Commands

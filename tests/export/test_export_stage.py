@@ -16,8 +16,8 @@ from network_watch import watched
 from stage_jobs import make_job
 
 from iowbc.deploy.contract import Contract, read_contract, seal
+from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import CONTRACT, GOLDEN, SETTLE, STEP
-from iowbc.deploy.session import open_session, run
 from iowbc.errors import ContractBroken, Interrupted, NoDisplay, StageFailed, UsageError
 from iowbc.evaluation.acceptance import try_out_network
 from iowbc.evaluation.play import exported_source, play, require_display
@@ -28,7 +28,7 @@ from iowbc.learning.networks import TeacherNetwork
 from iowbc.learning.storage import save_network
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.evaluation.evaluation import Video
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 from iowbc.recipe.recipe import Recipe
 from iowbc.robot.description import Robot
 from iowbc.stages import export
@@ -228,7 +228,7 @@ def test_an_exported_folder_plays_on_its_own(done: Job, tmp_path: Path) -> None:
 def test_playing_an_exported_folder_tells_nobody(done: Job, tmp_path: Path) -> None:
     program = (
         "from pathlib import Path; from iowbc.evaluation.play import exported_source, play;"
-        "from iowbc.evaluation.play_request import PlayRequest; from iowbc.recipe.evaluation.segment import Segment;"
+        "from iowbc.evaluation.play_request import PlayRequest; from iowbc.recipe.evaluation.sequences import Segment;"
         "from iowbc.recipe.evaluation.evaluation import Video;"
         f"play(exported_source(Path({str(done.out)!r})), PlayRequest(sequence=(Segment(duration=0.1, ramp=0.0),),"
         f"video=Path({str(tmp_path / 'out.mp4')!r}), video_settings=Video(width=96, height=64, fps=10)))"

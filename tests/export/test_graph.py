@@ -14,8 +14,8 @@ from iowbc.control import observation
 from iowbc.control.layout import Part
 from iowbc.control.observation import Sensed
 from iowbc.deploy.contract import Contract
+from iowbc.deploy.controller import open_session, run
 from iowbc.deploy.exported_folder import SETTLE, STEP
-from iowbc.deploy.session import open_session, run
 from iowbc.export.folder import write_folder
 from iowbc.export.golden import Values, largest_difference, stacked, write_golden
 from iowbc.export.graph import ControllerGraph

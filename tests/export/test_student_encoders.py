@@ -9,7 +9,7 @@ from test_graph import random_inputs
 
 from iowbc.control.action import action_mirror
 from iowbc.control.observation import observation_layout
-from iowbc.deploy.session import open_session, run
+from iowbc.deploy.controller import open_session, run
 from iowbc.export.golden import largest_difference
 from iowbc.export.onnx_graph import run_torch, write_onnx
 from iowbc.learning.networks import StudentNetwork, mirror_as_json

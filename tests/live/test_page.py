@@ -21,7 +21,7 @@ from iowbc.live.panel import LIVE
 from iowbc.live.server import HOST, serving
 from iowbc.live.session import Session
 from iowbc.live.track import trial_titles
-from iowbc.recipe.evaluation.segment import Segment
+from iowbc.recipe.evaluation.sequences import Segment
 
 STANDING = (Segment(duration=0.2, ramp=0.0),)
 

@@ -7,7 +7,7 @@ import numpy as np
 from iowbc.arrays import Array
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
-from iowbc.onboard.limits import SafetyLimits
+from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges

@@ -11,8 +11,7 @@ from still import Still
 from iowbc.commands.robot import report_checks
 from iowbc.errors import UsageError
 from iowbc.onboard import messages
-from iowbc.onboard.checks import CheckResult, Listened, checks
-from iowbc.onboard.limits import LIMITS
+from iowbc.onboard.checks import LIMITS, CheckResult, Listened, checks
 from iowbc.onboard.messages import Record
 
 

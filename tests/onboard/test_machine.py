@@ -121,7 +121,6 @@ def test_states_that_repeat_damp_within_20_ms(still: Still) -> None:
     while still.machine.state is State.RUN:
         still.turn(states=(state,))
     assert still.now - last <= 0.020
-    assert still.machine.sensors.refused > 5
 
 
 @pytest.mark.parametrize(

@@ -76,4 +76,3 @@ def test_the_robots_program_understands_the_message(sighted: Path) -> None:
     wanted = poses.wanted(1.0, None)
     poses.close()
     assert {name: values[0].tolist() for name, values in wanted.seen.items()} == message["seen"]
-    assert poses.refused == ""

@@ -13,7 +13,7 @@ from iowbc.errors import UsageError
 from iowbc.evaluation.exported import exported_world
 from iowbc.live.remote_view import Asked
 from iowbc.onboard import messages
-from iowbc.onboard.limits import SafetyLimits
+from iowbc.onboard.checks import SafetyLimits
 from iowbc.onboard.machine import Machine, State, TurnInputs, Wanted
 from iowbc.onboard.messages import Record
 from iowbc.onboard.operators import Ranges, object_poses

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from iowbc.errors import UsageError
-from iowbc.pipeline import writability
-from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.writability import require_writable, require_writable_runs
+from iowbc.pipeline.store import runs as folders
+from iowbc.pipeline.store.runs import Runs, require_writable, require_writable_runs
 
 
 def test_a_missing_folder_is_made_and_nothing_is_left_in_it(tmp_path: Path) -> None:
@@ -41,13 +40,13 @@ def test_anothers_folder_is_to_be_given_to_this_user(tmp_path: Path, monkeypatch
     def refuse(**_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(writability.tempfile, "NamedTemporaryFile", refuse)
+    monkeypatch.setattr(folders.tempfile, "NamedTemporaryFile", refuse)
     owner = runs.stat().st_uid
-    monkeypatch.setattr(writability.os, "geteuid", lambda: owner + 1000)
+    monkeypatch.setattr(folders.os, "geteuid", lambda: owner + 1000)
     with pytest.raises(UsageError, match=rf"belongs to user {owner} and .* `sudo chown -R {owner + 1000} runs`"):
         require_writable_runs(Runs(runs))
     with pytest.raises(UsageError, match="Permission denied; give another folder with --output"):
         require_writable(runs, "--output")
-    monkeypatch.setattr(writability.os, "geteuid", lambda: owner)
+    monkeypatch.setattr(folders.os, "geteuid", lambda: owner)
     with pytest.raises(UsageError, match="Permission denied; give another folder with --runs"):
         require_writable_runs(Runs(runs))

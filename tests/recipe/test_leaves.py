@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 
 from iowbc.recipe.reading.document import located, plain
-from iowbc.recipe.reading.overrides import overridden
+from iowbc.recipe.reading.loading import overridden
 from iowbc.recipe.reading.validation import validate
 from iowbc.recipe.recipe import Recipe, recipe_schema
 

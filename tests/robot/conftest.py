@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from iowbc.reference.labels.support_model import build_model
 from iowbc.robot.description import Robot
-from iowbc.robot.pinocchio_model import build_model
 
 CONFIGURATIONS = 100
 

@@ -8,7 +8,7 @@ import pytest
 CONTACT = """
 import crocoddyl, numpy as np, pinocchio
 from iowbc.robot.description import load_robot, robot_folder
-from iowbc.robot.pinocchio_model import build_model
+from iowbc.reference.labels.support_model import build_model
 robot = load_robot(robot_folder("g1"))
 model = build_model(robot)
 state = crocoddyl.StateMultibody(model)

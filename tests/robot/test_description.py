@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from iowbc.errors import UsageError
 from iowbc.robot.description import Robot, load_robot, robot_folder
 
 
@@ -33,7 +34,7 @@ def test_branches_cover_the_joints_in_the_papers_order(robot: Robot) -> None:
 
 
 def test_an_unknown_robot_is_answered_with_the_known_ones() -> None:
-    with pytest.raises(FileNotFoundError, match=r"no robot 'g2'.*known robots: g1"):
+    with pytest.raises(UsageError, match=r"no robot 'g2'.*known robots: g1"):
         robot_folder("g2")
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pinocchio
 import pytest
+from pinocchio_states import configuration
 
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import (
@@ -16,7 +17,6 @@ from iowbc.robot.mirror import (
     joint_mirror,
     support_mirror,
 )
-from iowbc.robot.pinocchio_model import configuration
 
 ROBOT_IS_SYMMETRIC = 5e-4
 """The manufacturer's left and right differ by fractions of a millimetre and of a gram [m]."""

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+from pinocchio_states import configuration
 
 from iowbc.control.arms import ArmKinematics
 from iowbc.robot.description import Robot
-from iowbc.robot.pinocchio_model import configuration
 
 SAME_FILE, PUBLIC = 1e-9, 1e-5
 MASS = 33.341142

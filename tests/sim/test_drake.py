@@ -8,7 +8,7 @@ from changes import changed
 from stepping import run
 
 from iowbc.errors import UsageError
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.recipe import Recipe as WholeRecipe
 from iowbc.recipe.section import deciding
 from iowbc.recipe.simulation.simulation import SimulationSettings as Recipe

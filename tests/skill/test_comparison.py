@@ -10,7 +10,7 @@ import torch
 
 from iowbc.errors import Interrupted, StageFailed
 from iowbc.learning.networks import TeacherNetwork
-from iowbc.recipe.skill.evaluation import SkillEvaluation
+from iowbc.recipe.skill.skill import SkillEvaluation
 from iowbc.results.table import markdown
 from iowbc.skill.evaluation.games import Competitor, planned_games, play_batches
 from iowbc.skill.evaluation.tables import COLUMNS, estimate, figure, headline, improvement, tables, worst_partner

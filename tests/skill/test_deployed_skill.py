@@ -13,8 +13,7 @@ import torch
 from iowbc.control.sensors import Measured
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
-from iowbc.deploy.skill import Skill
-from iowbc.deploy.skill_contract import CONTRACT, GOLDEN, GRAPH
+from iowbc.deploy.skill import CONTRACT, GOLDEN, GRAPH, Skill
 from iowbc.deploy.timing import step_seconds
 from iowbc.errors import ContractBroken
 from iowbc.export.skill import write_skill
@@ -135,7 +134,7 @@ def test_measurements_that_are_no_numbers_leave_the_command(folder: Path, contro
 @pytest.mark.parametrize("name", [GRAPH, GOLDEN])
 def test_a_changed_file_is_refused(folder: Path, controller: Controller, name: str) -> None:
     (folder / name).write_bytes((folder / name).read_bytes() + b"x")
-    with pytest.raises(ContractBroken, match="changed or lost"):
+    with pytest.raises(ContractBroken, match="changed or damaged"):
         Skill.load(folder, controller)
 
 

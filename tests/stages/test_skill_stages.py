@@ -10,7 +10,7 @@ from changes import with_changes
 from stage_jobs import make_job
 from training_jobs import rows, small_recipe, stopped_and_resumed
 
-from iowbc.deploy.skill_contract import read_skill_contract
+from iowbc.deploy.skill import read_skill_contract
 from iowbc.errors import StageFailed
 from iowbc.recipe.recipe import Recipe
 from iowbc.results.table import read_tables

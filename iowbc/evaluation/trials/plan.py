@@ -8,8 +8,7 @@ from types import MappingProxyType
 
 from iowbc.evaluation.trials.scripts import drawn_script
 from iowbc.recipe.evaluation.evaluation import Evaluation
-from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING
+from iowbc.recipe.evaluation.sequences import LIFTING, PUSHING, Segment
 from iowbc.recipe.evaluation.suites import EIGHT, Case, MassSweep
 from iowbc.recipe.recipe import Recipe
 from iowbc.recipe.simulation.holding import FREE

@@ -7,7 +7,7 @@ import numpy as np
 from iowbc import counter_random as random
 from iowbc.arrays import Array
 from iowbc.control.command import COMMAND, nominal_command, rate_limits
-from iowbc.recipe.evaluation.segment import DrawnScripts
+from iowbc.recipe.evaluation.sequences import DrawnScripts
 from iowbc.recipe.section import Range
 from iowbc.recipe.task.commands import Commands
 from iowbc.task.commands.script import CommandScript, CommandSegment

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from iowbc.errors import Damaged
-from iowbc.files import synchronise, write_whole
+from iowbc.files import file_digest, synchronise, write_whole
 from iowbc.pipeline.stage import SUMMARY
-from iowbc.pipeline.store.digests import content_digest, data_digest, file_digest
+from iowbc.pipeline.store.digests import content_digest, data_digest
 from iowbc.pipeline.store.runs import read_json, read_yaml
 
 if TYPE_CHECKING:

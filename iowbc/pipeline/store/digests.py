@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from iowbc.files import file_digest
+
 PACKAGE = Path(__file__).parents[2]
 """Folder of this package."""
 
@@ -20,12 +22,6 @@ def canonical_json(data: Any) -> str:
 def data_digest(data: Any) -> str:
     """SHA-256 of the data's canonical JSON, hexadecimal."""
     return hashlib.sha256(canonical_json(data).encode()).hexdigest()
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file's bytes, hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def content_digest(files: Mapping[str, str]) -> str:

@@ -1,9 +1,84 @@
-"""Fixed command sequences of trials. All ask for steps: a robot that stands still fails every one.
+"""Commands of trials: stretches of a sequence, scripts that are drawn trial by trial, and the fixed sequences.
 
-Each changes no faster than `task.commands.rates` allow and asks for no posture outside of the feasible map.
+All fixed ones ask for steps: a robot that stands still fails every one. Each changes no faster than
+`task.commands.rates` allow and asks for no posture outside of the feasible map.
 """
 
-from iowbc.recipe.evaluation.segment import Segment
+from collections.abc import Iterator
+from typing import Annotated
+
+from pydantic import Field
+
+from iowbc.recipe.section import Range, Section
+
+Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
+"""Wrist offset along an axis [m]; no arm of this size takes its wrist farther from the grasp."""
+
+
+class Segment(Section):
+    """A stretch of a command sequence; the command moves to these values over `ramp` and then holds."""
+
+    duration: float = Field(gt=0, le=600)
+    """Length of the segment, its ramp included [s]."""
+    ramp: float = Field(default=0.5, ge=0)
+    """Time over which the command moves linearly from the previous segment's values [s]."""
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Commanded v_x, v_y [m/s] and yaw rate [rad/s] in the heading frame."""
+    height: float | None = Field(default=None, ge=0.3, le=1.0)
+    """Commanded pelvis height [m], which no humanoid of this size exceeds; empty takes the task's default height."""
+    pitch: float = Field(default=0.0, ge=-1.6, le=1.6)
+    """Commanded torso pitch [rad], positive leans forward."""
+    wrists: tuple[Offset, Offset, Offset, Offset, Offset, Offset] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Wrist offsets Δp, left then right, heading frame [m]."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        if self.ramp > self.duration:
+            yield "", f"ramp {self.ramp} s is longer than the segment's duration {self.duration} s"
+
+
+class DrawnScripts(Section):
+    """Every script holds the same kinds of motion in a drawn order, each with drawn sizes and times.
+
+    With an object in the hands, or without one: walk, walk with raised hands, turn left and right, walk back and
+    sideways, crouch, bow, stop. Behind a crate: push straight, in a left and a right turn, from a crouch, stop bowed,
+    stop upright. Sizes are clipped to the ranges of `task.commands`, and commands change as fast as its rates allow.
+    """
+
+    duration: float = Field(default=24.0, ge=12.0, le=600.0)
+    """Time of a script [s]: nine kinds of motion with a second or two at each. A script whose ramps leave less than
+    `shortest_hold` for each is longer."""
+    start: float = Field(default=1.0, ge=0.0)
+    """Time for which the robot stands at first [s]: the object's weight comes to bear."""
+    shortest_hold: float = Field(default=0.5, gt=0.0)
+    """Shortest time for which a command is held after its ramp [s]."""
+    walking: Range = (0.3, 0.5)
+    """Forward speed [m/s]; from what is worth a step to that of the fixed sequences."""
+    backward: Range = (0.2, 0.3)
+    """Backward speed [m/s]; training draws up to 0.3."""
+    sideways: Range = (0.15, 0.2)
+    """Speed to either side [m/s]; training draws up to 0.2."""
+    turning: Range = (0.2, 0.4)
+    """Yaw rate of a turn [rad/s], on the spot in every other one; training draws up to 0.4."""
+    crate_turning: Range = (0.05, 0.1)
+    """Yaw rate of a turn behind a crate [rad/s]; two palms turn it slowly."""
+    height: Range = (0.62, 0.76)
+    """Pelvis height while walking in another posture than the nominal one [m]."""
+    pitch: Range = (-0.2, 0.4)
+    """Torso pitch in such a posture [rad]."""
+    posture_share: float = Field(default=0.5, ge=0.0, le=1.0)
+    """Part of the walks and stops in another posture than the nominal one."""
+    raised: Range = (0.02, 0.05)
+    """Height of raised hands above their grasp [m]."""
+    crouch: Range = (0.5, 0.6)
+    """Pelvis height of a crouch [m]; the paper's lowest is 0.5."""
+    bow: Range = (0.4, 0.75)
+    """Torso pitch of a bow while standing [rad]; as far as `task.commands.pitch` goes."""
+    deep_share: float = Field(default=0.1, ge=0.0, le=1.0)
+    """Part of the bows that go on to the paper's range, up to `task.commands.deep_pitch`; as often as training draws
+    them."""
+    bow_height: Range = (0.64, 0.72)
+    """Pelvis height of a bow [m]; at 1.5 rad 0.62 to 0.72 m are feasible."""
+
 
 RAISED = (0.0, 0.0, 0.05, 0.0, 0.0, 0.05)
 """Both wrists 5 cm above their grasp [m]."""

@@ -6,8 +6,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, PositiveFloat
 
-from iowbc.recipe.evaluation.segment import Segment
-from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON
+from iowbc.recipe.evaluation.sequences import BOWING, PROBED, STAGNATION, STANDING, WALKING, WALKING_ON, Segment
 from iowbc.recipe.section import Ascending, Masses, Section
 from iowbc.recipe.simulation.holding import Held, ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS

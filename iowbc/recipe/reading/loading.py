@@ -1,18 +1,98 @@
-"""Reads a recipe file: inheritance, overrides, validation, and where each value came from."""
+"""Finds and reads a recipe file: inheritance, `--set` overrides, validation, and where each value came from."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, nearest, shown
 from iowbc.files import read_limited
 from iowbc.recipe.beside import FileBeside
-from iowbc.recipe.reading.document import Located, leaves, located, merged, read_document
-from iowbc.recipe.reading.finding import SUFFIXES, file_meant_in, known_files, recipe_file
-from iowbc.recipe.reading.overrides import overridden
-from iowbc.recipe.reading.validation import models_at, validate
+from iowbc.recipe.reading.document import MAXIMUM_DEPTH, Located, leaves, located, merged, read_document, read_value
+from iowbc.recipe.reading.validation import defaults, models_at, validate
 from iowbc.recipe.recipe import Recipe
+
+SUFFIXES = (".yaml", ".yml")
+PACKAGE = Path(__file__).resolve().parents[2]
+LARGEST_FILE = 1_000_000
+"""Bytes of the largest recipe that is read."""
+LONGEST_PATH = 300
+"""Number of last characters of an unreadable path that an error shows."""
+LONGEST_CHAIN = 20
+"""Recipes that extend one another, at most."""
+OWN_KEYS = ("name", "description")
+"""Keys that a recipe never inherits: they say which experiment this is."""
+
+
+def recipe_file(word: str | Path) -> Path:
+    """The file that a word means: the file itself, or, for a bare name with or without ending, the first of that name.
+
+    Looked through are `./recipes`, the recipes of this checkout, and those of the installed package. A word that means
+    nothing comes back as it is, for the reader to complain about.
+    """
+    path = Path(word)
+    if os.path.isfile(path) or path.name != str(word):
+        return path
+    return next((found for found in known_files() if path.name in (found.stem, found.name)), path)
+
+
+def file_meant_in(folder: Path, word: str) -> Path:
+    """The file that `extends`, `teacher.start` or one of `variants` means in a recipe of a folder: one beside it, with
+    or without ending, else what the word means anywhere."""
+    beside = [Path(os.path.normpath(folder / f"{word}{ending}")) for ending in ("", *SUFFIXES)]
+    return next((found for found in (*beside, recipe_file(word)) if os.path.isfile(found)), beside[0])
+
+
+def known_files() -> Iterator[Path]:
+    """The recipes that can be named without their folder, nearest first."""
+    for folder in (Path("recipes"), PACKAGE.parent / "recipes", PACKAGE / "recipes"):
+        for suffix in SUFFIXES:
+            yield from sorted(folder.glob(f"*{suffix}"))
+
+
+def overridden(tree: Located, overrides: Sequence[str]) -> Located:
+    """The tree with each override laid upon it, in order.
+
+    A number in the path is an index of a list, which may be one that the recipe has by default. Raises `RecipeError`.
+    """
+    for override in overrides:
+        place = f"--set {override}"
+        dotted, equals, text = override.partition("=")
+        path = tuple(part.strip() for part in dotted.split("."))
+        if not equals or not all(path):
+            raise RecipeError([Problem(place, "should read a.b.c=value, for example --set eval.trials=5")])
+        if len(path) > MAXIMUM_DEPTH:
+            raise RecipeError([Problem(shown(place), f"names {len(path)} levels; no recipe has more than a few")])
+        if path[0] == "extends":
+            raise RecipeError([Problem(place, "'extends' cannot be set here; name the recipe that extends instead")])
+        tree = _replaced(tree, path, read_value(text, place), place, ())
+    return tree
+
+
+def _replaced(tree: Located, path: tuple[str, ...], value: Located, place: str, above: tuple[str, ...]) -> Located:
+    if not path:
+        return merged(tree, value)
+    name, rest = path[0], path[1:]
+    if isinstance(tree.value, list):
+        count = len(tree.value)
+        if not name.isdecimal() or int(name) >= count:
+            valid = f"0 to {count - 1}" if count else "none, the list is empty"
+            raise RecipeError([Problem(place, f"'{name}' is not an index of '{'.'.join(above)}'; valid: {valid}")])
+        items = list(tree.value)
+        items[int(name)] = _replaced(items[int(name)], rest, value, place, (*above, name))
+        return Located(items, tree.place)
+    entries = dict(tree.value) if isinstance(tree.value, dict) else {}
+    below = entries.get(name) or _default((*above, name), place)
+    entries[name] = _replaced(below, rest, value, place, (*above, name))
+    return Located(entries, tree.place)
+
+
+def _default(path: tuple[str, ...], place: str) -> Located:
+    """The list that a recipe has at a path when it says nothing there; anything else starts empty."""
+    found: Located | None = defaults()
+    for name in path:
+        found = found.value.get(name) if found is not None and isinstance(found.value, dict) else None
+    return found if found is not None and isinstance(found.value, list) else Located({}, place)
 
 
 def with_files(tree: Located, folder: Path) -> Located:
@@ -39,16 +119,6 @@ def with_files(tree: Located, folder: Path) -> Located:
     if problems:
         raise RecipeError(problems)
     return whole
-
-
-LARGEST_FILE = 1_000_000
-"""Bytes of the largest recipe that is read."""
-LONGEST_PATH = 300
-"""Number of last characters of an unreadable path that an error shows."""
-LONGEST_CHAIN = 20
-"""Recipes that extend one another, at most."""
-OWN_KEYS = ("name", "description")
-"""Keys that a recipe never inherits: they say which experiment this is."""
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from iowbc.errors import Problem, RecipeError, shown
 from iowbc.recipe.reading.document import Located, plain, read_document
-from iowbc.recipe.reading.finding import file_meant_in, recipe_file
-from iowbc.recipe.reading.loading import LoadedRecipe, load_recipe, read_text
+from iowbc.recipe.reading.loading import LoadedRecipe, file_meant_in, load_recipe, read_text, recipe_file
 from iowbc.recipe.recipe import NAME
 
 MOST_VARIANTS = 100

@@ -3,13 +3,112 @@
 from collections.abc import Iterator
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
-from iowbc.recipe.section import LATER, Section
+from iowbc.recipe.ppo import PPO
+from iowbc.recipe.section import COSMETIC, DEEPEST, LATER, ArtifactName, Ascending, RecipeFile, Section, Width
+from iowbc.recipe.simulation.holding import ObjectScene
 from iowbc.recipe.simulation.partner import BEHAVIOURS
-from iowbc.recipe.skill.evaluation import SkillEvaluation
-from iowbc.recipe.skill.learning import SkillLearning
 from iowbc.recipe.skill.task import Tasks
+
+LARGEST_ROLLOUT = 1_000_000
+"""Decisions that are kept in memory for one update."""
+
+
+class SkillLearning(PPO):
+    """Multi-agent PPO: decentralised policies of robot and human, a centralised value network in training."""
+
+    algorithm: Literal["mappo", "happo", "ppo"] = "mappo"
+    """`mappo`: both policies learn at once from the same advantages (Yu et al. 2022). `happo`: one after the other, the
+    later one with its advantages weighted by what the earlier one changed (Kuba et al. 2022). `ppo`: the robot alone,
+    against scripted humans throughout, with a value of its own observation."""
+    steps: int = Field(default=400_000, ge=1, le=10**12)
+    """Decisions of the whole training, summed over the games."""
+    games: int = Field(default=32, ge=1, le=100_000)
+    """Games that are played at the same time."""
+    rollout: int = Field(default=100, ge=2, le=10_000)
+    """Decisions of each game between two updates. All games begin anew with each rollout, so that a resumed training
+    needs no state of the simulation; an episode should therefore fit into one."""
+    imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
+    """First decisions, in which the robot does not learn from the reward: it acts, and imitates what it would do if it
+    knew the path (DAgger), while the value learns. From the reward alone 76,000 decisions had changed nothing."""
+    scripted_steps: int = Field(default=200_000, ge=0, le=10**12)
+    """First decisions, those of the imitation included, in which every human is a scripted one."""
+    learnt_share: float = Field(default=0.5, ge=0, le=1)
+    """Part of the episodes in which the learnt human acts afterwards; the robot goes on meeting scripted ones in the
+    others, so that it does not learn to rely on one partner."""
+    imitation_gradient_steps: int = Field(default=200, ge=1, le=100_000)
+    """Gradient steps of the imitation after each rollout."""
+    imitation_rate: float = Field(default=1e-3, gt=0)
+    """Adam's learning rate of the imitation."""
+    hidden: tuple[Width, ...] = Field(default=(128, 128), max_length=DEEPEST)
+    """Hidden layers of the policies and of the value network."""
+    normalization_clip: float = Field(default=5.0, gt=0)
+    """Normalised inputs are clipped to this many standard deviations."""
+    learning_rate: float = Field(default=6e-5, gt=0)
+    """Adam's learning rate of the policies at the start; at 3e-4 the first update after the imitation had a KL
+    divergence of 0.35."""
+    value_learning_rate: float = Field(default=3e-4, gt=0)
+    """Adam's learning rate of the value."""
+    desired_kl: float | None = Field(default=0.012, gt=0)
+    """KL divergence that an update of a policy should have; moves its learning rate as in `teacher.desired_kl`."""
+    learning_rate_range: tuple[PositiveFloat, PositiveFloat] = (1e-5, 1e-3)
+    """Least and largest learning rate, where `desired_kl` moves it."""
+    gamma: float = Field(default=0.98, gt=0, lt=1)
+    """Discount factor of a decision; 0.98 looks ten seconds ahead at 5 Hz."""
+    initial_std: float = Field(default=0.4, gt=0)
+    """Initial standard deviation of the actions, which range from -1 to 1."""
+    seed: int | None = Field(default=None, ge=0, lt=2**32)
+    """Seed of this training alone; the recipe's `seed` when empty."""
+    checkpoint_every: int = Field(default=5, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
+    """Updates between two checkpoints."""
+
+    def problems(self) -> Iterator[tuple[str, str]]:
+        samples = self.games * self.rollout
+        if samples > LARGEST_ROLLOUT:
+            yield "", f"games x rollout is {samples:,}; at most {LARGEST_ROLLOUT:,} are kept in memory"
+        elif samples % self.minibatches:
+            yield "", f"minibatches ({self.minibatches}) does not divide games x rollout ({samples})"
+
+
+Rival = Literal["nominal", "follow", "lead", "clock", "stand"]
+"""Rules of `iowbc.skill.plan.Plan` that act without a skill."""
+
+
+class SkillEvaluation(Section):
+    """Games in which trained skills and rivals are compared: every combination of what is listed here."""
+
+    label: str = Field(default="MAPPO", min_length=1, max_length=40)
+    """Name of this recipe's skill in tables and figures."""
+    rivals: tuple[Rival, ...] = ("lead", "follow")
+    """Rules that play beside it. `nominal`: the nominal command alone, which leads or follows. `lead`: a scripted
+    leader, who knows the path in any case. `follow`: an admittance follower. `clock`: the path by the clock. `stand`:
+    nothing."""
+    others: dict[str, tuple[ArtifactName, ...]] = Field(default_factory=dict, json_schema_extra=COSMETIC)
+    """By label: recipes whose trained skills play, too, or keys of theirs. Under this recipe's own label they are
+    further trainings of it, such as other seeds. What they are is part of the key, not what they are called."""
+    controllers: dict[str, RecipeFile] = Field(default_factory=dict, json_schema_extra=COSMETIC)
+    """By label: recipes with `distill` whose student this recipe's skill also commands, in place of the controller that
+    it was trained with. Each brings its references, command ranges, action scale, control frequency and reference
+    generator; the world and the skill's observation stay those of this recipe."""
+    tasks: tuple[str, ...] = ()
+    """Tasks of `skill.tasks`; all where it is empty."""
+    known: tuple[bool, ...] = (True, False)
+    """Whether the robot knows the path, or only the human does."""
+    partners: tuple[str, ...] = ()
+    """Humans: scripted behaviours, and `agent` for the learnt one; those of training, those held out, and the learnt
+    one where it is empty."""
+    loads: tuple[float, ...] = Field(default=(0.5,), min_length=1)
+    """Masses as places in the range of the task: 0 is its least, 1 its greatest."""
+    masses: dict[ObjectScene, Ascending] = Field(default_factory=dict, json_schema_extra=LATER)
+    """Masses of the tasks of a scene [kg], which may lie outside the range of the task; in place of `loads`."""
+    episodes: int = Field(default=2, ge=1, le=1000)
+    """Episodes of each combination."""
+    seed: int = Field(default=7000, ge=0, lt=2**32)
+    """Seed of the first episode; the same episodes for every skill and rival."""
+    games: int = Field(default=48, ge=1, le=10_000, json_schema_extra=COSMETIC)
+    """Games that are played at the same time."""
+
 
 PartnerKind = Literal["path", "follower", "leader", "stopping", "tugging", "lagging", "agent"]
 """Behaviours of scripted humans, and the human of the actions."""

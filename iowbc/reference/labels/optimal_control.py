@@ -14,10 +14,9 @@ import pinocchio
 from iowbc.arrays import Array
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.kinematic_start import KinematicStart
-from iowbc.reference.labels.sample import Posture, Sample
-from iowbc.reference.labels.soles import distribute, sole_limits
-from iowbc.reference.labels.support_model import SupportModel, posture_weights
+from iowbc.reference.labels.gauss_newton import UNBOUNDED, KinematicStart, constrained_step
+from iowbc.reference.labels.soles import SoleLimits, sole_limits
+from iowbc.reference.labels.support_model import Posture, Sample, SupportModel, posture_weights
 
 STOP = 1e-10
 """Expected improvement at which the solver ends; crocoddyl's own 5e-5 leaves flat postures where they started."""
@@ -130,3 +129,22 @@ class OptimalControlMethod:
             activation = crocoddyl.ActivationModelQuadraticBarrier(bounds)
             cost = crocoddyl.CostModelResidual(self.state, activation, residual)
             costs.addCost(f"wrench of sole {sole}", cost, self.ocp.cone_weight)
+
+
+def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:
+    """The sole wrenches that hold a posture with the least joint torques, (2, 6), in the soles' frames.
+
+    `configuration` (22,) of the support model. Raises `Rejected` where the limits leave no equilibrium with gravity.
+    """
+    model, data = support.model, support.data
+    gravity = pinocchio.computeGeneralizedGravity(model, data, configuration).copy()
+    pinocchio.computeJointJacobians(model, data, configuration)
+    pinocchio.updateFramePlacements(model, data)
+    transposed = np.concatenate(
+        [pinocchio.getFrameJacobian(model, data, sole, pinocchio.LOCAL).T for sole in support.soles], axis=1
+    )
+    base, joints = transposed[:6], transposed[6:]
+    cone, bound = limits.rows()
+    rows, upper = np.kron(np.eye(2), cone), np.tile(bound, 2)
+    lower = np.full(len(upper), -UNBOUNDED)
+    return constrained_step(joints, -gravity[6:], base, -gravity[:6], rows, lower, upper).reshape(2, 6)

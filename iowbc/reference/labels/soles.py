@@ -1,16 +1,13 @@
-"""Limits of two soles on the ground: wrenches, support polygon, and the wrenches that hold a posture."""
+"""Limits of two soles on the ground: wrenches and support polygon."""
 
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio
 from scipy.spatial import ConvexHull
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import PostureProblem
-from iowbc.reference.labels.constrained_step import UNBOUNDED, constrained_step
-from iowbc.reference.labels.sample import mean_stance
-from iowbc.reference.labels.support_model import SupportModel
+from iowbc.reference.labels.support_model import mean_stance
 from iowbc.robot.description import Robot
 
 
@@ -64,22 +61,3 @@ def support_margin(edges: tuple[Array, Array], point: Array) -> Array:
     """Distance of points (..., 2) to the nearest edge, positive inside [m]."""
     normals, offsets = edges
     return (point @ normals.T + offsets).min(axis=-1)
-
-
-def distribute(support: SupportModel, configuration: Array, limits: SoleLimits) -> Array:
-    """The sole wrenches that hold a posture with the least joint torques, (2, 6), in the soles' frames.
-
-    `configuration` (22,) of the support model. Raises `Rejected` where the limits leave no equilibrium with gravity.
-    """
-    model, data = support.model, support.data
-    gravity = pinocchio.computeGeneralizedGravity(model, data, configuration).copy()
-    pinocchio.computeJointJacobians(model, data, configuration)
-    pinocchio.updateFramePlacements(model, data)
-    transposed = np.concatenate(
-        [pinocchio.getFrameJacobian(model, data, sole, pinocchio.LOCAL).T for sole in support.soles], axis=1
-    )
-    base, joints = transposed[:6], transposed[6:]
-    cone, bound = limits.rows()
-    rows, upper = np.kron(np.eye(2), cone), np.tile(bound, 2)
-    lower = np.full(len(upper), -UNBOUNDED)
-    return constrained_step(joints, -gravity[6:], base, -gravity[:6], rows, lower, upper).reshape(2, 6)

@@ -1,5 +1,6 @@
-"""The robot with its arms locked: base and support branch that carry the inertia of the arms."""
+"""Samples of the dataset, and the robot in pinocchio on which they are solved, with its arms locked to a sample."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,72 @@ import pinocchio
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import PostureProblem
-from iowbc.reference.labels.sample import Sample, mean_stance
+from iowbc.robot import rotations
 from iowbc.robot.description import Robot
-from iowbc.robot.pinocchio_model import build_model
+
+BASE_RANGE = 10.0
+"""Bound on the floating base's position [m]; pinocchio's reader leaves ±1.01, which optimisers take for a limit."""
+ROOT = "root_joint"
+"""Name that crocoddyl's floating-base actuation looks for."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One arm posture and base command."""
+
+    arm: Array
+    """Positions of the interaction branch, shape (14,) [rad]."""
+    command: Array
+    """Height [m] and torso pitch [rad], shape (2,)."""
+
+    @property
+    def height(self) -> float:
+        """Commanded height [m]."""
+        return float(self.command[0])
+
+    def torso_rotation(self) -> Array:
+        """Commanded torso orientation against the feet: a turn about the lateral axis by the pitch, shape (3, 3)."""
+        level = np.zeros(())
+        return rotations.matrix(rotations.from_euler(level, self.command[1], level))
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A support posture in equilibrium on two soles."""
+
+    configuration: Array
+    """Reduced pinocchio configuration: base position, base quaternion xyzw, support joints, shape (22,)."""
+    wrench: Array
+    """Wrench of the ground on each sole in the sole's frame, force then moment, shape (2, 6) [N, N·m]."""
+
+    @property
+    def support(self) -> Array:
+        """Support joint positions, shape (15,) [rad]."""
+        return self.configuration[7:]
+
+
+def mean_stance(width: float) -> Array:
+    """Places of the sole centres on the ground, left and right, shape (2, 3) [m]."""
+    return np.array([[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, 0.0]])
+
+
+def build_model(robot: Robot) -> Any:
+    """A `pinocchio.Model` in MuJoCo's joint order (nq 7 + joints, nv 6 + joints), with armature and limits."""
+    model = pinocchio.buildModelFromMJCF(str(robot.mjcf))
+    names = tuple(model.names)[2:]
+    if model.names[1] != ROOT or names != robot.joints:
+        raise ValueError(
+            f"{robot.mjcf}: pinocchio reads joints {model.names[1]}, {names}; the free joint must be named {ROOT!r} "
+            f"and the others be {robot.joints}"
+        )
+    model.armature = np.concatenate([np.zeros(6), robot.armature])
+    model.rotorInertia = np.zeros(model.nv)
+    effort, velocity = (np.concatenate([np.full(6, np.inf), limit]) for limit in (robot.effort, robot.velocity_limit))
+    model.lowerEffortLimit, model.upperEffortLimit = -effort, effort
+    model.lowerVelocityLimit, model.upperVelocityLimit = -velocity, velocity
+    model.lowerPositionLimit = np.concatenate([np.full(3, -BASE_RANGE), np.full(4, -1.01), robot.lower])
+    model.upperPositionLimit = np.concatenate([np.full(3, BASE_RANGE), np.full(4, 1.01), robot.upper])
+    return model
 
 
 class SupportModel:

@@ -12,7 +12,6 @@ from matplotlib.patches import Patch
 from iowbc.arrays import Array
 from iowbc.control.feasible_map import FeasibleMap
 from iowbc.recipe.generator import FitGates
-from iowbc.reference.fit.smoothness import Jumps
 from iowbc.reference.fit.task_error import TaskErrors
 from iowbc.reference.labels.checks import MethodComparison
 from iowbc.reference.labels.dataset import Dataset
@@ -73,7 +72,7 @@ def error_figures(
     labels: Array,
     predicted: Array,
     errors: TaskErrors,
-    jumps: Jumps,
+    jumps: Array,
     gates: FitGates,
     joints: Sequence[str],
 ) -> None:
@@ -88,7 +87,7 @@ def error_figures(
     histogram(axes[3], 1e3 * errors.foot, "foot mismatch [mm]", _limit(gates.foot_p95, p95, 1e3))
     margin, jump = _limit(gates.margin_p1, p1, 1e2), _limit(gates.jump, "gate of the largest")
     histogram(axes[4], 1e2 * errors.margin, "support margin [cm]", margin, everything=True)
-    histogram(axes[5], jumps.largest, "largest jump on a line [rad]", jump, counted="lines", everything=True)
+    histogram(axes[5], jumps, "largest jump on a line [rad]", jump, counted="lines", everything=True)
     figure.suptitle(f"Held-out errors of the reference generator, {len(labels)} samples")
     write_figure(figure, folder / "errors.png")
 

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import ModelInstanceIndex, PlanarJoint, QuaternionFloatingJoint
 
 from iowbc.arrays import Array, Mask
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.robot import rotations
 from iowbc.sim.drake.plant import Plant
 from iowbc.sim.model_index import ModelIndex

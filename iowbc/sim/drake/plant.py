@@ -31,7 +31,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import DiagramBuilder
 
 from iowbc.arrays import Array
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.sim.model import GROUND_BIT
 
 FREE = mujoco.mjtJoint.mjJNT_FREE.value

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from iowbc.arrays import Array, Indices, Mask
-from iowbc.recipe.evaluation.engine import Drake
+from iowbc.recipe.evaluation.evaluation import Drake
 from iowbc.recipe.simulation.scene import Scene
 from iowbc.recipe.simulation.simulation import Physics
 from iowbc.robot import rotations

@@ -13,8 +13,7 @@ from iowbc.control.observation import observation_layout
 from iowbc.errors import StageFailed
 from iowbc.learning.networks import TeacherNetwork
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.skill.evaluation import SkillEvaluation
-from iowbc.recipe.skill.skill import Skill
+from iowbc.recipe.skill.skill import Skill, SkillEvaluation
 from iowbc.recipe.task.task import Task
 from iowbc.robot.description import load_robot
 from iowbc.skill.game import HUMAN, ROBOT, TransportGame, play_once

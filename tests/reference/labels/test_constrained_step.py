@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from iowbc.errors import Rejected
-from iowbc.reference.labels.constrained_step import constrained_step
+from iowbc.reference.labels.gauss_newton import constrained_step
 
 
 def test_a_worked_example() -> None:

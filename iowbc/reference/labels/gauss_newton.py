@@ -1,15 +1,45 @@
-"""The cost of a posture without torques, linearised; and the posture that meets a command by kinematics alone."""
+"""Gauss-Newton steps under constraints: the cost of a posture, linearised, a step, and a start by kinematics alone."""
 
 from dataclasses import dataclass
 from typing import Literal
 
+import daqp
 import numpy as np
 import pinocchio
 
 from iowbc.arrays import Array
-from iowbc.reference.labels.constrained_step import constrained_step
-from iowbc.reference.labels.sample import Sample
-from iowbc.reference.labels.support_model import SupportModel, posture_weights
+from iowbc.errors import Rejected
+from iowbc.reference.labels.support_model import Sample, SupportModel, posture_weights
+
+REGULARISATION = 1e-9
+"""Added to the reduced Hessian, relative to its largest entry: the QP solver needs it positive definite."""
+UNBOUNDED = 1e30
+"""A bound that daqp takes for none."""
+SOLVED = 1
+"""daqp's exit flag of an optimum."""
+
+
+def constrained_step(
+    gradient: Array, residual: Array, equality: Array, error: Array, rows: Array, lower: Array, upper: Array
+) -> Array:
+    """argmin ½|G s + r|² with E s = -e and lower ≤ R s ≤ upper, shape (n,). Raises `Rejected` where there is none.
+
+    The equalities are eliminated by an orthogonal decomposition of Eᵀ; what is left is a small dense QP.
+    """
+    count = len(error)
+    orthogonal, triangle = np.linalg.qr(equality.T, mode="complete")
+    particular = orthogonal[:, :count] @ np.linalg.solve(triangle[:count].T, -error)
+    free = orthogonal[:, count:]
+    reduced = gradient @ free
+    hessian = reduced.T @ reduced
+    hessian[np.diag_indices_from(hessian)] += REGULARISATION * hessian.max()
+    linear = reduced.T @ (residual + gradient @ particular)
+    shift = rows @ particular
+    sense = np.zeros(len(rows), dtype=np.int32)
+    solution, _, flag, _ = daqp.solve(hessian, linear, rows @ free, upper - shift, lower - shift, sense)
+    if flag != SOLVED or not np.isfinite(solution).all():
+        raise Rejected("infeasible")
+    return particular + free @ solution
 
 
 @dataclass(frozen=True)
