@@ -33,7 +33,7 @@ MAY_IMPORT = {
     "model_based": SHARED | {"reference"},
     "adapters": SHARED | {"task"},
     "rollouts": {"arrays"},
-    "learning": SHARED | {"rollouts"},
+    "learning": SHARED | {"rollouts", "results"},
     "twin": WORLD | {"onboard"},
     "task": WORLD | {"rollouts"},
     "evaluation": WORLD | {"task", "reference", "learning", "rollouts", "deploy", "model_based", "adapters", "results"},

@@ -32,7 +32,7 @@ PUBLISHED_TO = {
     "blind": "export",
     "compliant": "export",
     "compliant_quick": "export",
-    "compliant_wide": "export",
+    "compliant_wide": "eval",
     "drake": "eval",
     "experts/late_lift": "teacher",
     "experts/quick": "distill",

@@ -6,6 +6,7 @@ import os
 import runpy
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -212,7 +213,7 @@ def test_a_check_without_a_sequence_plays_those_of_the_evaluation() -> None:
     recipe = Recipe.model_validate(
         {"name": "a", "task": {"references": {"use_rg": False}, "scenes": {"push": 0.5}}, "teacher": {"check": check}}
     )
-    with teacher.check_of(Specification(recipe, robot_folder("g1")), 0) as played:
+    with closing(teacher.check_of(Specification(recipe, robot_folder("g1")), 0)) as played:
         scripts = [trial.episode.script for trial in played.trials]
     commands = recipe.task.commands
     assert scripts == 2 * [command_script(LIFTING, commands)] + 2 * [command_script(PUSHING, commands)]
