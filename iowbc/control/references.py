@@ -70,7 +70,7 @@ class ReferenceLayer(Constants):
         return changed
 
     def start(self, command: Array, grasp: Array) -> tuple[Array, Array]:
-        """References at the start of an episode, settled in the commanded posture.
+        """References at the start of an episode, settled in the commanded posture, standing as the gait prior does.
 
         command (n, 11); grasp (n, 2, 3): base grasp wrist positions, heading frame [m]; arms (n, arm joints),
         support (n, support joints).
@@ -82,7 +82,8 @@ class ReferenceLayer(Constants):
         support = self.support(arms, command)
         for _ in range(self._start.refining):
             arms, support = self.advance(arms, support, command, grasp, self._start.refining_time)
-        return arms, support
+        rest = 0.0 * command[:, 0]
+        return arms, self.with_stride(support, command, rest, rest > 0.0)
 
     def advance(
         self,

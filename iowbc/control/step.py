@@ -117,8 +117,9 @@ class ControlStep(Constants):
         xp, begun = namespace(command), state.begun > 0.5
         limited = self.references.clamp(approach(state.command, command, self._largest_step))
         command = xp.where(begun, limited, state.command)
-        arms, posture = self.references.advance(state.arms, state.posture, command, grasp, self._period)
-        arms, posture = xp.where(begun, arms, state.arms), xp.where(begun, posture, state.posture)
+        arms, _ = self.references.advance(state.arms, state.posture, command, grasp, self._period)
+        arms = xp.where(begun, arms, state.arms)
+        posture = self.references.support(arms, command)
         before, ran = state.phase[:, 0], state.stepping[:, 0] > 0.5
         phase, runs, foothold = self.references.pace(
             before, ran, state.foothold, measured, posture, command, self._period

@@ -31,7 +31,7 @@ class Stride(Constants):
     joints: tuple[tuple[int, int], ...]
     """Places of each joint of the legs, left and right, among the support joints."""
     spread: Array
-    """How far each sole is to the left of where the posture has it, (2,) [m]."""
+    """Lateral offset of each sole from its place in the posture, positive to the left, (2,) [m]."""
     order: tuple[int, ...]
     """For each support joint its place among those of the legs, or among the zeros after them."""
     lower: Array

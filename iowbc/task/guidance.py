@@ -53,14 +53,13 @@ class Guidance:
         self.commander.start(which, memory, key)
         command = memory.command[which]
         arms, posture = self.references.start(command, self.grasp[which])
+        memory.arms[which], memory.posture[which], memory.support[which] = arms, posture, posture
+        memory.stepping[which] = False
         halves = np.floor(2.0 * random.uniform(key, "gait/phase", 1)[:, 0])
-        phase, stepping = np.where(self.commander.scripted[which], 0.0, 0.5 * halves), np.zeros(len(which), bool)
-        support = self.references.with_stride(posture, command, phase, stepping)
-        memory.arms[which], memory.posture[which], memory.support[which] = arms, posture, support
-        memory.phase[which], memory.stepping[which] = phase, stepping
+        memory.phase[which] = np.where(self.commander.scripted[which], 0.0, 0.5 * halves)
         memory.height_rate[which], memory.foothold[which] = 0.0, 0.0
         joints = np.empty((len(which), self._joints))
-        joints[:, self._support], joints[:, self._arms] = support, arms
+        joints[:, self._support], joints[:, self._arms] = posture, arms
         return joints, self.references.start_pitch(posture, command)
 
     def advance(self, memory: EpisodeState, key: Keys, measured: Measured) -> None:

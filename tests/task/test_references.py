@@ -13,7 +13,7 @@ from iowbc.control.feasible_map import FeasibleMap
 from iowbc.control.generator import ReferenceNetwork
 from iowbc.control.references import ReferenceLayer, both_wrists
 from iowbc.recipe.recipe import Recipe
-from iowbc.recipe.task.joint_references import ArmReference, References
+from iowbc.recipe.task.joint_references import ArmReference, GaitPrior, References
 from iowbc.robot.description import Robot
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
@@ -103,6 +103,16 @@ def test_an_episode_starts_in_the_commanded_posture_only_with_a_generator(
     assert np.array_equal(ReferenceLayer(robot, References(), generator).startable(asked), asked)
     start = layer.startable(asked)[0]
     assert (start[HEIGHT], start[PITCH]) == (robot.default_height, 0.0)
+
+
+def test_a_robot_with_spread_feet_begins_as_it_stands(robot: Robot, generator: Path) -> None:
+    gait = GaitPrior(spread=0.04)
+    narrow, wide = (ReferenceLayer(robot, References(gait=prior), generator) for prior in (GaitPrior(), gait))
+    arms, begin = wide.start(command(), GRASP)
+    rest = np.zeros(1)
+    standing = wide.with_stride(wide.support(arms, command()), command(), rest, rest > 0.0)
+    assert np.array_equal(begin, standing)
+    assert np.abs(begin - narrow.start(command(), GRASP)[1]).max() > 0.03
 
 
 def test_with_a_generator_commands_are_clamped_to_the_feasible_map(robot: Robot, generator: Path) -> None:
