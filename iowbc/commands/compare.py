@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from iowbc.commands import options
+from iowbc.commands import completion, options
 from iowbc.commands.diff import difference_lines
 from iowbc.commands.lookup import FILM, film_of, members_of, named, points_of, record_comparison
 from iowbc.commands.printed import filming, print_json, shown_path, stdout_console, tell
@@ -38,7 +38,7 @@ def compare(
     words: Annotated[
         list[str],
         typer.Argument(
-            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=options.complete_ran
+            help="Two or more finished recipes, or a study.", metavar="RECIPE...", autocompletion=completion.ran
         ),
     ],
     output: Annotated[Path | None, typer.Option(help="Output folder (default: runs/compare).")] = None,
@@ -94,7 +94,7 @@ def compare(
 def report(
     words: Annotated[
         list[str],
-        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=options.complete_ran),
+        typer.Argument(help="One or more finished recipes.", metavar="RECIPE...", autocompletion=completion.ran),
     ],
     output: Annotated[Path | None, typer.Option(help="Output HTML file (default: runs/report/RECIPE.html).")] = None,
     log: Annotated[
@@ -106,7 +106,7 @@ def report(
     """Write one HTML file about what the words name, which opens anywhere without a network. Raises `UsageError`."""
     store, console = Store(Runs(runs)), stdout_console()
     if log is not None:
-        from iowbc.commands.robot import report_log
+        from iowbc.commands.robot_log import report_log
 
         report_log(console, words[0], log, output or log.with_suffix(".png"))
         return

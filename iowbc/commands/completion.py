@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def recipes(incomplete: str) -> list[str]:
     """Recipes that can be run by name; a path is the shell's own business."""
-    from iowbc.recipe.reading.finding import known_files
+    from iowbc.recipe.reading.loading import known_files
 
     return _beginning(incomplete, (path.stem for path in known_files()))
 

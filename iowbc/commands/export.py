@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from iowbc.commands import options
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import named
 from iowbc.commands.printed import shown_path, stdout_console, tell
 from iowbc.deploy.exported_folder import CONTRACT
@@ -23,7 +23,7 @@ def export(
         typer.Argument(
             help="Recipe, RECIPE/export, key, or export folder.",
             metavar="WHAT",
-            autocompletion=options.complete_artifacts,
+            autocompletion=completion.artifacts,
         ),
     ],
     folder: Annotated[Path, typer.Option("--web", help="Output folder of the web page.", metavar="DIR")],

@@ -16,8 +16,9 @@ from iowbc.files import OLD
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.store.last_used import ever_used, record_path, remove_dangling
 from iowbc.pipeline.store.locks import holder
+from iowbc.pipeline.store.publishing import PUBLISHING
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
-from iowbc.pipeline.store.store import PUBLISHING, Store
+from iowbc.pipeline.store.store import Store
 from iowbc.pipeline.store.workspace import unfinished
 from iowbc.pipeline.tracking.journal import Journal, sent_path, unsent
 

@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from iowbc.commands import options
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import known_recipes, last_used, named
 from iowbc.commands.printed import NARROW, artifact_data, plain_table, print_json, shown_path, stdout_console, tell
 from iowbc.errors import require_known, shown
@@ -92,7 +92,7 @@ METRICS_SHOWN = 2
 
 def ls(
     stage: Annotated[
-        str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=options.complete_stages)
+        str | None, typer.Argument(help="Only artifacts of this stage.", autocompletion=completion.stages)
     ] = None,
     as_json: options.AsJson = False,
     runs: options.RunsFolder = options.RUNS,

@@ -1,18 +1,17 @@
-"""Arguments, options and requirements that several commands share, and what a shell offers on Tab."""
+"""Arguments, options and requirements that several commands share."""
 
-import os
 import socket
-from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from iowbc.commands import completion
 from iowbc.errors import UsageError
 
 if TYPE_CHECKING:
-    from iowbc.pipeline.store.store import Store
+    pass
 
 EXTRAS = {
     "train": (
@@ -56,57 +55,6 @@ def _free(port: int) -> bool:
     return True
 
 
-def complete_recipes(incomplete: str) -> list[str]:
-    """Recipes that can be run by name; a path is the shell's own business."""
-    from iowbc.recipe.reading.loading import known_files
-
-    return _beginning(incomplete, (path.stem for path in known_files()))
-
-
-def complete_ran(incomplete: str) -> list[str]:
-    """Recipes that have run, or are published."""
-    from iowbc.commands.lookup import nameable
-
-    return _beginning(incomplete, nameable(_store()))
-
-
-def complete_artifacts(incomplete: str) -> list[str]:
-    """Recipes that have run or are published, `RECIPE/STAGE`, and, once something is typed, keys."""
-    from iowbc.commands.lookup import nameable
-
-    store = _store()
-    known = nameable(store)
-    stages = [f"{name}/{stage}" for name, found in known.items() for stage in found]
-    keys = [found.manifest.key for found in store.artifacts()] if incomplete else []
-    return _beginning(incomplete, [*known, *stages, *keys])
-
-
-def complete_stages(incomplete: str) -> list[str]:
-    """Names of stages."""
-    from iowbc.recipe.recipe import PIPELINE
-
-    return _beginning(incomplete, PIPELINE)
-
-
-def complete_paths(incomplete: str) -> list[str]:
-    """Dotted paths of a recipe's values, with the sign that a value follows."""
-    from iowbc.pipeline.nested import flattened
-    from iowbc.recipe.recipe import Recipe
-
-    return _beginning(incomplete, (f"{path}=" for path in flattened(Recipe(name="any").model_dump(mode="json"))))
-
-
-def _store() -> "Store":
-    from iowbc.pipeline.store.runs import Runs
-    from iowbc.pipeline.store.store import Store
-
-    return Store(Runs(Path(os.environ.get("IOWBC_RUNS", "runs"))))
-
-
-def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
-    return sorted({name for name in names if name.startswith(incomplete)})
-
-
 RUNS = Path("runs")
 """Folder of artifacts and tracking data where no other is given."""
 RunsFolder = Annotated[
@@ -119,24 +67,24 @@ RunsFolder = Annotated[
     ),
 ]
 RecipeFile = Annotated[
-    str, typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=complete_recipes)
+    str, typer.Argument(help="Recipe: a YAML file or its name.", metavar="RECIPE", autocompletion=completion.recipes)
 ]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", help="Override a recipe value (repeatable).", metavar="A.B.C=VALUE", autocompletion=complete_paths
+        "--set", help="Override a recipe value (repeatable).", metavar="A.B.C=VALUE", autocompletion=completion.paths
     ),
 ]
 SweepFile = Annotated[
     Path | None, typer.Option("--from", help="YAML file of a sweep: grid, random draws, or both.", metavar="YAML")
 ]
 Until = Annotated[
-    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=complete_stages)
+    str | None, typer.Option(help="Stop after this stage.", metavar="STAGE", autocompletion=completion.stages)
 ]
 Force = Annotated[
     list[str] | None,
     typer.Option(
-        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=complete_stages
+        help="Re-run this stage even if it is cached (repeatable).", metavar="STAGE", autocompletion=completion.stages
     ),
 ]
 Workers = Annotated[int | None, typer.Option(help="Worker processes (default: all available cores).", min=1)]
@@ -157,14 +105,14 @@ SceneName = Annotated[str, typer.Option("--scene", help="Scene of the recipe.", 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Exported = Annotated[
     str,
-    typer.Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=complete_ran),
+    typer.Argument(help="Export folder, or the recipe that made it.", metavar="EXPORT", autocompletion=completion.ran),
 ]
 Named = Annotated[
     str,
     typer.Argument(
         help="Recipe (name or file), RECIPE/STAGE, or the first characters of a key.",
         metavar="WHAT",
-        autocompletion=complete_artifacts,
+        autocompletion=completion.artifacts,
     ),
 ]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from iowbc.commands import options
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import (
     in_training,
     input_of,
@@ -60,7 +60,7 @@ def play(
         typer.Argument(
             help="Recipe, RECIPE/STAGE, key, or export folder.",
             metavar="WHAT",
-            autocompletion=options.complete_artifacts,
+            autocompletion=completion.artifacts,
         ),
     ],
     stage: Annotated[

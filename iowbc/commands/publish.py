@@ -10,9 +10,9 @@ from iowbc.commands.request import Request, planners
 from iowbc.errors import UsageError
 from iowbc.pipeline.console.wording import size
 from iowbc.pipeline.stage_plan import Options
+from iowbc.pipeline.store.publishing import publish as copied
+from iowbc.pipeline.store.publishing import published_size
 from iowbc.pipeline.store.runs import Runs, require_writable_runs
-from iowbc.pipeline.store.store import publish as copied
-from iowbc.pipeline.store.store import published_size
 
 
 def publish(

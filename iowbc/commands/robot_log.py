@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from iowbc.commands.needs import require_training
+from iowbc.commands import options
 from iowbc.commands.printed import plain_table, shown_path, tell
-from iowbc.commands.robot import require_bus
 from iowbc.deploy.controller import Controller
 from iowbc.deploy.exported_folder import exported_folder
 from iowbc.errors import UsageError
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
 
 def report_log(console: Console, what: str, log: Path, output: Path) -> None:
     """Print what happened, replay the log, and draw it. Raises UsageError."""
-    require_bus("report --log")
-    require_training("report --log")
+    options.require_extra("robot", "iowbc report --log")
+    options.require_extra("train", "iowbc report --log")
     if output.suffix != ".png":
         raise UsageError(f"--output {output}: the figure of a log is a PNG file; give a name that ends in .png")
     import json
@@ -30,9 +29,8 @@ def report_log(console: Console, what: str, log: Path, output: Path) -> None:
 
     folder = exported_folder(what)
     controller = Controller.load(folder)
-    replayed = replay(log, folder)
-    end = "all bit for bit the same" if not replayed.different else f"{replayed.different} differ"
-    tell(console, f"{replayed.turns} commands replayed, {end}")
+    turns, different = replay(log, folder)
+    tell(console, f"{turns} commands replayed, {f'{different} differ' if different else 'all bit for bit the same'}")
     for topic, _, data in read_messages(log):
         if topic in ("event", "timing"):
             tell(console, f"  {json.loads(data)['text']}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from iowbc.commands import options
+from iowbc.commands import completion, options
 from iowbc.commands.lookup import named, record_sweep
 from iowbc.commands.plan import PlannedStage, in_all, plan_table, planned, step_data
 from iowbc.commands.points import Endings, PointProcess, PointRun, PointThread, run_points
@@ -46,7 +46,7 @@ def sweep(
             "--set",
             help="Value to set, or values to vary (a,b or 0..4; repeat for a grid).",
             metavar="A.B.C=VALUES",
-            autocompletion=options.complete_paths,
+            autocompletion=completion.paths,
         ),
     ] = None,
     file: options.SweepFile = None,

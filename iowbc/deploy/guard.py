@@ -1,116 +1,12 @@
-"""Guards of a controller, robot by robot: measurements and commands that can be true, targets that do not jump."""
+"""Guard of the joint targets sent to the motors: finite, and without jumps."""
 
 import logging
 from collections.abc import Mapping
-from dataclasses import fields
 from types import MappingProxyType
 
 import numpy as np
-from pydantic import Field
 
 from iowbc.arrays import Array, Mask
-from iowbc.control.command import COMMAND
-from iowbc.control.sensors import Measured
-from iowbc.deploy.contract import Contract
-from iowbc.recipe.section import Section
-
-UNIT_LENGTH = ("projected_gravity", "object_quaternion")
-"""Measured quantities of length 1."""
-
-
-class Limits(Section):
-    """What a controller takes for possible: wide, to find wrong units and broken sensors and not to find falls."""
-
-    norm: tuple[float, float] = (0.5, 1.5)
-    """Norm of the direction of gravity and of quaternions: 1, but for noise; 9.81 is an acceleration."""
-    joint_margin: float = Field(default=0.5, ge=0.0)
-    """How far beyond its limits a joint may be measured [rad]: encoder bias and elastic stops; degrees are further."""
-    joint_speed: float = Field(default=3.0, gt=0.0)
-    """Highest joint velocity, as a multiple of the joint's limit: falls stay below, degrees per second do not."""
-    turning: float = Field(default=35.0, gt=0.0)
-    """Highest angular velocity of base and object [rad/s]: 2000 degrees per second, where gyroscopes saturate."""
-    heading: float = Field(default=1e5, gt=0.0)
-    """Largest heading [rad]: float32 resolves it to 0.01 rad."""
-    distance: float = Field(default=50.0, gt=0.0)
-    """Largest distance of the object along an axis [m]: a reach in millimetres is more."""
-    speed: float = Field(default=20.0, gt=0.0)
-    """Highest velocity of the object along an axis [m/s]."""
-    command: float = Field(default=10.0, gt=0.0)
-    """Largest entry of a command [m/s, rad/s, m, rad]: more than any robot can do; degrees are more."""
-    age: float = Field(default=0.1, gt=0.0)
-    """For how long the same measurement may be given [s]: five steps at 50 Hz; a robot out of balance falls in 0.5."""
-
-
-WIDE = Limits()
-
-
-class Plausibility:
-    """Judges the measurements and commands of n robots; remembers only how old the measurements are."""
-
-    def __init__(self, contract: Contract, limits: Limits, robots: int) -> None:
-        speed = limits.joint_speed * np.array(contract.velocity_limit)
-        ranges: dict[str, tuple[Array | float, Array | float]] = {
-            "command": (-limits.command, limits.command),
-            "projected_gravity": (-limits.norm[1], limits.norm[1]),
-            "base_angular_velocity": (-limits.turning, limits.turning),
-            "heading": (-limits.heading, limits.heading),
-            "joint_position": (
-                np.array(contract.lower) - limits.joint_margin,
-                np.array(contract.upper) + limits.joint_margin,
-            ),
-            "joint_velocity": (-speed, speed),
-            "object_position": (-limits.distance, limits.distance),
-            "object_quaternion": (-limits.norm[1], limits.norm[1]),
-            "object_linear_velocity": (-limits.speed, limits.speed),
-            "object_angular_velocity": (-limits.turning, limits.turning),
-        }
-        sizes = {port.name: port.shape[0] for port in contract.inputs}
-        entries = {"command": COMMAND, "joint_position": contract.joints, "joint_velocity": contract.joints}
-        self.names = ("command", *(field.name for field in fields(Measured) if field.name in sizes))
-        """Names of the values that are judged, in their order."""
-        self._unit_length = [name for name in UNIT_LENGTH if name in sizes]
-        low, high = ([np.broadcast_to(ranges[name][end], sizes[name]) for name in self.names] for end in (0, 1))
-        self._low, self._high = (
-            np.concatenate([*rows, np.full(len(self._unit_length), norm)])
-            for rows, norm in zip((low, high), limits.norm, strict=True)
-        )
-        self._columns = [
-            f"{name}[{entry}]" for name in self.names for entry in entries.get(name, map(str, range(sizes[name])))
-        ] + [f"the norm of {name}" for name in self._unit_length]
-        self._period, self._longest = 1.0 / contract.control_frequency, limits.age
-        self._last: Array = np.zeros((robots, 0))
-        self._repeated: Array = np.zeros(robots, np.int64)
-
-    def refusals(self, given: dict[str, Array], measured_at: Array | None) -> dict[int, str]:
-        """Why the values of a robot cannot be true, for every robot of which that can be said.
-
-        given: the values of `names`, (n, size) each. measured_at: time stamps of the measurements, (n,) [s], of any
-        clock; without them equal values are one measurement, as sensors have noise.
-        """
-        values = [given[name] for name in self.names]
-        rows = np.column_stack([*values, *(np.sqrt(np.vecdot(given[n], given[n])) for n in self._unit_length)])
-        inside = (rows >= self._low) & (rows <= self._high)
-        old = self._old(rows[:, values[0].shape[1] :] if measured_at is None else measured_at[:, None])
-        refusals = {}
-        for robot in np.flatnonzero(old | ~inside.all(axis=1)).tolist():
-            column = int(np.argmin(inside[robot]))
-            refusals[robot] = (
-                f"the sensors have delivered nothing new for {self._repeated[robot] * self._period:.2f} s"
-                if inside[robot].all()
-                else f"{self._columns[column]} is {rows[robot, column]:.4g}, "
-                f"which is not between {self._low[column]:.4g} and {self._high[column]:.4g}"
-            )
-        return refusals
-
-    def _old(self, measurement: Array) -> Mask:
-        """Robots whose measurement, (n, size), has been the same for too long, (n,)."""
-        new: Mask = np.ones(len(measurement), np.bool_)
-        if measurement.shape == self._last.shape:
-            new = (np.isfinite(measurement) & (measurement != self._last)).any(axis=1)
-        self._last = measurement
-        self._repeated = np.where(new, 0, self._repeated + 1)
-        return self._repeated * self._period > self._longest + 0.5 * self._period
-
 
 LOG = logging.getLogger(__name__)
 JUMP = 2.0

@@ -16,12 +16,12 @@ UNIT_LENGTH = ("projected_gravity", "object_quaternion")
 
 
 class Limits(Section):
-    """What a controller takes for possible: wide, to find wrong units and broken sensors and not to find falls."""
+    """Ranges of plausible measurements and commands, wide enough for a fall: they detect wrong units and broken sensors."""
 
     norm: tuple[float, float] = (0.5, 1.5)
     """Norm of the direction of gravity and of quaternions: 1, but for noise; 9.81 is an acceleration."""
     joint_margin: float = Field(default=0.5, ge=0.0)
-    """How far beyond its limits a joint may be measured [rad]: encoder bias and elastic stops; degrees are further."""
+    """Tolerance beyond the joint limits [rad], for encoder bias and elastic stops; values in degrees exceed it."""
     joint_speed: float = Field(default=3.0, gt=0.0)
     """Highest joint velocity, as a multiple of the joint's limit: falls stay below, degrees per second do not."""
     turning: float = Field(default=35.0, gt=0.0)

@@ -6,7 +6,8 @@ import platform
 from dataclasses import dataclass
 from socket import gethostname
 
-from iowbc.pipeline.store.digests import PACKAGE, content_digest, file_digest
+from iowbc.files import file_digest
+from iowbc.pipeline.store.digests import PACKAGE, content_digest
 
 RECORDED_PACKAGES = ("crocoddyl", "mujoco", "numpy", "onnxruntime", "pin", "stable-baselines3", "torch")
 """Versions of these are kept with every artifact."""

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import iowbc
 from iowbc.cli import BENCHMARKS, COMMANDS, app
-from iowbc.commands import options
+from iowbc.commands import completion
 
 ROOT = Path(__file__).parents[2]
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -62,13 +62,13 @@ def test_a_quiet_run_prints_nothing_and_a_verbose_one_every_step(command: Comman
 def test_a_shell_completes_recipes_artifacts_stages_and_paths(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.delenv("IOWBC_RUNS", raising=False)
-    assert "quickstart" in options.complete_recipes("quick")
-    assert options.complete_ran("") == ["first", "second"]
-    assert options.complete_artifacts("first/t") == ["first/teacher"]
+    assert "quickstart" in completion.recipes("quick")
+    assert completion.ran("") == ["first", "second"]
+    assert completion.artifacts("first/t") == ["first/teacher"]
     key = (folder / "runs" / "first" / "teacher").resolve().name
-    assert options.complete_artifacts(key[:12]) == [key]
-    assert options.complete_stages("t") == ["teacher"]
-    assert options.complete_paths("teacher.gam") == ["teacher.gamma="]
+    assert completion.artifacts(key[:12]) == [key]
+    assert completion.stages("t") == ["teacher"]
+    assert completion.paths("teacher.gam") == ["teacher.gamma="]
 
 
 @pytest.mark.parametrize(

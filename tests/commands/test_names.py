@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from iowbc import open_artifact
-from iowbc.commands import options
+from iowbc.commands import completion
 from iowbc.commands.export import exported_folder as exported_by
 from iowbc.commands.lookup import named
 from iowbc.commands.play import playable
@@ -64,8 +64,8 @@ def test_what_is_published_goes_by_its_recipes_name_before_anything_ran(
     assert "did you mean 'first'?" in command("show", "frist").stderr
     assert "first (published)" in command("ls").stdout
     monkeypatch.chdir(folder)
-    assert options.complete_ran("") == ["first"]
-    assert options.complete_artifacts("first/t") == ["first/teacher"]
+    assert completion.ran("") == ["first"]
+    assert completion.artifacts("first/t") == ["first/teacher"]
     assert open_artifact("first/export", folder / "runs").published
 
 

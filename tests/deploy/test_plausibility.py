@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iowbc.deploy.controller import Controller, Measured, Targets
-from iowbc.deploy.guard import Limits
+from iowbc.deploy.plausibility import Limits
 from iowbc.robot.description import Robot
 
 NOMINAL = np.array([0, 0, 0, 0.72, 0, 0, 0, 0, 0, 0, 0.0])

@@ -14,8 +14,9 @@ from iowbc.errors import RecipeError
 from iowbc.pipeline.planner import Planner, planner_for
 from iowbc.pipeline.stage import START, Job, Stage
 from iowbc.pipeline.stage_plan import Options, StagePlan
+from iowbc.pipeline.store.publishing import publish
 from iowbc.pipeline.store.runs import Runs
-from iowbc.pipeline.store.store import Store, publish
+from iowbc.pipeline.store.store import Store
 from iowbc.recipe.reading.loading import load_recipe
 from iowbc.robot.description import robot_folder
 from iowbc.stages.registry import STAGES
@@ -80,7 +81,7 @@ def test_what_was_published_without_its_state_begins_one_all_the_same(
 ) -> None:
     first = workplace.run()["teacher"]
     start = f"teacher.start={first.manifest.key}"
-    monkeypatch.setattr("iowbc.pipeline.store.store.KINDS", frozenset())
+    monkeypatch.setattr("iowbc.pipeline.store.publishing.KINDS", frozenset())
     published = publish(workplace.store.runs, first)
     assert first.manifest.key in str(published)
     shutil.rmtree(first.folder)

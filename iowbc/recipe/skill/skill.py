@@ -27,8 +27,8 @@ class SkillLearning(PPO):
     games: int = Field(default=32, ge=1, le=100_000)
     """Games that are played at the same time."""
     rollout: int = Field(default=100, ge=2, le=10_000)
-    """Decisions of each game between two updates. All games begin anew with each rollout, so that a resumed training
-    needs no state of the simulation; an episode should therefore fit into one."""
+    """Decisions of each game between two updates. Every rollout restarts all games, so that a resumed training needs no
+    state of the simulation; an episode should therefore fit into one."""
     imitation_steps: int = Field(default=100_000, ge=0, le=10**12)
     """First decisions, in which the robot does not learn from the reward: it acts, and imitates what it would do if it
     knew the path (DAgger), while the value learns. From the reward alone 76,000 decisions had changed nothing."""
@@ -94,7 +94,7 @@ class SkillEvaluation(Section):
     tasks: tuple[str, ...] = ()
     """Tasks of `skill.tasks`; all where it is empty."""
     known: tuple[bool, ...] = (True, False)
-    """Whether the robot knows the path, or only the human does."""
+    """True if the robot knows the path; otherwise only the human does."""
     partners: tuple[str, ...] = ()
     """Humans: scripted behaviours, and `agent` for the learnt one; those of training, those held out, and the learnt
     one where it is empty."""

@@ -46,7 +46,7 @@ def write_shard(path: Path, key: str, shard: Shard) -> None:
 
 
 def read_shard(path: Path, key: str, indices: Sequence[int]) -> Shard | None:
-    """The shard, or None where it is missing, damaged, of another run or of other samples: it is then made anew."""
+    """The stored shard; None if it is missing or damaged, or belongs to another run or other samples."""
     content, _ = newest_checked(path, key)
     if content is None:
         return None

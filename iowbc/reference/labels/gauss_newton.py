@@ -24,7 +24,7 @@ def constrained_step(
 ) -> Array:
     """argmin ½|G s + r|² with E s = -e and lower ≤ R s ≤ upper, shape (n,). Raises `Rejected` where there is none.
 
-    The equalities are eliminated by an orthogonal decomposition of Eᵀ; what is left is a small dense QP.
+    An orthogonal decomposition of Eᵀ eliminates the equalities and leaves a small dense QP.
     """
     count = len(error)
     orthogonal, triangle = np.linalg.qr(equality.T, mode="complete")
