@@ -16,7 +16,7 @@ UNIT_LENGTH = ("projected_gravity", "object_quaternion")
 
 
 class Limits(Section):
-    """Ranges of plausible measurements and commands, wide enough for a fall: they detect wrong units and broken sensors."""
+    """Plausible measurements and commands, wide enough for a fall: they detect wrong units and broken sensors."""
 
     norm: tuple[float, float] = (0.5, 1.5)
     """Norm of the direction of gravity and of quaternions: 1, but for noise; 9.81 is an acceleration."""

@@ -94,7 +94,7 @@ class SkillEvaluation(Section):
     tasks: tuple[str, ...] = ()
     """Tasks of `skill.tasks`; all where it is empty."""
     known: tuple[bool, ...] = (True, False)
-    """True if the robot knows the path; otherwise only the human does."""
+    """Cases of knowledge: `true` if the robot knows the path, `false` if only the human does."""
     partners: tuple[str, ...] = ()
     """Humans: scripted behaviours, and `agent` for the learnt one; those of training, those held out, and the learnt
     one where it is empty."""
