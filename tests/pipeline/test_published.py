@@ -10,14 +10,14 @@ from workplace import Workplace
 
 from iowbc import files
 from iowbc.errors import UsageError
-from iowbc.pipeline.store import store
+from iowbc.pipeline.store import publishing
 
 
 @pytest.fixture
 def cloned(workplace: Workplace) -> Workplace:
     """All stages are published, and nothing was made here."""
     for artifact in workplace.run().values():
-        store.publish(workplace.store.runs, artifact)
+        publishing.publish(workplace.store.runs, artifact)
     shutil.rmtree(workplace.store.runs.store)
     workplace.ran()
     return workplace
@@ -59,12 +59,12 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
     workplace: Workplace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = workplace.run()
-    monkeypatch.setattr(store, "LARGEST_FILE", 22)
-    copy = store.publish(workplace.store.runs, made["rg-fit"])
+    monkeypatch.setattr(publishing, "LARGEST_FILE", 22)
+    copy = publishing.publish(workplace.store.runs, made["rg-fit"])
     assert "result.json" in copy.manifest.omitted
     monkeypatch.undo()
     for name in ("rg-dataset", "teacher", "distill", "eval", "export"):
-        store.publish(workplace.store.runs, made[name])
+        publishing.publish(workplace.store.runs, made[name])
     shutil.rmtree(workplace.store.runs.store)
     workplace.ran()
     assert all(step.cached for step in workplace.plan().values())
@@ -78,9 +78,9 @@ def test_what_leaves_out_its_large_files_stands_for_its_digest_alone(
 
 
 def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store, "KINDS", (".json",))
+    monkeypatch.setattr(publishing, "KINDS", (".json",))
     for artifact in workplace.run().values():
-        assert store.publish(workplace.store.runs, artifact).manifest.omitted == (
+        assert publishing.publish(workplace.store.runs, artifact).manifest.omitted == (
             "figures/curve.png",
             "tables/counts.md",
         )
@@ -93,9 +93,9 @@ def test_a_missing_record_makes_nothing_anew(workplace: Workplace, monkeypatch: 
 def test_a_published_training_is_gone_on_from_unless_it_lacks_what_that_takes(
     workplace: Workplace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store, "KINDS", (".json",))
+    monkeypatch.setattr(publishing, "KINDS", (".json",))
     for artifact in workplace.run().values():
-        store.publish(workplace.store.runs, artifact)
+        publishing.publish(workplace.store.runs, artifact)
     shutil.rmtree(workplace.store.runs.store)
     teacher = workplace.registry["teacher"]
     for needed, found in (("result.json", True), ("figures/curve.png", False)):
@@ -132,10 +132,10 @@ def test_publishing_leaves_out_the_files_that_are_named(workplace: Workplace) ->
 
 
 def test_a_repository_that_grows_too_large_is_refused(cloned: Workplace, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert store.published_size(cloned.store.runs) > 1000
-    monkeypatch.setattr(store, "LARGEST_REPOSITORY", 1000)
+    assert publishing.published_size(cloned.store.runs) > 1000
+    monkeypatch.setattr(publishing, "LARGEST_REPOSITORY", 1000)
     with pytest.raises(UsageError, match="more than the 0 MB"):
-        store.published_size(cloned.store.runs)
+        publishing.published_size(cloned.store.runs)
 
 
 def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(
@@ -152,7 +152,7 @@ def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(
 
     monkeypatch.setattr(files, "move_folder", dies)
     with pytest.raises(KeyboardInterrupt):
-        store.publish(runs, artifact)
+        publishing.publish(runs, artifact)
     monkeypatch.undo()
     (teacher.parent / f".{'a' * 64}.4711").mkdir()
     assert {path.name for path in teacher.parent.iterdir()} == {
@@ -165,7 +165,7 @@ def test_publishing_brings_back_what_a_death_left_and_removes_the_rest(
     removed = cloned.command("gc", "--unused").output
     assert removed.count("removed") == 2
     assert f".{teacher.name}.old" not in removed
-    store.publish(runs, other)
+    publishing.publish(runs, other)
     assert [path.name for path in teacher.parent.iterdir()] == [teacher.name]
     again = published("teacher", teacher.name)
     assert again is not None
