@@ -42,7 +42,8 @@ class FootPlacement(Constants):
     def __call__(
         self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array, period: float
     ) -> Array:
-        """Forward offset of each foot from its nominal place in the stride a control period [s] later, (n, 2) [m].
+        """Forward offset of each foot from its nominal place in the stride, and of both by the trim, a control period
+        [s] later, (n, 3) [m].
 
         `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
         """
@@ -52,11 +53,16 @@ class FootPlacement(Constants):
         standing = 1.0 * expected_stance(foot, stepping > 0.5, gait.stance)
         longer = running * (standing * (foot >= gait.stance - 0.5)) + 0.5 * (1.0 - running)
         speed = (longer * self.speed(measured)).sum(1)
-        wanted = (feedback.gain * (speed - command[:, 0])).clip(-feedback.longest, feedback.longest)[:, None]
+        faster = (speed - command[:, 0])[:, None]
+        own, trim = foothold[:, :2], foothold[:, 2:]
+        wanted = (feedback.gain * faster).clip(-feedback.longest, feedback.longest)
         left = (1.0 - swing_progress(foot, gait.stance)) * ((1.0 - gait.stance) / gait.frequency)
-        landing = foothold + (wanted - foothold) * (period / (left + feedback.filter_time))
-        kept = foothold * float(np.exp(-period / feedback.return_time))
-        return (standing * kept + (1.0 - standing) * landing) * running
+        landing = own + (wanted - own) * (period / (left + feedback.filter_time))
+        back = float(np.exp(-period / feedback.return_time))
+        own = (standing * own * back + (1.0 - standing) * landing) * running
+        kept = running + (1.0 - running) * back
+        trim = trim * kept + feedback.integral * period * faster * running
+        return namespace(own).concatenate([own, trim.clip(-feedback.longest_trim, feedback.longest_trim)], -1)
 
     def speed(self, measured: Measured) -> Array:
         """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""

@@ -78,7 +78,7 @@ class Stride(Constants):
         x, z = pitched(direction(thigh), *_ankle(legs, knee))
         ahead, left, up, turn = self._soles(pitch, x, command, phase, stepping)
         if foothold is not None:
-            ahead = ahead + foothold
+            ahead = ahead + foothold[:, :2] + foothold[:, 2:]
         bent, angle = self._bent(x + ahead, z + up)
         running = stepping[:, None]
         change, bend = (angle - thigh) * running, (bent - knee) * running
