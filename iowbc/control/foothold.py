@@ -3,6 +3,8 @@ commanded (Raibert's rule; the capture point of a pendulum).
 
 The speed is that of the standing leg, or of the one that has stood longer, by joint velocities and gyroscope. While a
 foot swings, its place goes to where it should land; on the ground it comes back under the pelvis as a pendulum's would.
+Both feet trail further behind for as long as the robot stays behind its command, by the integral of the difference: the
+moment of its weight about them is what pushes a crate.
 """
 
 from dataclasses import dataclass
@@ -42,8 +44,8 @@ class FootPlacement(Constants):
     def __call__(
         self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array, period: float
     ) -> Array:
-        """Forward offset of each foot from its nominal place in the stride, and of both by the trim, a control period
-        [s] later, (n, 3) [m].
+        """Forward offset of left foot, right foot and both from their places in the stride a control period [s] later,
+        (n, 3) [m].
 
         `command` C (n, 11); `phase` (n,) of the gait; `stepping` (n,) one while the clock runs, else zero.
         """

@@ -107,7 +107,8 @@ class ReferenceLayer(Constants):
     def with_stride(
         self, support: Array, command: Array, phase: Array, stepping: Mask, foothold: Array | None = None
     ) -> Array:
-        """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]; `foothold` (n, 2) [m]."""
+        """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]; `foothold` (n, 3)
+        [m], see `FootPlacement`."""
         if self._stride is None:
             return support
         return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping, foothold)
@@ -122,7 +123,7 @@ class ReferenceLayer(Constants):
         command: Array,
         dt: float,
     ) -> tuple[Array, Mask, Array]:
-        """Gait phase (n,), whether the clock runs (n,), and footholds (n, 2) [m] one control period later; it runs
+        """Gait phase (n,), whether the clock runs (n,), and footholds (n, 3) [m] one control period later; it runs
         for a commanded velocity, or to catch a fall."""
         moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
         if recovery is not None:

@@ -46,7 +46,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
     "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
     "phase": ("1", "-", "gait phase in [0, 1)"),
     "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
-    "foothold": ("m", "heading", "forward offset of left and right foot from the nominal place in the stride"),
+    "foothold": ("m", "heading", "forward offset of left foot, right foot and both from their places in the stride"),
     "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
     "action": ("action", "joint", "residual action that the motors follow, support order"),
     "history": ("SI", "-", "the last observations, oldest first"),
@@ -91,7 +91,7 @@ class ControlStep(Constants):
             "arms": (arms,),
             "posture": (support,),
             **dict.fromkeys(("heading_reference", "phase", "stepping"), (1,)),
-            "foothold": (2,),
+            "foothold": (3,),
             "begun": (1,),
             "action": (support,),
             "history": (history, layout.size),
@@ -107,7 +107,7 @@ class ControlStep(Constants):
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
         blank = zero[:, None] + self._blank
-        return State(command, arms, posture, heading, zero, zero, 0.0 * grasp[:, :, 0], zero, 0.0 * posture, blank)
+        return State(command, arms, posture, heading, zero, zero, 0.0 * grasp[:, 0], zero, 0.0 * posture, blank)
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.

@@ -69,8 +69,8 @@ class Stride(Constants):
         """θ_S_ref with the stride, (n, support joints) [rad].
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
-        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `foothold` (n, 2) [m]:
-        forward offset of each foot from its nominal place in the stride.
+        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `foothold` (n, 3) [m]:
+        forward offset of left foot, right foot and both from their places in the stride.
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]

@@ -59,7 +59,7 @@ class EpisodeState:
     stepping: Array
     """Whether the gait clock runs, (n,) bool."""
     foothold: Array
-    """Forward offset of each foot from its nominal place in the stride, (n, 2) [m]."""
+    """Forward offset of left foot, right foot and both from their places in the stride, (n, 3) [m]."""
     arms: Array
     """θ_I_ref, (n, 14) [rad]."""
     posture: Array
