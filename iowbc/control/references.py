@@ -15,6 +15,7 @@ from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.foothold import FootPlacement
 from iowbc.control.gravity import ArmGravity
+from iowbc.control.hips import HipFeedback
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
 from iowbc.recipe.task.joint_references import References
@@ -25,6 +26,10 @@ from iowbc.robot.mirror import VECTOR_SIGN
 def both_wrists(left: tuple[float, float, float]) -> Array:
     """Base grasp of both wrists, (2, 3), from the left one's position in the heading frame [m]."""
     return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
+
+
+TURN = 3
+"""Place of the turn of the hips in the feedback, after the offsets of the feet."""
 
 
 class ReferenceLayer(Constants):
@@ -52,6 +57,7 @@ class ReferenceLayer(Constants):
         self._settings = references.gait
         self._stride = Stride.of(robot, references.gait)
         self._placement = FootPlacement.of(robot, references.gait)
+        self._hips = HipFeedback.of(robot, references.torso)
 
     def clamp(self, command: Array) -> Array:
         """The command with height and torso pitch brought into the feasible map; (n, 11)."""
@@ -105,33 +111,40 @@ class ReferenceLayer(Constants):
         return self.network(arms, command[:, HEIGHT : PITCH + 1])
 
     def with_stride(
-        self, support: Array, command: Array, phase: Array, stepping: Mask, foothold: Array | None = None
+        self, support: Array, command: Array, phase: Array, stepping: Mask, feedback: Array | None = None
     ) -> Array:
-        """θ_S_ref with the stride that the gait prior adds to it, (n, support joints) [rad]; `foothold` (n, 3)
-        [m], see `FootPlacement`."""
-        if self._stride is None:
-            return support
-        return self._stride(support, self.start_pitch(support, command), command, phase, 1.0 * stepping, foothold)
+        """θ_S_ref with the stride of the gait prior and the feedback of `pace`, (n, support joints) [rad]."""
+        if self._stride is not None:
+            pitch = self.start_pitch(support, command)
+            support = self._stride(support, pitch, command, phase, 1.0 * stepping, feedback)
+        if self._hips is not None and feedback is not None:
+            support = self._hips.turned(support, feedback[:, TURN:])
+        return support
 
     def pace(
         self,
         phase: Array,
         stepping: Mask,
-        foothold: Array,
+        feedback: Array,
         measured: Measured,
         support: Array,
         command: Array,
         dt: float,
     ) -> tuple[Array, Mask, Array]:
-        """Gait phase (n,), whether the clock runs (n,), and footholds (n, 3) [m] one control period later; it runs
-        for a commanded velocity, or to catch a fall."""
+        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 4) one control period later: offset of left
+        foot, right foot and both [m], turn of both hips [rad].
+
+        The clock runs for a commanded velocity, or to catch a fall."""
         moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
         if recovery is not None:
             moving = moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
         phase, stepping = gait.advance(phase, stepping, moving, self._settings, dt)
+        feet, turn = feedback[:, :TURN], feedback[:, TURN:]
         if self._placement is not None:
-            foothold = self._placement(foothold, measured, command, phase, 1.0 * stepping, dt)
-        return phase, stepping, foothold
+            feet = self._placement(feet, measured, command, phase, 1.0 * stepping, dt)
+        if self._hips is not None:
+            turn = self._hips(turn, measured, command, dt)
+        return phase, stepping, namespace(feedback).concatenate([feet, turn], -1)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

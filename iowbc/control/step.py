@@ -33,7 +33,7 @@ class State:
     heading_reference: Array
     phase: Array
     stepping: Array
-    foothold: Array
+    feedback: Array
     begun: Array
     action: Array
     history: Array
@@ -46,7 +46,7 @@ STATE: Mapping[str, tuple[str, str, str]] = {
     "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
     "phase": ("1", "-", "gait phase in [0, 1)"),
     "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
-    "foothold": ("m", "heading", "forward offset of left foot, right foot and both from their places in the stride"),
+    "feedback": ("m, m, m, rad", "heading", "forward offset of left foot, right foot and both; turn of both hips"),
     "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
     "action": ("action", "joint", "residual action that the motors follow, support order"),
     "history": ("SI", "-", "the last observations, oldest first"),
@@ -91,7 +91,7 @@ class ControlStep(Constants):
             "arms": (arms,),
             "posture": (support,),
             **dict.fromkeys(("heading_reference", "phase", "stepping"), (1,)),
-            "foothold": (3,),
+            "feedback": (4,),
             "begun": (1,),
             "action": (support,),
             "history": (history, layout.size),
@@ -107,7 +107,7 @@ class ControlStep(Constants):
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
         blank = zero[:, None] + self._blank
-        return State(command, arms, posture, heading, zero, zero, 0.0 * grasp[:, 0], zero, 0.0 * posture, blank)
+        return State(command, arms, posture, heading, zero, zero, 0.0 * command[:, :4], zero, 0.0 * posture, blank)
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.
@@ -121,12 +121,12 @@ class ControlStep(Constants):
         arms = xp.where(begun, arms, state.arms)
         posture = self.references.support(arms, command)
         before, ran = state.phase[:, 0], state.stepping[:, 0] > 0.5
-        phase, runs, foothold = self.references.pace(
-            before, ran, state.foothold, measured, posture, command, self._period
+        phase, runs, feedback = self.references.pace(
+            before, ran, state.feedback, measured, posture, command, self._period
         )
-        phase, foothold = xp.where(begun[:, 0], phase, before), xp.where(begun, foothold, state.foothold)
+        phase, feedback = xp.where(begun[:, 0], phase, before), xp.where(begun, feedback, state.feedback)
         stepping = (begun[:, 0] & runs) | (~begun[:, 0] & ran)
-        support = self.references.with_stride(posture, command, phase, stepping, foothold)
+        support = self.references.with_stride(posture, command, phase, stepping, feedback)
         sensed = Sensed(
             measured=measured,
             command=command,
@@ -144,7 +144,7 @@ class ControlStep(Constants):
         held = self.references.arm_target(arms, posture, command, load[:, 0])
         turned = state.heading_reference + command[:, YAW_RATE, None] * self._period
         clock, one = 1.0 * stepping[:, None], 1.0 + 0.0 * state.begun
-        after = State(command, arms, posture, turned, phase[:, None], clock, foothold, one, action, history)
+        after = State(command, arms, posture, turned, phase[:, None], clock, feedback, one, action, history)
         return StepResult(self._joints(support + self.scale * action, held), action, support, after)
 
     def _joints(self, support: Array, arms: Array) -> Array:

@@ -64,21 +64,21 @@ class Stride(Constants):
         command: Array,
         phase: Array,
         stepping: Array,
-        foothold: Array | None = None,
+        feedback: Array | None = None,
     ) -> Array:
         """θ_S_ref with the stride, (n, support joints) [rad].
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
-        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `foothold` (n, 3) [m]:
-        forward offset of left foot, right foot and both from their places in the stride.
+        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `feedback` (n, 3 or
+        more): forward offset of left foot, right foot and both from their places in the stride [m].
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]
         thigh = pitch + hip
         x, z = pitched(direction(thigh), *_ankle(legs, knee))
         ahead, left, up, turn = self._soles(pitch, x, command, phase, stepping)
-        if foothold is not None:
-            ahead = ahead + foothold[:, :2] + foothold[:, 2:]
+        if feedback is not None:
+            ahead = ahead + feedback[:, :2] + feedback[:, 2:3]
         bent, angle = self._bent(x + ahead, z + up)
         running = stepping[:, None]
         change, bend = (angle - thigh) * running, (bent - knee) * running

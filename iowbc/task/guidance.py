@@ -57,7 +57,7 @@ class Guidance:
         memory.stepping[which] = False
         halves = np.floor(2.0 * random.uniform(key, "gait/phase", 1)[:, 0])
         memory.phase[which] = np.where(self.commander.scripted[which], 0.0, 0.5 * halves)
-        memory.height_rate[which], memory.foothold[which] = 0.0, 0.0
+        memory.height_rate[which], memory.feedback[which] = 0.0, 0.0
         joints = np.empty((len(which), self._joints))
         joints[:, self._support], joints[:, self._arms] = posture, arms
         return joints, self.references.start_pitch(posture, command)
@@ -73,11 +73,11 @@ class Guidance:
         )
         self._frames = None
         memory.arms[:], memory.posture[:] = arms, posture
-        phase, stepping, foothold = self.references.pace(
-            memory.phase, memory.stepping, memory.foothold, measured, posture, memory.command, period
+        phase, stepping, feedback = self.references.pace(
+            memory.phase, memory.stepping, memory.feedback, measured, posture, memory.command, period
         )
-        memory.phase[:], memory.stepping[:], memory.foothold[:] = phase, stepping, foothold
-        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, foothold)
+        memory.phase[:], memory.stepping[:], memory.feedback[:] = phase, stepping, feedback
+        memory.support[:] = self.references.with_stride(posture, memory.command, phase, stepping, feedback)
 
     def turn(self, memory: EpisodeState) -> None:
         """Turns the heading reference by the yaw rate that was commanded in the step just made."""

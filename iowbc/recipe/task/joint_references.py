@@ -106,6 +106,18 @@ class Placement(Section):
     trained with it fall."""
 
 
+class TorsoFeedback(Section):
+    """Feedback of the torso's pitch on both hips, which hold up what the waist's motors cannot: they give 35 to 50 N·m,
+    and 8 kg in the hands ask for 54 in a bow of 0.4 rad."""
+
+    integral: float = Field(default=0.3, ge=0.0)
+    """Turn of the hips for each radian by which the torso leans further than commanded, a second [1/s]."""
+    longest: float = Field(default=0.2, ge=0.0)
+    """Furthest that the hips turn the pelvis back [rad]: so much further leans a robot with 8 kg without."""
+    least: float = Field(default=0.05, ge=0.0)
+    """Furthest that they turn it ahead [rad]."""
+
+
 class GaitPrior(Section):
     """The gait clock, and the stride that it adds to the support reference while a velocity is commanded."""
 
@@ -169,6 +181,8 @@ class References(Section):
     """Arm references."""
     gait: GaitPrior = GaitPrior()
     """Gait clock and swing."""
+    torso: TorsoFeedback | None = Field(default=None, json_schema_extra=LATER)
+    """Hips that hold up the torso; empty leaves it to the policy."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
         for name, grasp in self.grasps:
