@@ -44,7 +44,7 @@ class HipFeedback(Constants):
         pelvis = xp.arctan2(gravity[:, 0], -gravity[:, 2])
         torso = pelvis + measured.joint_position[:, self.waist].sum(1)
         further = (torso - command[:, PITCH])[:, None]
-        return (turn + self.settings.integral * period * further).clip(-self.settings.least, self.settings.longest)
+        return (turn + self.settings.integral * period * further).clip(-self.settings.least, self.settings.furthest)
 
     def turned(self, support: Array, turn: Array) -> Array:
         """θ_S_ref with the turn of the hips, (n, support joints) [rad]."""

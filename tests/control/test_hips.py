@@ -10,7 +10,7 @@ from iowbc.control.sensors import Measured
 from iowbc.recipe.task.joint_references import TorsoFeedback
 from iowbc.robot.description import Robot
 
-SETTINGS = TorsoFeedback(integral=0.3, longest=0.2, least=0.05)
+SETTINGS = TorsoFeedback(integral=0.3, furthest=0.2, least=0.05)
 PERIOD = 0.02
 
 
