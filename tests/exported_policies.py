@@ -79,9 +79,9 @@ def graph_of(
 
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
-    gait = {"recovery": {}, "placement": {}}
+    references = {"gait": {"recovery": {}, "placement": {"integral": 0.1}, "spread": 0.04}, "torso": {}}
     return Recipe.model_validate(
-        {"name": "test", "task": {"references": {"gait": gait}}, "export": {"acceptance": [], "golden_steps": 5}}
+        {"name": "test", "task": {"references": references}, "export": {"acceptance": [], "golden_steps": 5}}
     )
 
 

@@ -11,6 +11,7 @@ from iowbc.arrays import Array, Constants, Indices, as_slice, namespace
 from iowbc.control.command import PITCH
 from iowbc.control.legs import leg_joints
 from iowbc.control.sensors import Measured
+from iowbc.control.stride import HIP_PITCH
 from iowbc.recipe.task.joint_references import TorsoFeedback
 from iowbc.robot.description import Robot
 
@@ -34,7 +35,7 @@ class HipFeedback(Constants):
         if settings is None:
             return None
         hips = np.zeros(len(robot.support))
-        hips[[leg[0] for leg in leg_joints(robot)]] = 1.0
+        hips[[leg[HIP_PITCH] for leg in leg_joints(robot)]] = 1.0
         lower, upper = robot.lower[robot.support], robot.upper[robot.support]
         return cls(settings, as_slice(robot.support[robot.waist_pitch]), hips, lower, upper)
 
