@@ -145,6 +145,7 @@ def test_tables_figures_film_and_summary_are_left(done: Job) -> None:
     assert any("succeeded" in line for line in done.report.lines)  # type: ignore[attr-defined]
 
 
+@pytest.mark.filterwarnings("ignore::ResourceWarning")  # imageio_ffmpeg leaves pipes of an ended ffmpeg open
 def test_the_film_shows_the_trial(done: Job) -> None:
     (path,) = (done.out / "videos").iterdir()
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))

@@ -42,6 +42,7 @@ def test_the_trial_that_is_filmed_is_one_that_all_played() -> None:
     assert common_trial([Actor(world, Still(), few), Actor(world, Still(), other)]) == []
 
 
+@pytest.mark.filterwarnings("ignore::ResourceWarning")  # imageio_ffmpeg leaves pipes of an ended ffmpeg open
 def test_the_film_has_all_of_them(tmp_path: Path) -> None:
     recipe = Recipe.model_validate(
         {
