@@ -68,8 +68,7 @@ class FootPlacement(Constants):
 
     def speed(self, measured: Measured) -> Array:
         """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""
-        xp, legs, gravity = namespace(measured.heading), self.legs, measured.projected_gravity
-        angle = xp.arctan2(gravity[:, 0], -gravity[:, 2])[:, None]
+        legs, angle = self.legs, measured.pitch[:, None]
         rate = measured.base_angular_velocity[:, 1:2]
         speed = -rate * pitched(direction(angle), *legs.hip)[1]
         for joint, segment in zip(self.joints, (legs.thigh, legs.shank, legs.sole), strict=True):

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from iowbc.arrays import Array, Constants, Indices, as_slice, namespace
+from iowbc.arrays import Array, Constants, Indices, as_slice
 from iowbc.control.command import PITCH
 from iowbc.control.legs import leg_joints
 from iowbc.control.sensors import Measured
@@ -41,9 +41,7 @@ class HipFeedback(Constants):
 
     def __call__(self, turn: Array, measured: Measured, command: Array, period: float) -> Array:
         """Turn of both hips a control period [s] later, (n, 1) [rad]; `command` C (n, 11)."""
-        xp, gravity = namespace(turn), measured.projected_gravity
-        pelvis = xp.arctan2(gravity[:, 0], -gravity[:, 2])
-        torso = pelvis + measured.joint_position[:, self.waist].sum(1)
+        torso = measured.pitch + measured.joint_position[:, self.waist].sum(1)
         further = (torso - command[:, PITCH])[:, None]
         return (turn + self.settings.integral * period * further).clip(-self.settings.least, self.settings.furthest)
 

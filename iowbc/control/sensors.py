@@ -2,9 +2,9 @@
 
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from typing import Annotated, get_type_hints
+from typing import Annotated, cast, get_type_hints
 
-from iowbc.arrays import Array
+from iowbc.arrays import Array, namespace
 from iowbc.robot.mirror import Kind, axial_vector, joint_mirror, polar_vector, rotation, turn
 
 
@@ -50,6 +50,12 @@ class Measured:
         Array | None, Quantity(axial_vector, "rad/s", "base", "object's angular velocity relative to the base")
     ] = None
     """Object's angular velocity relative to the base, base frame, (n, 3) [rad/s]."""
+
+    @property
+    def pitch(self) -> Array:
+        """Pitch of the base by the direction of gravity in its sagittal plane, (n,) [rad]."""
+        gravity = self.projected_gravity
+        return cast(Array, namespace(gravity).arctan2(gravity[:, 0], -gravity[:, 2]))
 
 
 @cache
