@@ -79,7 +79,7 @@ def graph_of(
 
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
-    references = {"gait": {"recovery": {}, "placement": {"integral": 0.1}, "spread": 0.04}, "torso": {}}
+    references = {"gait": {"recovery": {}, "placement": {"integral": 0.1}, "spread": 0.04}, "torso": {}, "height": {}}
     return Recipe.model_validate(
         {"name": "test", "task": {"references": references}, "export": {"acceptance": [], "golden_steps": 5}}
     )

@@ -14,13 +14,10 @@ import numpy as np
 
 from iowbc.arrays import Array, Constants, namespace
 from iowbc.control.gait import expected_stance, foot_phase, swing_progress
-from iowbc.control.legs import Legs, direction, leg_geometry, leg_joints, pitched
+from iowbc.control.odometry import LegOdometry
 from iowbc.control.sensors import Measured
 from iowbc.recipe.task.joint_references import GaitPrior
 from iowbc.robot.description import Robot
-
-SAGITTAL = (0, 3, 4)
-"""Hip pitch, knee and ankle pitch among the joints of a leg."""
 
 
 @dataclass(frozen=True)
@@ -28,18 +25,12 @@ class FootPlacement(Constants):
     """The feedback of a robot. Holds constants only."""
 
     settings: GaitPrior
-    legs: Legs
-    joints: tuple[tuple[int, ...], ...]
-    """Places of hip pitch, knee and ankle pitch, left and right, among all joints."""
+    odometry: LegOdometry
 
     @classmethod
     def of(cls, robot: Robot, settings: GaitPrior) -> Self | None:
         """The feedback of a robot, or none where it is switched off."""
-        if settings.placement is None:
-            return None
-        left, right = leg_joints(robot)
-        places = tuple((int(robot.support[left[j]]), int(robot.support[right[j]])) for j in SAGITTAL)
-        return cls(settings, leg_geometry(robot), places)
+        return None if settings.placement is None else cls(settings, LegOdometry.of(robot))
 
     def __call__(
         self, foothold: Array, measured: Measured, command: Array, phase: Array, stepping: Array, period: float
@@ -54,7 +45,7 @@ class FootPlacement(Constants):
         foot, running = foot_phase(phase), stepping[:, None]
         standing = 1.0 * expected_stance(foot, stepping > 0.5, gait.stance)
         longer = running * (standing * (foot >= gait.stance - 0.5)) + 0.5 * (1.0 - running)
-        speed = (longer * self.speed(measured)).sum(1)
+        speed = (longer * self.odometry.speed(measured)).sum(1)
         faster = (speed - command[:, 0])[:, None]
         own, trim = foothold[:, :2], foothold[:, 2:]
         wanted = (feedback.gain * faster).clip(-feedback.longest, feedback.longest)
@@ -65,14 +56,3 @@ class FootPlacement(Constants):
         kept = running + (1.0 - running) * back
         trim = trim * kept + feedback.integral * period * faster * running
         return namespace(own).concatenate([own, trim.clip(-feedback.longest_trim, feedback.longest_trim)], -1)
-
-    def speed(self, measured: Measured) -> Array:
-        """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""
-        legs, angle = self.legs, measured.pitch[:, None]
-        rate = measured.base_angular_velocity[:, 1:2]
-        speed = -rate * pitched(direction(angle), *legs.hip)[1]
-        for joint, segment in zip(self.joints, (legs.thigh, legs.shank, legs.sole), strict=True):
-            angle = angle + measured.joint_position[:, list(joint)]
-            rate = rate + measured.joint_velocity[:, list(joint)]
-            speed = speed - rate * pitched(direction(angle), *segment)[1]
-        return speed

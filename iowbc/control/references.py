@@ -15,6 +15,7 @@ from iowbc.control.command import HEIGHT, OFFSET, PITCH
 from iowbc.control.feasible_map import FEASIBLE, FeasibleMap
 from iowbc.control.foothold import FootPlacement
 from iowbc.control.gravity import ArmGravity
+from iowbc.control.height import LegStretch
 from iowbc.control.hips import HipFeedback
 from iowbc.control.sensors import Measured
 from iowbc.control.stride import Stride
@@ -28,8 +29,8 @@ def both_wrists(left: tuple[float, float, float]) -> Array:
     return np.stack([np.array(left), VECTOR_SIGN * np.array(left)])
 
 
-TURN = 3
-"""Place of the turn of the hips in the feedback, after the offsets of the feet."""
+STRETCH, TURN = 3, 4
+"""Places of the stretch of the legs and the turn of the hips in the feedback, after the offsets of the feet."""
 
 
 class ReferenceLayer(Constants):
@@ -55,8 +56,9 @@ class ReferenceLayer(Constants):
         self.default_height = robot.default_height
         self.waist, self._waist_pitch = as_slice(robot.waist), as_slice(robot.waist_pitch)
         self._settings = references.gait
-        self._stride = Stride.of(robot, references.gait)
+        self._stride = Stride.of(robot, references.gait, held=references.height is not None)
         self._placement = FootPlacement.of(robot, references.gait)
+        self._legs = LegStretch.of(robot, references.height)
         self._hips = HipFeedback.of(robot, references.torso)
 
     def clamp(self, command: Array) -> Array:
@@ -131,20 +133,22 @@ class ReferenceLayer(Constants):
         command: Array,
         dt: float,
     ) -> tuple[Array, Mask, Array]:
-        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 4) one control period later: offset of left
-        foot, right foot and both [m], turn of both hips [rad].
+        """Gait phase (n,), whether the clock runs (n,), and feedback (n, 5) one control period later: offset of left
+        foot, right foot and both, stretch of both legs [m], turn of both hips [rad].
 
         The clock runs for a commanded velocity, or to catch a fall."""
         moving, recovery = gait.wants_to_move(command, self._settings), self._settings.recovery
         if recovery is not None:
             moving = moving | gait.is_falling(measured, self.start_pitch(support, command), recovery)
         phase, stepping = gait.advance(phase, stepping, moving, self._settings, dt)
-        feet, turn = feedback[:, :TURN], feedback[:, TURN:]
+        feet, stretch, turn = feedback[:, :STRETCH], feedback[:, STRETCH:TURN], feedback[:, TURN:]
         if self._placement is not None:
             feet = self._placement(feet, measured, command, phase, 1.0 * stepping, dt)
+        if self._legs is not None:
+            stretch = self._legs(stretch, measured, command, dt)
         if self._hips is not None:
             turn = self._hips(turn, measured, command, dt)
-        return phase, stepping, namespace(feedback).concatenate([feet, turn], -1)
+        return phase, stepping, namespace(feedback).concatenate([feet, stretch, turn], -1)
 
     def pelvis_pitch(self, support: Array, command: Array) -> Array:
         """Pelvis pitch of the reference posture, (n,) [rad]: the torso's less the waist's."""

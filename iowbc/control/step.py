@@ -46,7 +46,11 @@ STATE: Mapping[str, tuple[str, str, str]] = {
     "heading_reference": ("rad", "world", "`heading` at the start plus the integrated yaw rate commanded"),
     "phase": ("1", "-", "gait phase in [0, 1)"),
     "stepping": ("1", "-", "1 while the gait clock runs, else 0"),
-    "feedback": ("m, m, m, rad", "heading", "forward offset of left foot, right foot and both; turn of both hips"),
+    "feedback": (
+        "m, m, m, m, rad",
+        "heading",
+        "forward offset of left foot, right foot and both; stretch of both legs; turn of both hips",
+    ),
     "begun": ("1", "-", "0 in the state that settle.onnx makes, 1 afterwards"),
     "action": ("action", "joint", "residual action that the motors follow, support order"),
     "history": ("SI", "-", "the last observations, oldest first"),
@@ -91,7 +95,7 @@ class ControlStep(Constants):
             "arms": (arms,),
             "posture": (support,),
             **dict.fromkeys(("heading_reference", "phase", "stepping"), (1,)),
-            "feedback": (4,),
+            "feedback": (5,),
             "begun": (1,),
             "action": (support,),
             "history": (history, layout.size),
@@ -107,7 +111,7 @@ class ControlStep(Constants):
         arms, posture = self.references.start(command, grasp)
         zero = 0.0 * heading
         blank = zero[:, None] + self._blank
-        return State(command, arms, posture, heading, zero, zero, 0.0 * command[:, :4], zero, 0.0 * posture, blank)
+        return State(command, arms, posture, heading, zero, zero, 0.0 * command[:, :5], zero, 0.0 * posture, blank)
 
     def step(self, measured: Measured, command: Array, grasp: Array, load: Array, state: State) -> StepResult:
         """One control period. `load` (n, 1): mass that the arms expect between the hands [kg]; the rest as in `settle`.

@@ -37,9 +37,11 @@ class Stride(Constants):
     lower: Array
     upper: Array
     """Ranges of the support joints [rad]."""
+    held: float
+    """One if the feedback of height counts while the robot stands, too, else zero."""
 
     @classmethod
-    def of(cls, robot: Robot, settings: GaitPrior) -> Self | None:
+    def of(cls, robot: Robot, settings: GaitPrior, held: bool = False) -> Self | None:
         """The prior of a robot, or none where it is switched off. Raises ValueError for legs of another kind."""
         if not settings.enabled:
             return None
@@ -55,6 +57,7 @@ class Stride(Constants):
             order=tuple(np.argsort([*moved, *others]).tolist()),
             lower=robot.lower[robot.support],
             upper=robot.upper[robot.support],
+            held=float(held),
         )
 
     def __call__(
@@ -69,8 +72,9 @@ class Stride(Constants):
         """θ_S_ref with the stride, (n, support joints) [rad].
 
         `posture` (n, support joints): the reference at rest; `pelvis_pitch` (n,) [rad] in it; `command` C (n, 11);
-        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `feedback` (n, 3 or
-        more): forward offset of left foot, right foot and both from their places in the stride [m].
+        `phase` (n,) of the gait, in [0, 1); `stepping` (n,) one while the clock runs, else zero; `feedback` (n, 4 or
+        more): forward offset of left foot, right foot and both from their places in the stride, stretch of
+        both legs [m].
         """
         xp, legs, pitch = namespace(posture), self.legs, pelvis_pitch[:, None]
         hip, knee = posture[:, list(self.joints[HIP_PITCH])], posture[:, list(self.joints[KNEE])]
@@ -78,14 +82,14 @@ class Stride(Constants):
         x, z = pitched(direction(thigh), *_ankle(legs, knee))
         ahead, left, up, turn = self._soles(pitch, x, command, phase, stepping)
         if feedback is not None:
-            ahead = ahead + feedback[:, :2] + feedback[:, 2:3]
+            ahead, up = ahead + feedback[:, :2] + feedback[:, 2:3], up - feedback[:, 3:4]
         bent, angle = self._bent(x + ahead, z + up)
-        running = stepping[:, None]
-        change, bend = (angle - thigh) * running, (bent - knee) * running
+        moved = stepping[:, None] + self.held * (1.0 - stepping[:, None])
+        change, bend = (angle - thigh) * moved, (bent - knee) * moved
         hip_roll, hip_yaw, ankle_roll = _sideways(legs, thigh + change, knee + bend, left, turn)
-        moved = [change, hip_roll, hip_yaw, bend, -change - bend, ankle_roll]
-        others = 0.0 * posture[:, : len(self.order) - 2 * len(moved)]
-        changes = xp.concatenate([*moved, others], -1)[:, list(self.order)]
+        joints = [change, hip_roll, hip_yaw, bend, -change - bend, ankle_roll]
+        others = 0.0 * posture[:, : len(self.order) - 2 * len(joints)]
+        changes = xp.concatenate([*joints, others], -1)[:, list(self.order)]
         return (posture + changes).clip(self.lower, self.upper)
 
     def _soles(

@@ -59,8 +59,8 @@ class EpisodeState:
     stepping: Array
     """Whether the gait clock runs, (n,) bool."""
     feedback: Array
-    """Forward offset of left foot, right foot and both from their places in the stride [m], and turn of both hips
-    [rad], (n, 4)."""
+    """Forward offset of left foot, right foot and both from their places in the stride, stretch of both legs [m], and
+    turn of both hips [rad], (n, 5)."""
     arms: Array
     """θ_I_ref, (n, 14) [rad]."""
     posture: Array
@@ -102,7 +102,7 @@ class EpisodeState:
     def blank(cls, n: int, arms: int, support: int) -> Self:
         kinds: dict[str, Any] = dict.fromkeys(COUNTERS, np.int64) | dict.fromkeys(FLAGS, np.bool_)
         kinds["failed_key"] = np.uint64
-        widths = {"tracking": len(TRACKED), "feedback": 4, "filtered_velocity": 3, "excess_force": 2, "object_place": 3}
+        widths = {"tracking": len(TRACKED), "feedback": 5, "filtered_velocity": 3, "excess_force": 2, "object_place": 3}
         widths |= dict.fromkeys(("level", "played"), len(AXES)) | dict.fromkeys(("command", "goal"), len(COMMAND))
         widths |= {"arms": arms} | dict.fromkeys(("posture", "support", "action", "earlier_action"), support)
         shapes = {field.name: (n, widths[field.name]) if field.name in widths else (n,) for field in fields(cls)}

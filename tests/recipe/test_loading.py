@@ -113,6 +113,8 @@ def test_a_name_that_reads_as_something_else_is_text_wherever_it_is_read_again(t
 def test_feedback_on_the_feet_of_a_gait_prior_that_is_off_is_refused(tmp_path: Path) -> None:
     (text,) = problems(tmp_path, "task: {references: {gait: {enabled: false, placement: {}}}}\n")
     assert "placement: moves the feet of the gait prior, which is off" in text
+    (text,) = problems(tmp_path, "task: {references: {gait: {enabled: false}, height: {}}}\n")
+    assert "height: stretches the legs of the gait prior, which is off" in text
 
 
 def test_a_number_where_text_belongs_is_asked_for_in_quotes(tmp_path: Path) -> None:

@@ -119,6 +119,16 @@ class TorsoFeedback(Section):
     """Furthest that they turn it ahead [rad]."""
 
 
+class HeightFeedback(Section):
+    """Feedback of the felt height on the legs, which stretch where robot and load bend the knees: their motors give 200
+    N·m a radian, and 4 kg cost an untrained reference 1 cm."""
+
+    integral: float = Field(default=0.5, ge=0.0)
+    """Stretch of both legs for each metre that the pelvis hangs lower than commanded, a second [1/s]."""
+    furthest: float = Field(default=0.05, ge=0.0)
+    """Longest such stretch, up or down [m]."""
+
+
 class GaitPrior(Section):
     """The gait clock, and the stride that it adds to the support reference while a velocity is commanded."""
 
@@ -184,8 +194,12 @@ class References(Section):
     """Gait clock and swing."""
     torso: TorsoFeedback | None = Field(default=None, json_schema_extra=LATER)
     """Hips that hold up the torso; empty leaves it to the policy."""
+    height: HeightFeedback | None = Field(default=None, json_schema_extra=LATER)
+    """Legs that hold up the pelvis; empty leaves it to the policy."""
 
     def problems(self) -> Iterator[tuple[str, str]]:
+        if self.height is not None and not self.gait.enabled:
+            yield "", "height: stretches the legs of the gait prior, which is off (`gait.enabled: false`); empty it"
         for name, grasp in self.grasps:
             if grasp[1] <= 0.0:
                 text = f"the left wrist's y is {grasp[1]}, it must be positive (left of the body)"

@@ -1,0 +1,46 @@
+"""What the legs tell of the base: its speed ahead and its height, by joints and inertial unit."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+from iowbc.arrays import Array, Constants
+from iowbc.control.legs import Legs, direction, leg_geometry, leg_joints, pitched
+from iowbc.control.sensors import Measured
+from iowbc.robot.description import Robot
+
+SAGITTAL = (0, 3, 4)
+"""Hip pitch, knee and ankle pitch among the joints of a leg."""
+
+
+@dataclass(frozen=True)
+class LegOdometry(Constants):
+    """The legs of a robot in the sagittal plane. Holds constants only."""
+
+    legs: Legs
+    joints: tuple[tuple[int, ...], ...]
+    """Places of hip pitch, knee and ankle pitch, left and right, among all joints."""
+
+    @classmethod
+    def of(cls, robot: Robot) -> Self:
+        left, right = leg_joints(robot)
+        places = tuple((int(robot.support[left[j]]), int(robot.support[right[j]])) for j in SAGITTAL)
+        return cls(leg_geometry(robot), places)
+
+    def speed(self, measured: Measured) -> Array:
+        """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""
+        return -sum(rate * rise for rate, rise in self._segments(measured))
+
+    def height(self, measured: Measured) -> Array:
+        """Height of the base above each sole's centre, (n, 2) [m], for legs in the sagittal plane."""
+        return -sum(rise for _, rise in self._segments(measured))
+
+    def _segments(self, measured: Measured) -> Iterator[tuple[Array, Array]]:
+        """Pitch rate [rad/s] and rise [m] of hip, thigh, shank and sole from the base outward, (n, 2) each."""
+        legs, angle = self.legs, measured.pitch[:, None]
+        rate = measured.base_angular_velocity[:, 1:2]
+        yield rate, pitched(direction(angle), *legs.hip)[1]
+        for joint, segment in zip(self.joints, (legs.thigh, legs.shank, legs.sole), strict=True):
+            angle = angle + measured.joint_position[:, list(joint)]
+            rate = rate + measured.joint_velocity[:, list(joint)]
+            yield rate, pitched(direction(angle), *segment)[1]
