@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 from typing import Self
 
 from iowbc.arrays import Array, Constants
@@ -29,11 +31,11 @@ class LegOdometry(Constants):
 
     def speed(self, measured: Measured) -> Array:
         """Speed ahead of the base over each foot, were it at rest on the ground, (n, 2) [m/s]."""
-        return -sum(rate * rise for rate, rise in self._segments(measured))
+        return -reduce(add, (rate * rise for rate, rise in self._segments(measured)))
 
     def height(self, measured: Measured) -> Array:
         """Height of the base above each sole's centre, (n, 2) [m], for legs in the sagittal plane."""
-        return -sum(rise for _, rise in self._segments(measured))
+        return -reduce(add, (rise for _, rise in self._segments(measured)))
 
     def _segments(self, measured: Measured) -> Iterator[tuple[Array, Array]]:
         """Pitch rate [rad/s] and rise [m] of hip, thigh, shank and sole from the base outward, (n, 2) each."""

@@ -120,8 +120,8 @@ class TorsoFeedback(Section):
 
 
 class HeightFeedback(Section):
-    """Feedback of the felt height on the legs, which stretch where robot and load bend the knees: their motors give 200
-    N·m a radian, and 4 kg cost an untrained reference 1 cm."""
+    """Feedback of the felt height on the legs, which stretch where robot and load bend the knees. Without, the pelvis
+    of an expert hangs 2 cm lower than commanded with 4 kg, and 4 cm with 8 kg."""
 
     integral: float = Field(default=0.5, ge=0.0)
     """Stretch of both legs for each metre that the pelvis hangs lower than commanded, a second [1/s]."""
