@@ -1,4 +1,4 @@
-"""What the legs tell of the base: its speed ahead and its height, by joints and inertial unit."""
+"""Leg odometry: speed ahead and height of the base, from the angles of the legs and the inertial unit."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,10 +9,8 @@ from typing import Self
 from iowbc.arrays import Array, Constants
 from iowbc.control.legs import Legs, direction, leg_geometry, leg_joints, pitched
 from iowbc.control.sensors import Measured
+from iowbc.control.stride import ANKLE_PITCH, HIP_PITCH, KNEE
 from iowbc.robot.description import Robot
-
-SAGITTAL = (0, 3, 4)
-"""Hip pitch, knee and ankle pitch among the joints of a leg."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,9 @@ class LegOdometry(Constants):
     @classmethod
     def of(cls, robot: Robot) -> Self:
         left, right = leg_joints(robot)
-        places = tuple((int(robot.support[left[j]]), int(robot.support[right[j]])) for j in SAGITTAL)
+        places = tuple(
+            (int(robot.support[left[j]]), int(robot.support[right[j]])) for j in (HIP_PITCH, KNEE, ANKLE_PITCH)
+        )
         return cls(leg_geometry(robot), places)
 
     def speed(self, measured: Measured) -> Array:

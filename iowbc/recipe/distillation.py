@@ -25,7 +25,7 @@ class Distillation(Encoder):
     start: Literal["teacher", "anew"] = "teacher"
     """Beginning of the body behind the encoder. `teacher`: the teacher's own body; where that sees s_priv, it sees
     a linear estimate from the latent, at first the mean of training, so that training begins with the teacher's
-    behaviour. `anew`: random weights that read the latent."""
+    behaviour. `anew`: random weights, with the latent as input."""
     hidden: tuple[Width, ...] = Field(default=(512, 256, 128), max_length=DEEPEST)
     """Hidden layers behind the encoder (paper Table I), where they start anew; else they are the teacher's."""
     activation: Literal["elu", "relu", "tanh"] = "elu"

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sagittal_plane import measured
 
 from iowbc.control.foothold import FootPlacement
 from iowbc.control.sensors import Measured
@@ -23,24 +24,14 @@ def placement(robot: Robot) -> FootPlacement:
     return made
 
 
-def measured(robot: Robot, position: Any, velocity: Any, pitch: float, rate: float) -> Measured:
-    return Measured(
-        projected_gravity=np.array([[np.sin(pitch), 0.0, -np.cos(pitch)]]),
-        base_angular_velocity=np.array([[0.0, rate, 0.0]]),
-        heading=np.zeros((1, 1)),
-        joint_position=position[None],
-        joint_velocity=velocity[None],
-    )
-
-
 def moving(robot: Robot, speed: float) -> Measured:
     """A robot in its default posture that turns over its feet at such a speed."""
     position = robot.default_position
     unit = FootPlacement.of(robot, PRIOR)
     assert unit is not None
     still = np.zeros(len(position))
-    per_rate = unit.odometry.speed(measured(robot, position, still, 0.0, 1.0)).mean()
-    return measured(robot, position, still, 0.0, speed / per_rate)
+    per_rate = unit.odometry.speed(measured(position, still, 0.0, 1.0)).mean()
+    return measured(position, still, 0.0, speed / per_rate)
 
 
 @pytest.mark.parametrize("excess", [0.4, -0.3])

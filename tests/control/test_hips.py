@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sagittal_plane import measured
 
 from iowbc.control.command import PITCH
 from iowbc.control.hips import HipFeedback
@@ -25,13 +26,7 @@ def leaning(robot: Robot, pelvis: float, waist: float) -> Measured:
     """A robot whose pelvis and waist are pitched so far."""
     position = robot.default_position.copy()
     position[robot.support[robot.waist_pitch]] = waist
-    return Measured(
-        projected_gravity=np.array([[np.sin(pelvis), 0.0, -np.cos(pelvis)]]),
-        base_angular_velocity=np.zeros((1, 3)),
-        heading=np.zeros((1, 1)),
-        joint_position=position[None],
-        joint_velocity=np.zeros((1, len(position))),
-    )
+    return measured(position, 0.0 * position, pelvis, 0.0)
 
 
 @pytest.mark.parametrize(("further", "end"), [(0.3, 0.2), (-0.3, -0.05)])
