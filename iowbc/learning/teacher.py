@@ -21,6 +21,9 @@ from iowbc.recipe.teacher import Teacher
 
 FLOOR_REACHED = 1.01
 """Standard deviations within this factor of their floor count as having arrived there."""
+DEAD = 0.5
+"""Share of `std_end` below which a standard deviation at its floor no longer explores; a higher floor is meant to be
+reached."""
 
 Score = Callable[[Policy], Mapping[str, float]]
 """Figures of a policy, `score` among them: the greater the better."""
@@ -91,7 +94,7 @@ class TeacherTraining:
         why = ""
         if len(figures) < len(training) or not self.model.policy.finite():
             why = "the networks diverged"
-        elif float(deviation.mean()) <= FLOOR_REACHED * self.settings.std_floor:
+        elif float(deviation.mean()) <= FLOOR_REACHED * self.settings.std_floor < DEAD * self.settings.std_end:
             why = "exploration died out"
         elif self.score is not None and self._updates % (self.settings.check.every or 1) == 0:
             found = {f"check/{name}": float(value) for name, value in self.score(policy_of(*self.network())).items()}

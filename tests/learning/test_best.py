@@ -119,6 +119,14 @@ def test_exploration_that_died_out_is_brought_back() -> None:
     assert float(some.model.policy.log_stds.exp().mean().detach()) == pytest.approx(0.5)
 
 
+def test_a_floor_near_the_end_of_the_annealing_is_meant_to_be_reached() -> None:
+    some, lines = training(None, std_floor=0.15)
+    with torch.no_grad():
+        some.model.policy.log_stds.fill_(np.log(0.15))
+    some.update()
+    assert lines == []
+
+
 def test_a_training_that_collapses_again_and_again_gives_up_and_says_what_to_lower() -> None:
     some, _ = training(Scores(0.6, 0.1, 0.1, 0.1))
     for _ in range(3):
