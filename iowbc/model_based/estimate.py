@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from iowbc.arrays import Array
-from iowbc.recipe.evaluation.rivals import Estimation
+from iowbc.recipe.evaluation.model_based import Estimation
 
 SMALLEST_NOISE = 1e-6
 """Standard deviation [rad, rad/s] that stands for a sensor without noise: the filter divides by it."""

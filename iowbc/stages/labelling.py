@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from iowbc.pipeline.cluster.spread import NodeSpread
-    from iowbc.reference.labels.dataset import Shard
     from iowbc.reference.labels.labelling import LabelTask
+    from iowbc.reference.labels.shards import Shard
 
 SHARES = 4
 """Pieces for each core: the last ones to end keep the others waiting for a quarter of the time at most."""
@@ -27,8 +27,8 @@ def label_everywhere(
     progress: Callable[[int, int], None],
 ) -> "Shard":
     """As `label_all`, the shards that are missing made by other machines, several in a piece."""
-    from iowbc.reference.labels.dataset import cut, read_shard
     from iowbc.reference.labels.pool import label_all
+    from iowbc.reference.labels.shards import cut, read_shard
 
     folder.mkdir(parents=True, exist_ok=True)
     chunks, paths = cut(indices, chunk_size, folder)

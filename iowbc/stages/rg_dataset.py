@@ -18,10 +18,11 @@ def run(job: Job) -> None:
     """Leaves `dataset.npz`, `labelled.npz`, `summary.json` and figures."""
     from iowbc.errors import NoRenderer
     from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods, mirror_error
-    from iowbc.reference.labels.dataset import Shard, assemble, reasons
+    from iowbc.reference.labels.dataset import assemble
     from iowbc.reference.labels.labelling import LabelTask
     from iowbc.reference.labels.plan import SamplePlan
     from iowbc.reference.labels.pool import label_all
+    from iowbc.reference.labels.shards import Shard, reasons
     from iowbc.reference.pictures.figures import dataset_figures
     from iowbc.reference.pictures.postures import draw_strip
     from iowbc.reference.ranges import wrong_ranges

@@ -13,7 +13,7 @@ from iowbc.adapters.networks import network
 from iowbc.adapters.source import load_adapter, policy_digest, policy_path
 from iowbc.errors import StageFailed
 from iowbc.recipe.beside import ModuleFile
-from iowbc.recipe.evaluation.rivals import PublicController
+from iowbc.recipe.evaluation.public_controller import PublicController
 
 pytestmark = pytest.mark.unit
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iowbc.model_based.estimate import MotionFilter
-from iowbc.recipe.evaluation.rivals import Estimation
+from iowbc.recipe.evaluation.model_based import Estimation
 
 PERIOD, JOINTS = 0.02, 2
 UPRIGHT = np.array([0.0, 0.0, -1.0])

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iowbc.arrays import Array
 from iowbc.errors import Interrupted
@@ -14,9 +12,6 @@ from iowbc.learning.acting import Policy
 from iowbc.task.episodes import Episode
 from iowbc.task.specification import Specification
 from iowbc.task.vector.vector_env import VectorEnv
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 RECORDED = tuple(field.name for field in fields(Trace) if field.name != "dt")
 """Signals that a trace keeps."""
@@ -102,31 +97,3 @@ def trace_of(recorded: Mapping[str, Array], index: int, steps: int, dt: float) -
     """The first `steps` of one environment as a trace, from signals of shape (T, n, k) by name."""
     rows = {name: values[:steps, index] for name, values in recorded.items()}
     return Trace(dt=dt, **{name: row if row.shape[1] > 1 else row[:, 0] for name, row in rows.items()})
-
-
-class PolicyInBatch:
-    """A policy for some environments that computes in the shape of a larger batch, with them at given places.
-
-    Matrix products round differently for other shapes; with this, a trial is the same bit for bit whichever trials of
-    its sweep it is played with.
-    """
-
-    def __init__(self, policy: Policy, size: int, places: NDArray[np.int64]) -> None:
-        """`places` (n,): the environments' rows in the batch of `size`."""
-        self.policy, self.size, self.places = policy, size, places
-
-    def reset(self, which: NDArray[np.bool_]) -> None:
-        self.policy.reset(self._spread(which))
-
-    def act(self, observation: NDArray[np.float32], privileged: NDArray[np.float32]) -> NDArray[np.float32]:
-        return self.policy.act(self._spread(observation), self._spread(privileged))[self.places]
-
-    def _spread(self, rows: NDArray[Any]) -> NDArray[Any]:
-        batch = np.zeros((self.size, *rows.shape[1:]), rows.dtype)
-        batch[self.places] = rows
-        return batch
-
-
-def in_batch(policy: Policy, row: "pd.Series[Any]") -> PolicyInBatch:
-    """The policy as it acted in the trial of a row of the long table, for that trial alone."""
-    return PolicyInBatch(policy, int(row["batch_size"]), np.array([int(row["batch_row"])]))

@@ -6,8 +6,9 @@ import numpy as np
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import ReferenceGenerator
-from iowbc.reference.labels.dataset import Dataset, Shard
+from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.shards import Shard
 from iowbc.robot.description import Robot
 from iowbc.robot.mirror import support_mirror
 

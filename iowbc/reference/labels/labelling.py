@@ -10,8 +10,9 @@ from iowbc.arrays import Array, Indices
 from iowbc.recipe.generator import ReferenceGenerator
 from iowbc.reference.labels.gates import LabelJudge
 from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.sample import Sample
 from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import Sample, SupportModel
+from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import load_robot
 
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from iowbc.errors import Interrupted, Rejected, WorkerFailed
 from iowbc.processes import die_with_parent, single_threaded
-from iowbc.reference.labels.dataset import Shard, cut, merge, read_shard, write_shard
 from iowbc.reference.labels.labelling import Solver
+from iowbc.reference.labels.shards import Shard, cut, merge, read_shard, write_shard
 
 CRASHED = "solver crashed"
 CRASHES = tuple(-number for number in (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGBUS, signal.SIGILL))

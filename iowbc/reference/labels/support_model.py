@@ -1,6 +1,5 @@
-"""Samples of the dataset, and the robot in pinocchio on which they are solved, with its arms locked to a sample."""
+"""The robot in pinocchio, with its arms locked to a sample."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,48 +7,13 @@ import pinocchio
 
 from iowbc.arrays import Array
 from iowbc.recipe.generator import PostureProblem
-from iowbc.robot import rotations
+from iowbc.reference.labels.sample import Sample
 from iowbc.robot.description import Robot
 
 BASE_RANGE = 10.0
 """Bound on the floating base's position [m]; pinocchio's reader leaves ±1.01, which optimisers take for a limit."""
 ROOT = "root_joint"
 """Name that crocoddyl's floating-base actuation looks for."""
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One arm posture and base command."""
-
-    arm: Array
-    """Positions of the interaction branch, shape (14,) [rad]."""
-    command: Array
-    """Height [m] and torso pitch [rad], shape (2,)."""
-
-    @property
-    def height(self) -> float:
-        """Commanded height [m]."""
-        return float(self.command[0])
-
-    def torso_rotation(self) -> Array:
-        """Commanded torso orientation against the feet: a turn about the lateral axis by the pitch, shape (3, 3)."""
-        level = np.zeros(())
-        return rotations.matrix(rotations.from_euler(level, self.command[1], level))
-
-
-@dataclass(frozen=True)
-class Posture:
-    """A support posture in equilibrium on two soles."""
-
-    configuration: Array
-    """Reduced pinocchio configuration: base position, base quaternion xyzw, support joints, shape (22,)."""
-    wrench: Array
-    """Wrench of the ground on each sole in the sole's frame, force then moment, shape (2, 6) [N, N·m]."""
-
-    @property
-    def support(self) -> Array:
-        """Support joint positions, shape (15,) [rad]."""
-        return self.configuration[7:]
 
 
 def mean_stance(width: float) -> Array:

@@ -10,8 +10,9 @@ import pytest
 from iowbc.errors import Rejected
 from iowbc.recipe.generator import LabelGates, ReferenceGenerator
 from iowbc.reference.labels.gates import LabelJudge
+from iowbc.reference.labels.sample import Posture, Sample
 from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import Posture, Sample, SupportModel
+from iowbc.reference.labels.support_model import SupportModel
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,16 @@ import pytest
 from iowbc.pipeline.stage import Job
 from iowbc.recipe.generator import LabelGates, PostureProblem, ReferenceGenerator
 from iowbc.reference.labels.checks import chosen_for_crosscheck, compare_methods
-from iowbc.reference.labels.dataset import Dataset, Shard
+from iowbc.reference.labels.dataset import Dataset
 from iowbc.reference.labels.gates import LabelJudge
 from iowbc.reference.labels.gauss_newton import KinematicStart
 from iowbc.reference.labels.optimal_control import OptimalControlMethod, distribute
 from iowbc.reference.labels.plan import SamplePlan
+from iowbc.reference.labels.sample import Sample
+from iowbc.reference.labels.shards import Shard
 from iowbc.reference.labels.soles import sole_limits
 from iowbc.reference.labels.static import StaticMethod
-from iowbc.reference.labels.support_model import Sample, SupportModel
+from iowbc.reference.labels.support_model import SupportModel
 from iowbc.robot.description import Robot
 
 COMMANDS = ((0.70, 0.0), (0.60, 0.4), (0.66, -0.2), (0.68, 0.9))

@@ -1,12 +1,10 @@
-"""Rivals of the trained policy: the model-based quadratic program, and controllers that others trained."""
+"""The model-based rival: a quadratic program that balances on both feet."""
 
-from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
-from iowbc.recipe.beside import ModuleFile
-from iowbc.recipe.section import COSMETIC, NonNegative, Positive, Section
+from iowbc.recipe.section import NonNegative, Positive, Section
 
 Share = Annotated[float, Field(gt=0, le=1)]
 
@@ -83,35 +81,3 @@ class ModelBased(Section):
     stop_torque: NonNegative = 60.0
     """Torque that the mechanical stop of a joint may bear that rests on it [N·m]: what a waist that bows with a load in
     its hands lacks."""
-
-
-class PublicController(Section):
-    """A public controller. The recipe holds its digest, and nothing of its content."""
-
-    adapter: Literal["holosoma", "deploy", "own"]
-    """Description of its observation, action, gains and frequency: of the walkers of `holosoma`, of a folder with a
-    network and the `deploy.yaml` of Isaac Lab exports, or one's own `module`."""
-    module: ModuleFile | None = None
-    """Python file with a function `adapter(policy)`, which takes the controller's path and returns an
-    `iowbc.adapters.adapter.Adapter`; for the adapter `own` alone."""
-    policy: str = Field(min_length=1, json_schema_extra=COSMETIC)
-    """Its file or folder: a path from the working folder, or PACKAGE:PATH for a file of an installed package."""
-    sha256: str = Field(pattern="^[0-9a-f]{64}$")
-    """SHA-256 of the file; of a folder that of its sorted lines `DIGEST  NAME`, as `sha256sum` prints them."""
-    arms: Literal["measured", "default", "free", "own"] = "measured"
-    """Control and observation of arms. `measured`, `default`: this project's inverse kinematics holds the grasp, and
-    the controller observes the arms as measured, or in its default posture at rest (a grasp may disturb a walker that
-    was trained to move its arms; choose on development trials). `own`: the controller moves the arms, with its own
-    gains. `free`: it does so in trials without an object."""
-    heading_gain: float = Field(default=0.5, ge=0.0)
-    """Commanded yaw rate against each radian of heading error [1/s]: such a controller follows rates and drifts, where
-    learnt policies of this project observe the error. Velocity tasks of Isaac Lab train with 0.5."""
-
-    @property
-    def moves_arms(self) -> bool:
-        """True where the arms follow the controller's outputs in some trials."""
-        return self.arms in ("free", "own")
-
-    def problems(self) -> Iterator[tuple[str, str]]:
-        if (self.adapter == "own") != (self.module is not None):
-            yield "", "module: belongs to the adapter 'own', which needs it"
