@@ -37,6 +37,8 @@ PANEL_WIDTH, SMALLEST_WIDTH = 3.75, 7.5
 """Width of a panel of the comparison, and of the whole figure with its legend [inch]."""
 ROOMY = 4
 """Variants whose bars and counts have room in a panel of that width; more make it wider."""
+LONGEST_TEXT = 5
+"""Characters above a bar that stand side by side where there are more variants."""
 LABEL_WIDTH = 11
 """Characters in a line under a bar."""
 SHIFT = 0.012
@@ -119,12 +121,13 @@ def draw_bars(
     intervals: how far each reaches below and above its bar, (2, labels), of variants that have some.
     """
     width = 0.8 / max(len(heights), 3)
+    upright = len(heights) > ROOMY and max(len(text) for row in texts.values() for text in row) > LONGEST_TEXT
     for place, (variant, values) in enumerate(heights.items()):
         positions = np.arange(len(labels)) + (place - (len(heights) - 1) / 2) * width
         colour = style_of(variant, list(heights))["color"]
         spread = intervals.get(variant)
         drawn = axes.bar(positions, values, width, yerr=spread, color=colour, label=variant, error_kw=WHISKERS)
-        axes.bar_label(drawn, texts[variant], padding=2, fontsize=8)
+        axes.bar_label(drawn, texts[variant], padding=2, fontsize=8, rotation=90 if upright else 0)
     axes.set_xticks(range(len(labels)), labels, fontsize=8)
     _from_zero(axes)
     axes.set_xlim(-0.6, len(labels) - 0.4)
