@@ -44,8 +44,8 @@ class Distillation(Encoder):
     """Part of the steps in which the teacher still drives some environments: all at first, none at the end."""
     withheld: tuple[str, ...] = Field(default=(), json_schema_extra=LATER)
     """Parts of s_priv, by name, that the teacher does not receive when it drives or answers: each is its mean in
-    training. What no history shows, such as a motor's strength, the student cannot answer to as the teacher does; and a
-    teacher that walks loses nothing without it."""
+    training. The student cannot react to what no history shows, such as a motor's strength; the teacher acts better
+    without it."""
     observe_object: bool = Field(default=True, json_schema_extra=LATER)
     """Lets the student see the object where its teacher does (`task.observation.observe_object`). Without, it has
     proprioception alone (paper III-C.2), and infers the object's pose from its history as it infers s_priv."""

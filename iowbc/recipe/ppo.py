@@ -25,5 +25,5 @@ class PPO(Section):
     gradient_norm: float = Field(default=1.0, gt=0)
     """Largest norm of a gradient step."""
     std_floor: float = Field(default=0.05, gt=0)
-    """Least standard deviation. A teacher that arrives at one below half of `std_end` explores no longer and goes back
-    to its best policy; a higher one is meant to be reached."""
+    """Least standard deviation. At a floor below half of `std_end` a teacher has stopped exploring and returns to its
+    best policy; a higher floor may be reached."""

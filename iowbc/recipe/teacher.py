@@ -87,15 +87,15 @@ class HistoryNetwork(Encoder):
 
 
 class Restart(Section):
-    """A warm restart: exploration comes back once, and sinks anew. What a training of little exploration begins with it
-    keeps; what it meets then, it can still learn."""
+    """A warm restart: the standard deviation is raised once and decays again, so that a policy that hardly explores can
+    learn new conditions."""
 
     after: int = Field(default=0, ge=0, le=10**12)
     """Environment steps after which it comes; at 0 before the first, for a training that begins from a trained one
     (`teacher.start`)."""
     std: float = Field(default=0.3, gt=0)
-    """Standard deviation to which all return; at 0.3 a trained policy still walks, and its steps may be twice as
-    long at the same KL divergence."""
+    """Standard deviation set at the restart; at 0.3 a trained policy still walks, and updates may be twice as large at
+    the same KL divergence."""
     half_life: int = Field(default=4_000_000, ge=1)
     """Environment steps in which the largest standard deviation halves from there on, down to `std_end`."""
 
@@ -123,16 +123,16 @@ class Teacher(PPO):
     gamma: float = Field(default=0.99, gt=0, lt=1)
     """Discount factor (paper Table I)."""
     smoothness: float = Field(default=0.0, ge=0, json_schema_extra=LATER)
-    """Weight of the KL divergence of the policy from the mean of what it did one step before and after: half of the
-    action's second difference, in standard deviations. A reward for smoothness sees the exploration as well, whose
-    jitter outweighs the policy's own; this term does not (temporal smoothness of CAPS, Mysore et al. 2021)."""
+    """Weight of the KL divergence between the policy and its mean one step before and after: a cost of the action's
+    squared second difference. A reward for smoothness sees the exploration as well, whose jitter outweighs the policy's
+    own; this term does not (temporal smoothness of CAPS, Mysore et al. 2021)."""
     value_weight: float = Field(default=0.5, ge=0)
     """Weight of the value loss."""
     initial_std: float = Field(default=0.5, gt=0)
     """Initial standard deviation of the action, in units of the action (before the action scale); 0.3 learnt slower."""
     std_learning_rate: float = Field(default=1.5e-4, gt=0)
-    """Adam's learning rate of the standard deviation. At 5e-4 it was 0.30 after 2.3 million steps, before walking was
-    learnt; with that of the networks it stayed, and its noise alone felled a third of the standing episodes."""
+    """Adam's learning rate of the standard deviation. At 5e-4 the deviation fell to 0.30 in 2.3 million steps, before
+    walking; at the networks' rate it stayed, and its noise felled a third of the standing episodes."""
     std_half_life: int | None = Field(default=10_000_000, ge=1)
     """Environment steps in which the largest standard deviation halves, from the initial one down to `std_end`:
     exploration shrinks even where the gradient does not ask for it. Empty sets no such bound."""
@@ -183,9 +183,8 @@ class Teacher(PPO):
     steps from zero. One thing changed can so be tried in a tenth of the time. What it began from is part of the key,
     not what it was called."""
     value_first: int = Field(default=300_000, ge=0, le=10**12, json_schema_extra=LATER)
-    """With `start`: environment steps at the beginning in which the value network alone learns, what the policy that it
-    finds is worth in this world and by this reward. After 250 thousand it foresees nine tenths of the variance; a
-    policy that learns before loses what it could."""
+    """With `start`: first environment steps, in which only the value network learns, for the loaded policy, world and
+    reward. After 250 thousand it explains nine tenths of the variance; a policy updated earlier loses skills."""
     checkpoint_every: int = Field(default=20, ge=1, le=1_000_000, json_schema_extra=COSMETIC)
     """Updates between two checkpoints."""
 

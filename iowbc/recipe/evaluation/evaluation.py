@@ -18,7 +18,7 @@ class Drake(Section):
     """Integration by Drake; masses, gains, friction and all that is drawn are those of `simulation`."""
 
     timestep: float = Field(default=0.004, gt=0.0, le=0.02)
-    """Physics step [s]; a whole number of them makes a control period. Trials at 2 ms end alike."""
+    """Physics step [s]; a whole number of them makes a control period. At 2 ms most trials end alike."""
     contact: Literal["sap", "lagged", "similar"] = "lagged"
     """Contact approximation of the SAP solver: linear damping (`sap`) or that of Hunt and Crossley (`lagged`,
     `similar`). All but `lagged` let a contact that slides push apart as well."""

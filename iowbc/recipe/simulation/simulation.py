@@ -47,7 +47,7 @@ class Physics(Section):
     """Part of the no-load speed up to which a motor gives its full torque; beyond, it falls to nothing in a line.
     An assumption, not a measured curve."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    """Friction cone: the pyramid inscribed in it, or the cone itself, with which a step costs half as much again."""
+    """Friction cone: the pyramid inscribed in it, or the cone itself, which costs a tenth more."""
     solver: Literal["newton", "cg"] = "newton"
     """Constraint solver."""
     iterations: int = Field(default=10, ge=1, le=10_000)
@@ -57,7 +57,7 @@ class Physics(Section):
     """Line search iterations at most; as above."""
     body_contact: Literal["nothing", "object", "everything"] = "object"
     """Bodies that links other than soles and palms touch. Where they touch nothing, a held box sinks 4 cm into thighs
-    and torso; self-collisions and falls on hands and knees need everything. `iowbc bench sim` shows what each costs."""
+    and torso; self-collisions and falls on hands and knees need everything. docs/simulation.md has the costs."""
     leg_contact: bool = True
     """Lets the legs, feet included, touch each other; off, feet pass through each other and steps may cross."""
     contact_force: float = Field(default=1.0, gt=0.0)

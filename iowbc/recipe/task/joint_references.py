@@ -17,8 +17,8 @@ class Grasps(NamedEntries):
     free: Vector = (0.30, 0.16, 0.12)
     """Forearms before the body, as when carrying."""
     lift: Vector = (0.30, 0.16, 0.26)
-    """Beside the object, as near to the body as leaves its near side 5 cm before the torso, and so high that it hangs
-    clear of the thighs down to H 0.5: 14 cm lower, hands carry 18 % of 8 kg there."""
+    """At the object's sides, its near face 5 cm ahead of the torso, high enough to clear the thighs down to H = 0.5 m;
+    14 cm lower, hands carry only 18 % of 8 kg at that height."""
     squeeze: Vector = (0.30, 0.16, 0.26)
     """As in `lift`."""
     tyre: Vector = (0.30, 0.27, 0.12)
@@ -28,8 +28,7 @@ class Grasps(NamedEntries):
 
 
 class Loads(NamedEntries):
-    """Loads that the arms expect to carry in each scene [kg]: as much lighter or heavier objects lift or lower the
-    hands."""
+    """Loads that the arms expect in each scene [kg]; lighter objects raise the hands, heavier ones lower them."""
 
     __pydantic_extra__: dict[str, Annotated[float, Field(ge=0.0)]] = Field(init=False)
     free: float = Field(default=0.0, ge=0.0)
@@ -59,8 +58,8 @@ class ArmReference(Section):
     damping: float = Field(default=0.05, gt=0.0)
     """Damping of the pseudo-inverse [m]: joint motion is bounded by |Δx| / (2·damping) next to a singular posture."""
     reach: float = Field(default=0.2, ge=0.0)
-    """Further squared damping for each metre of error [m]: out of reach, a stretched arm settles instead of
-    overshooting, since its reach falls off by no more than half of this times the squared angle of the elbow."""
+    """Squared damping added per metre of error [m]: an arm stretched towards a target out of reach settles instead of
+    overshooting."""
     longest_step: float = Field(default=0.1, gt=0.0)
     """Longest error that a step answers to [m]: a wrist turns towards a distant target without overshooting."""
     posture_gain: float = Field(default=1.0, ge=0.0)
@@ -77,8 +76,8 @@ class Recovery(Section):
 
     tilt: float = Field(default=0.25, gt=0.0)
     """Felt tilt from the pelvis of the reference posture at which the clock starts [rad]: pitch and roll where the
-    gyroscope carries them within `horizon`. A robot that stands quietly feels 0.1 in the median and 0.25 in one step
-    of a hundred: at 0.1 the clock always runs. At 0.4 the steps come too late for 20 N·s."""
+    gyroscope carries them within `horizon`. A quiet robot measures 0.1 in the median and 0.25 in one step of a hundred:
+    up to 0.15 the clock runs most of the time. At 0.4 steps come too late for 20 N·s."""
     horizon: float = Field(default=0.25, ge=0.0)
     """Time over which the tilt goes on at the measured rate [s]: sqrt(h / g) of a pelvis at 0.7 m, so that the sum is
     the capture point's angle."""
@@ -100,7 +99,7 @@ class Placement(Section):
     integral: float = Field(default=0.0, ge=0.0, json_schema_extra=LATER)
     """Way by which both feet trail further behind for each metre that the robot is felt to be behind its command, so
     that it leans into what it pushes [m/m]. Without, a crate of 10 kg moves at 1.18 and one of 60 kg at 0.56 of the
-    commanded speed; with 0.1 at 1.05 and 0.75."""
+    commanded speed; with 0.05 at 1.07 and 0.74."""
     longest_trim: float = Field(default=0.1, ge=0.0, json_schema_extra=LATER)
     """Longest such way [m]: what 36 N in hands 0.95 m above the ground ask of 35 kg. With 0.16 policies that were not
     trained with it fall."""
